@@ -49,21 +49,6 @@ def rig_report(table: SigmaTable, gain: float, position_mm: float, effects: dict
 
 
 @pytest.mark.slow
-def test_a_place_that_runs_round_is_no_scatter(table: SigmaTable) -> None:
-    report = rig_report(table, 0.02, 0.0, {"stage_wobble": {"amplitude_mm": 0.5, "period_recordings": 6.3}})
-    assert report["verdict"] == "unexplained"
-    assert "a place that runs round, up to 0." in report["statement"]
-    assert "once in 6." in report["statement"]
-
-
-@pytest.mark.slow
-def test_a_memory_of_the_preload_before_is_found(table: SigmaTable) -> None:
-    report = rig_report(table, 0.02, 0.0, {"hysteretic_d33": {"amplitude": 0.1}})
-    assert report["verdict"] == "unexplained"
-    assert "the preload of the recording before" in report["statement"]
-
-
-@pytest.mark.slow
 def test_what_scatters_as_no_rig_does_is_unexplained(table: SigmaTable) -> None:
     assert rig_report(table, 0.25, 0.0, {})["verdict"] == "unexplained"
 

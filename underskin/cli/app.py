@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import diagnose, store, stress
+from underskin.cli import diagnose, mechanism, store, stress
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -202,6 +202,7 @@ app.command("stress", no_args_is_help=True)(stress.stress)
 app.command("import", no_args_is_help=True)(store.import_files)
 app.command("export", no_args_is_help=True)(store.export_skin)
 diagnose.add_commands(app)
+app.add_typer(mechanism.app, name="mechanism")
 
 
 def _add_commands_of_other_packages() -> None:

@@ -63,6 +63,10 @@ def diagnose(
     campaign: Annotated[
         list[str] | None, typer.Option(help="Id of a campaign that the service keeps and diagnoses; repeatable.")
     ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option(help="A mechanism to leave out of the catalogue: suppose that it is not that; repeatable."),
+    ] = None,
     url: Url = LOCAL,
     key: KeyOption = None,
 ) -> None:
@@ -72,11 +76,13 @@ def diagnose(
 
     one_blas_thread()
     files, campaign = files or [], campaign or []
+    if without and campaign:
+        raise typer.BadParameter("is for files; the service diagnoses with its whole catalogue", param_hint="--without")
     _refuse_overwriting(files, campaign, output_dir)
     description = None if rig is None else rig_description_in(rig)
     output_dir.mkdir(parents=True, exist_ok=True)
     # Absolute, since a cluster's workers have a working folder of their own
-    one = partial(_one, rig=description, output_dir=output_dir.resolve(), html=html)
+    one = partial(_one, rig=description, output_dir=output_dir.resolve(), html=html, without=without or [])
     failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
@@ -174,7 +180,7 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bool) -> _Outcome:
+def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bool, without: Sequence[str]) -> _Outcome:
     """Read, diagnose and write one campaign."""
     from underskin.diagnosis.pipeline import diagnose as work_out
     from underskin.diagnosis.pipeline import with_refused
@@ -183,7 +189,7 @@ def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bo
 
     try:
         reading = read_file(file, file.name, rig)
-        diagnosis = with_refused(work_out(reading.campaign, _table()), reading.problems)
+        diagnosis = with_refused(work_out(reading.campaign, _table(), without=without), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")
     document = report(diagnosis)

@@ -1,7 +1,7 @@
 """A campaign's diagnosis: screening → rows with noise → search → location → held-out groups → plan → report."""
 
 import importlib.metadata
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +25,7 @@ from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
+from underskin.diagnosis.selection.unnamed_search import law_of, with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation
@@ -36,7 +37,8 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.registry import CATALOGUE, Known
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
@@ -45,6 +47,7 @@ _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
+_LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -52,22 +55,30 @@ NO_LIMITS = RigLimits()
 
 
 def diagnose(
-    campaign: Campaign, table: SigmaTable, progress: Progress = lambda _: None, limits: RigLimits = NO_LIMITS
+    campaign: Campaign,
+    table: SigmaTable,
+    progress: Progress = lambda _: None,
+    limits: RigLimits = NO_LIMITS,
+    without: Collection[str] = (),
 ) -> DiagnosisResult:
     """What recordings and model disagree about, and what physics was left out.
 
     FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. From a
     campaign that holds nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
-    (`recordings/plausibility.py`).
+    (`recordings/plausibility.py`). Mechanisms `without` which it is to be explained are left out of the catalogue.
+
+    Raises InvalidInput where one of those is not in it.
     """
-    diagnosis = _diagnosed(campaign, table, progress, limits)
+    diagnosis = _diagnosed(campaign, table, progress, limits, Known(without))
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
-def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits) -> DiagnosisResult:
+def _diagnosed(
+    campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: Known
+) -> DiagnosisResult:
     progress(0.05)
     possible = without_extremes(campaign)
-    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table))
+    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table, mechanisms))
     if possible.findings and possible.lacking:
         return replace(begun, lacking=possible.lacking)
     campaign = possible.campaign
@@ -79,7 +90,7 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
         begun = begun.with_findings(*unusable, *curves.findings)
         if curves.findings and curves.lacking:
             return replace(begun, lacking=curves.lacking)
-        rows = curve_lines(curves.campaign, kind)
+        rows = replace(curve_lines(curves.campaign, kind), mechanisms=mechanisms)
         if rows.recordings:
             problem = FittingProblem(rows, table)
             result = search(problem)
@@ -93,8 +104,10 @@ def _diagnosed(campaign: Campaign, table: SigmaTable, progress: Progress, limits
     begun = begun.with_findings(*inspected.findings)
     if inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
-    problem, known = frf_problem(inspected.campaign, inspected.uneven, table)
-    return _work_out(begun, problem, search(problem, known), progress, limits)
+    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+    result = search(problem, known)
+    result = replace(result, laws=tuple(with_laws(problem, result)))
+    return _work_out(begun, problem, result, progress, limits)
 
 
 def _work_out(
@@ -118,7 +131,7 @@ def _work_out(
     )
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    groups = cross_validation.hold_out(problem, ranked, nothing, result.supported)
+    groups = _held_out(problem, result, ranked, nothing)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
@@ -129,6 +142,8 @@ def _work_out(
         result = replace(result, contradicted=frozenset(contradicted))
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
+    if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
+        groups = _held_out(problem, result, ranked, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)
@@ -138,7 +153,8 @@ def _work_out(
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
-    shape = describe(problem, shown) if leader.explanation is None and shown.names not in result.imitating else None
+    undescribed = leader.explanation is None and shown.names not in result.imitating and result.law is None
+    shape = describe(problem, shown) if undescribed else None
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
@@ -151,6 +167,25 @@ def _work_out(
         power=power(signatures, shown, result.supported),
         shape=shape,
         plan=plan(problem, result, limits),
+    )
+
+
+def _held_out(
+    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
+) -> list[cross_validation.HeldOut]:
+    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
+    law = result.law
+    if result.answers[0].explanation is not None or law is None:
+        return cross_validation.hold_out(
+            problem, ranked, nothing, result.log_prior, cross_validation.groups(problem.lines)
+        )
+    laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
+    both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
+    leading = law_of(problem, law)
+    ids = [entry.id for entry in problem.lines.campaign.recordings]
+    column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
+    return cross_validation.hold_out(
+        problem, both, nothing, result.log_prior, cross_validation.thirds(problem.lines, column)
     )
 
 
@@ -191,7 +226,7 @@ def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]
     return replace(diagnosis, findings=(*problems, *diagnosis.findings), lacking=lacking)
 
 
-def _provenance(table: SigmaTable) -> dict[str, Any]:
+def _provenance(table: SigmaTable, mechanisms: Known) -> dict[str, Any]:
     return {
         "underskin": importlib.metadata.version(underskin.__name__),
         "numpy": np.__version__,
@@ -199,4 +234,5 @@ def _provenance(table: SigmaTable) -> dict[str, Any]:
         "tables": {"sigma": table.sha256},
         "seed": SEED,
         **({"mechanisms": dict(CATALOGUE.packages)} if CATALOGUE.packages else {}),
+        **({"without": list(mechanisms.without)} if mechanisms.without else {}),
     }

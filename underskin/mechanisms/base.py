@@ -21,11 +21,12 @@ if TYPE_CHECKING:
     from underskin.mechanisms.models.curve_state import Curve
     from underskin.mechanisms.models.frf_design import FrfDesign
     from underskin.mechanisms.models.pickup import Pickup
+    from underskin.surrogate.sigma_table import SigmaTable
 
 Kind = Literal["frf", "indentation", "compression"]
 UNITS = (
     *("-", "mm", "MPa", "1/MPa", "GPa", "N/mm", "N", "1/N", "g", "J/m²", "Hz", "s", "1/s", "ms", "µs", "°"),
-    *("pC", "pC/N", "pF", "MΩ", "cycles"),
+    *("pC", "pC/N", "pF", "MΩ", "cycles", "h"),
 )
 AXES = (  # fields of a campaign along which an effect can show
     *("preload_n", "indenter_radius_mm", "position_mm", "sensor", "dwell_s", "load_cycles", "dynamic_force_n"),
@@ -77,27 +78,29 @@ class Mechanism:
     composition; `kinds` of recordings that it acts on; `axes` of the campaign on which the effect shows.
     """
 
-    name: ClassVar[str]
-    plain: ClassVar[str]
-    law: ClassVar[str]
-    assumptions: ClassVar[str]
-    source: ClassVar[str]
+    name: str
+    plain: str
+    law: str
+    assumptions: str
+    source: str
     stage: ClassVar[Stage]
     order: ClassVar[int] = 100
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]]
-    needs: ClassVar[str] = "nothing beyond the recordings themselves"
-    parameters_stated: ClassVar[tuple[Parameter, ...]] = ()  # those that are the same for all campaigns and kinds
+    needs: str = "nothing beyond the recordings themselves"
+    parameters_stated: tuple[Parameter, ...] = ()  # those that are the same for all campaigns and kinds
     # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
     needs_fields: ClassVar[tuple[str, ...]] = ()
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
     # layer that much thicker or thinner.
     needs_stiffness: ClassVar[bool] = False
     needs_neighbours: ClassVar[bool] = False
+    tells_recordings_apart: ClassVar[bool] = False  # its lines differ between recordings of one and the same contact
     largest_offset: ClassVar[float] = 0.0
     largest_stretch: ClassVar[float] = 1.0
     moves_predictions: ClassVar[bool] = True  # False: it acts on the covariance alone
     moves_contact_points: ClassVar[bool] = False  # of indentations: contact begins elsewhere than the base model has it
+    begins_at_guesses: ClassVar[bool] = False  # fits begin there alone, not at quantiles of its priors
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
@@ -134,6 +137,10 @@ class Mechanism:
         Raises InvalidInput where they say too little for that campaign.
         """
         return values
+
+    def bind(self, conditions: Conditions, table: SigmaTable) -> Mechanism:
+        """The mechanism for the recordings of one campaign and their parts; itself where it needs no campaign."""
+        return self
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""

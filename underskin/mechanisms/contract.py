@@ -76,6 +76,14 @@ def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:
                 raise not_unique(_field(entry, "name"), entry.name, f"is taken by {taken[entry.name]}")
             if entry.acts_on == "gain_spread" and spreads:
                 raise not_unique(_field(entry, "acts_on"), entry.acts_on, f"is taken by {spreads[0]}")
+    check_numbers(mechanism)
+
+
+def check_numbers(mechanism: Mechanism) -> None:
+    """Whether a law gives finite numbers on a synthetic campaign of each kind that supports it.
+
+    Raises InvalidInput where it does not.
+    """
     for kind in mechanism.kinds:
         _check_numbers(mechanism, kind)
 

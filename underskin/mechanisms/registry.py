@@ -1,20 +1,29 @@
-"""All mechanisms by name, in the order in which a model composes them: those of this package, then those of others.
+"""All mechanisms by name, in the order in which a model composes them: this package's, those of others, the lab's own.
 
 A mechanism of this package is a module of `underskin.mechanisms.laws`; one of another package is named by an entry
-point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one.
+point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one; the lab's own are files
+(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names.
 """
 
-from collections.abc import Iterator, Mapping
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from inspect import isclass
 from pkgutil import iter_modules
+from typing import TYPE_CHECKING
 
 from underskin import extensions
-from underskin.errors import InvalidInput
+from underskin.errors import FileError, InvalidInput, not_one_of
 from underskin.mechanisms import laws
 from underskin.mechanisms.base import Mechanism
+
+if TYPE_CHECKING:
+    from underskin.recordings.conditions import Conditions
+    from underskin.surrogate.sigma_table import SigmaTable
 
 GROUP = "underskin.mechanisms"
 
@@ -48,6 +57,46 @@ class Catalogue(Mapping[str, Mechanism]):
 CATALOGUE = Catalogue()
 
 
+class Known(Mapping[str, Mechanism]):
+    """What one diagnosis composes its models of: the catalogue less what is left out, and laws bound to its recordings.
+
+    Those are added as a screening finds them, and come last.
+    """
+
+    def __init__(self, without: Collection[str] = ()) -> None:
+        """Raises InvalidInput where `without` names something that is not in the catalogue."""
+        for name in without:
+            if name not in CATALOGUE:
+                raise not_one_of("without", name, CATALOGUE)
+        self._named = {name: mechanism for name, mechanism in CATALOGUE.items() if name not in without}
+        self._bound: dict[str, Mechanism] = {}
+        self.without = tuple(name for name in CATALOGUE if name in without)
+
+    def __getitem__(self, name: str) -> Mechanism:
+        return self._named[name] if name in self._named else self._bound[name]
+
+    def __iter__(self) -> Iterator[str]:
+        yield from self._named
+        yield from self._bound
+
+    def __len__(self) -> int:
+        return len(self._named) + len(self._bound)
+
+    @property
+    def named(self) -> Mapping[str, Mechanism]:
+        """Those of the catalogue."""
+        return self._named
+
+    def bind(self, conditions: Conditions, table: SigmaTable) -> None:
+        """Bind the lab's own mechanisms to the recordings of this diagnosis."""
+        for name, mechanism in self._named.items():
+            self._named[name] = mechanism.bind(conditions, table)
+
+    def add(self, law: Mechanism) -> None:
+        """One more, bound to the recordings of this diagnosis."""
+        self._bound[law.name] = law
+
+
 @cache
 def built_in() -> tuple[Mechanism, ...]:
     """The mechanisms of this package in order of composition."""
@@ -74,7 +123,19 @@ def _loaded() -> _Loaded:
         mechanism = _checked(extension, mechanisms)
         packages[mechanism.name] = extension.package
         mechanisms.append(mechanism)
+    for declared, file in _declared():
+        if declared.name in {other.name for other in mechanisms}:
+            raise FileError(file, "name", f"{declared.name!r} is taken by another mechanism")
+        packages[declared.name] = file
+        mechanisms.append(declared)
     return _Loaded({mechanism.name: mechanism for mechanism in _in_order(mechanisms)}, packages)
+
+
+def _declared() -> list[tuple[Mechanism, str]]:
+    """Those of the lab's folder, each with its file."""
+    from underskin.mechanisms.declared.document import in_folder  # the models, which few callers need
+
+    return [*in_folder()] if os.environ.get("UNDERSKIN_MECHANISMS") else []
 
 
 def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechanism:

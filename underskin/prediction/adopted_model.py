@@ -6,7 +6,7 @@ mechanisms that act line by line (resonance, delays, high pass), as a plateau wo
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,29 +14,33 @@ from scipy.special import ndtri
 
 from underskin.errors import InvalidInput, conflicting
 from underskin.findings import sentences
-from underskin.mechanisms.base import Mechanism, Stage
+from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.binding import OF_ONE_CAMPAIGN, bound_to
+from underskin.mechanisms.unnamed.grammar import Grammar
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.conditions import Conditions, SkinDescription, frf_of
 from underskin.recordings.frf.estimation import lines_of
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Indices, Mask, to_si
 
 _DECLARED = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 NOT_ADOPTED = {
     "ambiguous": "several explanations remain, and only one can serve. Record what the report plans "
     "(next_experiment), send it together with these recordings, and diagnose that",
-    "unexplained": "none of the known mechanisms describes what is missing, so that nothing could "
-    "be predicted with it. Look at the rig where the report says that the misfit lies, and record it again",
+    "unexplained": "none of the known mechanisms describes what is missing, and no law over one axis that holds for "
+    "other recordings stands for it. Look at the rig where the report says that the misfit lies, and record it again",
     "no_mismatch": "nothing is missing, so that there is nothing to adopt; the paper's model serves",
     "insufficient_data": "too little was recorded to tell what is missing. Record what the report "
     "plans (next_experiment), send it together with these recordings, and diagnose that",
 }  # by verdict: why it is refused, and what to do
+UNNAMED = "a law without a name"  # what an adopted one is called
 _SAME = 1e-9  # relative
 _ANY_LINE = np.array([1.0])  # Hz
 _REPORTED_SDS = 2 * float(ndtri(0.975))  # width of a report's interval
@@ -62,6 +66,8 @@ class AdoptedModel:
     skin: SkinDescription
     parameters: Mapping[str, Mapping[str, float]]
     unsure: float
+    law: UnnamedLaw | None = None  # that nobody listed, as it was found
+    of_law: Mapping[str, float] = field(default_factory=dict)  # its parameters
 
     @property
     def mechanisms(self) -> list[Mechanism]:
@@ -71,12 +77,16 @@ class AdoptedModel:
     @property
     def of_lines(self) -> list[str]:
         """Names of the mechanisms that act line by line."""
-        return [mechanism.name for mechanism in self.mechanisms if mechanism.stage is Stage.LINES]
+        names = [mechanism.name for mechanism in self.mechanisms if mechanism.stage is Stage.LINES]
+        return [*names, *([UNNAMED] if self.law is not None and self.law.stage is Stage.LINES else [])]
 
     @property
     def needs(self) -> dict[str, str]:
         """Fields of a recording that its predictions need beside sphere, preload and lines; each with who needs it."""
-        return needed_fields(self.mechanisms)
+        needed = needed_fields(self.mechanisms)
+        if isinstance(self.law, RecordingLaw | LagLaw) and self.law.axis.name in NEEDED_FIELDS:
+            needed.setdefault(self.law.axis.name, UNNAMED)
+        return needed
 
     def require_skin(self, declared: Mapping[str, Any]) -> None:
         """Raises InvalidInput where a skin is declared otherwise than the one that was diagnosed.
@@ -103,13 +113,19 @@ class AdoptedModel:
         known: dict[str, float] = {}
         for mechanism in mechanisms:
             known |= mechanism.values_on(self.parameters[mechanism.name], conditions)
+        inside = np.ones(len(frf_of(conditions)), dtype=bool)
+        if self.law is not None:
+            law, inside = bound_to(self.law, conditions, table, tuple(CATALOGUE.values()))
+            if not (level and law.stage is Stage.LINES):
+                mechanisms = [*mechanisms, law]
+                known |= self.of_law
         model = forward_model(mechanisms, conditions, table, "frf")
         fit = [_on_fit(parameter, known.get(parameter.name, 1.0)) for parameter in model.parameters]
         predicted = model.predict(np.array(fit))
         return Response(
             value=predicted.value.astype(np.complex128) / float(to_si("d33_pc_per_n", 1.0)),
             recording=model.recording,
-            inside=model.valid & predicted.inside,
+            inside=model.valid & predicted.inside & inside[model.recording],
         )
 
     def as_base_model(self, campaign: Campaign, table: SigmaTable) -> tuple[Campaign, list[str]]:
@@ -133,13 +149,12 @@ class AdoptedModel:
         return replace(campaign, recordings=tuple(recordings)), left_out
 
 
-def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
+def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None = None) -> AdoptedModel:
     """The model of a `report/1` and the campaign that it is of; raises InvalidInput where it cannot serve."""
-    if report["verdict"] != "explained":
+    why_not = not_adopted(report)
+    if why_not is not None:
         raise InvalidInput(
-            "diagnosis_id",
-            f"a diagnosis of verdict {report['verdict']}",
-            f"must be explained: {NOT_ADOPTED[report['verdict']]}",
+            "diagnosis_id", f"a diagnosis of verdict {report['verdict']}", f"must be explained: {why_not}"
         )
     reason = implausible_d33(report)
     if reason is not None:
@@ -161,7 +176,33 @@ def adopted(report: Mapping[str, Any], campaign: Campaign) -> AdoptedModel:
             allowed = "must be of mechanisms that this version knows, with the parameters that it knows"
             raise InvalidInput("diagnosis_id", name, allowed)
     d33 = report["d33"]
-    return AdoptedModel(campaign.skin, parameters, float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS)
+    unsure = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
+    model = AdoptedModel(campaign.skin, parameters, unsure)
+    return model if report["verdict"] == "explained" else replace(model, **_law(report, campaign, table))
+
+
+def not_adopted(report: Mapping[str, Any]) -> str | None:
+    """Why a diagnosis cannot serve as a model, by its verdict; None where it may.
+
+    A law that nobody listed may, where it is certain and its axis says something of other recordings.
+    """
+    if report["verdict"] == "explained":
+        return None
+    law = report.get("unnamed")
+    if law is None or report["d33"] is None or law["axis"] in OF_ONE_CAMPAIGN:
+        return NOT_ADOPTED[report["verdict"]]
+    return None
+
+
+def _law(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None) -> dict[str, Any]:
+    """The law of a report, and its parameters."""
+    found = report["provenance"]["unnamed"]
+    lines = np.concatenate([lines_of(entry).frequency for entry in frf_recordings(campaign)])
+    grammar = Grammar.of(campaign, lines, load_table() if table is None else table, tuple(CATALOGUE.values()))
+    law = next((entry for entry in grammar.laws if entry.name == found["law"]), None)
+    if law is None or {entry.name for entry in law.parameters_bound} != set(found["parameters"]):
+        raise InvalidInput("diagnosis_id", found["law"], "must be a law that this version knows")
+    return {"law": law, "of_law": dict(found["parameters"])}
 
 
 def implausible_d33(report: Mapping[str, Any]) -> str | None:

@@ -67,7 +67,8 @@ class FrfConditions:
     """The skin is pressed by `preload_n` and shaken by `dynamic_force_n` (peak amplitude) at `frequency_hz`.
 
     A `dynamic_force_n` of 0 stands for the limit of a small oscillation. `frequency_hz` is None where a time series is
-    recorded, whose lines are yet to be estimated.
+    recorded, whose lines are yet to be estimated. `conditions` holds what else the lab noted, numbers or words by names
+    of its own.
     """
 
     id: field.Name
@@ -81,6 +82,7 @@ class FrfConditions:
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     frequency_hz: field.Frequencies | None = None
+    conditions: field.Further | None = None
 
     def without_measurements(self, **changes: Any) -> "FrfConditions":
         """These conditions alone, with some of them changed."""
@@ -111,6 +113,7 @@ class IndentationConditions:
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     stage_stiffness_n_per_mm: field.Positive | None = None
+    conditions: field.Further | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +130,7 @@ class CompressionConditions:
     recorded_at: field.TimeOfDay | None = None
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
+    conditions: field.Further | None = None
 
 
 CurveConditions = IndentationConditions | CompressionConditions

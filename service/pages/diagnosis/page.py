@@ -122,14 +122,15 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a report cannot become a model, and what to do; None where it can."""
-    from underskin.prediction.adopted_model import NOT_ADOPTED, implausible_d33
+    from underskin.prediction.adopted_model import implausible_d33, not_adopted
 
-    if report["verdict"] == "explained":
+    why_not = not_adopted(report)
+    if why_not is None:
         if report["d33"] is None:
             return "it is of curves, which have no d33: a model of a skin is of FRFs"
         reason = implausible_d33(report)
         return None if reason is None else f"its d33 cannot be right: {reason}"
-    return NOT_ADOPTED[report["verdict"]]
+    return why_not
 
 
 def _kept(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:

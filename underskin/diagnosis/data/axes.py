@@ -50,31 +50,6 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     return {name: column for name, column in columns_by_axis.items() if np.ptp(column, axis=0).max() > 1e-9}
 
 
-def order(campaign: Campaign) -> Floats:
-    """Which recording came how late, from 0 (recordings,): by its time, else by its load cycles, else as listed."""
-    for name in ("recorded_at", "load_cycles"):
-        values = [getattr(entry, name, None) for entry in campaign.recordings]
-        if None not in values and len(set(values)) == len(values):
-            column = hours(values) if name == "recorded_at" else np.array(values, dtype=float)
-            return np.argsort(np.argsort(column)).astype(float)
-    return np.arange(len(campaign.recordings), dtype=float)
-
-
-def preload_before(campaign: Campaign) -> Floats | None:
-    """How much higher the preload of the recording before was: log(F_before/F), 0 of the first (recordings, 1).
-
-    None where it is the same of all, or does not change from one to the next.
-    """
-    entries = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
-    if len(entries) != len(campaign.recordings):
-        return None
-    place = np.argsort(order(campaign))
-    preload = np.log([entries[number].preload_n for number in place])
-    column = np.zeros((len(place), 1))
-    column[place[1:], 0] = -np.diff(preload)
-    return column if np.ptp(column) > 1e-9 else None
-
-
 def hours(times: list[str | None]) -> Floats:
     """Hours since the first of these times (ISO 8601; UTC where they do not say)."""
     read = [datetime.fromisoformat(str(time).replace("Z", "+00:00")) for time in times]

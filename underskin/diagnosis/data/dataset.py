@@ -6,7 +6,7 @@ first sum, which no such model changes, is carried along in `scatter`.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -16,6 +16,7 @@ from underskin.diagnosis.noise.correlated_error import CurveError, Whitening
 from underskin.diagnosis.noise.line_noise import LineNoise, line_noise
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
+from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, frf_recordings, samples_of
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Complexes, Floats, Indices, Mask
@@ -42,6 +43,7 @@ class Lines:
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
     smooth: CurveError | None = None  # of curves
+    mechanisms: Known = field(default_factory=Known)  # that may explain them
 
     @property
     def recordings(self) -> int:

@@ -22,7 +22,6 @@ from underskin.diagnosis.inference.starts import Beginning, best_starts
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER, POSITION_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
@@ -45,14 +44,14 @@ class Explanation:
     each: tuple[tuple[float, Evidence], ...]  # without and with it, as far as they were fitted, with their log priors
 
     @classmethod
-    def of(cls, names: Sequence[str], each: Sequence[tuple[float, Evidence]]) -> Self:
+    def of(cls, each: Sequence[tuple[float, Evidence]]) -> Self:
         """From the fits, the log prior of each beside it."""
         weights = np.array([prior + fit.log_evidence for prior, fit in each])
         total = float(np.logaddexp.reduce(weights))
         best = each[int(np.argmax(weights))][1]
         scattered = [fit.hypothesis.placed for _, fit in each]
         placed = float(np.exp(weights[scattered] - total).sum())
-        return cls(tuple(name for name in CATALOGUE if name in names), total, best, placed, tuple(each))
+        return cls(each[0][1].hypothesis.model.names, total, best, placed, tuple(each))
 
     @property
     def model(self) -> Model:
@@ -105,13 +104,13 @@ class FittingProblem:
 
     def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
-        whole = whole or any(CATALOGUE[name].needs_lines for name in names)
+        whole = whole or any(self.lines.mechanisms[name].needs_lines for name in names)
         key = frozenset(names), whole, placed
         if key not in self._hypotheses:
             other = self._hypotheses.get((frozenset(names), whole, not placed))
             if other is None:
                 lines = self.lines if whole else self.collapsed
-                model = compose(names, lines.campaign, self.table, self.kind)
+                model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
                 other = Hypothesis(model, lines, self.curvature, placed)
             self._hypotheses[key] = replace(other, placed=placed)
         return self._hypotheses[key]
@@ -153,9 +152,7 @@ class FittingProblem:
                 fits[number].append((float(log_priors[1]), evidence))
             elif np.isfinite(requests[number].target(True)):
                 fits[number].clear()
-        return [
-            Explanation.of(request.names, own) if own else None for request, own in zip(requests, fits, strict=True)
-        ]
+        return [Explanation.of(own) if own else None for own in fits]
 
     def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
         """Sets fitted to more recordings, fitted to these from where they stood; by the Laplace approximation.
@@ -176,10 +173,7 @@ class FittingProblem:
         requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
         fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}
         each = [fitted.get(entry.names) for entry in explanations]
-        return [
-            Explanation.of(entry.names, [(0.0, evidence)]) if evidence else None
-            for entry, evidence in zip(explanations, each, strict=True)
-        ]
+        return [Explanation.of([(0.0, evidence)]) if evidence else None for evidence in each]
 
     def _position_matters(self, hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, bool]:
         """Of those hypotheses that have points, whether positioning scatter as large as it usually gets would show in
@@ -212,7 +206,7 @@ def integrated(explanations: Sequence[Explanation]) -> list[Explanation]:
     whole = over_all_values([each[number][place][1] for number, place in counting])
     for (number, place), fit in zip(counting, whole, strict=True):
         each[number][place] = each[number][place][0], fit
-    return [Explanation.of(entry.names, own) for entry, own in zip(explanations, each, strict=True)]
+    return [Explanation.of(own) for own in each]
 
 
 def _fitted(

@@ -18,7 +18,6 @@ from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
@@ -91,7 +90,7 @@ class Hypothesis:
     @cached_property
     def own_parameters(self) -> int:
         """How many of the model's parameters are its mechanisms' own; they come first."""
-        mechanisms = [CATALOGUE[name] for name in self.model.names]
+        mechanisms = [self.lines.mechanisms[name] for name in self.model.names]
         return sum(map(len, parameters_together(mechanisms, self.lines.campaign, self.lines.kind).values()))
 
     def group(self, number: int) -> object:
@@ -154,7 +153,7 @@ def curvature_of_prior(entry: Parameter) -> tuple[float, float]:
 
 def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     """Where in a composed model's parameters each mechanism's are."""
-    mechanisms = [mechanism for name, mechanism in CATALOGUE.items() if name in names]
+    mechanisms = [mechanism for name, mechanism in lines.mechanisms.items() if name in names]
     places, first = {}, 0
     for name, own in parameters_together(mechanisms, lines.campaign, lines.kind).items():
         places[name] = slice(first, first + len(own))

@@ -15,7 +15,6 @@ from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_pr
 from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT
 from underskin.diagnosis.noise.noise_priors import START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import curves_of
 from underskin.units import Floats
 
@@ -49,7 +48,7 @@ class LeastSquares:
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
         travels = [entry.displacement_mm for entry in curves_of(lines.campaign)]
         self._approach = [np.unique(travel[: int(travel.argmax()) + 1]) for travel in travels]
-        self._jumps = any(CATALOGUE[name].moves_contact_points for name in model.names)
+        self._jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
 
     def fitted(self, start: Floats) -> tuple[Floats, float]:
         """The fit coordinates (parameters,) from a start, and half the sum of squares there."""

@@ -122,9 +122,9 @@ class Evaluator:
         for rows, response in parts:
             own = self.hypotheses[points.owner[rows[0]]]
             each.append(FrfProducts.of(own.frf_lines, own.pickup_rows, response))
-        if len(parts) == 1:
-            return each[0]
         order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+        if len(parts) == 1:  # whose points come in the order of what presses their contacts
+            return each[0] if (np.diff(order) == 1).all() else each[0][order]
         return FrfProducts.joined(each, max(self.counts))[order]
 
     def weighed(self, points: Points, products: Products) -> Evaluated:

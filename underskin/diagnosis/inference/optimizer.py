@@ -17,7 +17,6 @@ from underskin.diagnosis.inference.objective import Evaluator
 from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, START_GAIN
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats, Indices, Mask
 
 __all__ = ["Evaluated", "Fitter"]
@@ -142,7 +141,7 @@ class Fitter(Evaluator):
         for number, hypothesis in enumerate(self.hypotheses):
             moves[number, : self.counts[number]] = [not entry.proportional for entry in hypothesis.model.parameters]
             for name, own in own_places(hypothesis.model.names, self.lines).items():
-                moves[number, own] &= not CATALOGUE[name].needs_lines
+                moves[number, own] &= not self.lines.mechanisms[name].needs_lines
         return moves
 
     def improve(self, start: Points, target: Target | None = None) -> Evaluated:

@@ -12,7 +12,6 @@ from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_p
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.points import Points, together
 from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
@@ -65,6 +64,8 @@ class _Grid:
         self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
         parameters = {name: hypothesis.model.parameters[places[name]] for name in self.new}
         quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+        if any(hypothesis.lines.mechanisms[name].begins_at_guesses for name in self.new):
+            quantiles = (0.5,)
         axes = [[entry.quantile(q) for q in quantiles] for name in self.new for entry in parameters[name]]
         free = [place for name in self.new for place in range(places[name].start, places[name].stop)]
         points = [*itertools.product(*axes)]
@@ -84,7 +85,7 @@ def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[st
     ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
     several = lowest[np.append(np.sort(ranked), np.arange(count, len(lowest)))]
     alone = len(fitter.hypotheses[0].model.names) == 1
-    sticks = alone and any(CATALOGUE[name].moves_contact_points for name in new)
+    sticks = alone and any(fitter.lines.mechanisms[name].moves_contact_points for name in new)
     if fitter.lines.kind == "indentation" and (sticks or beginning.begin is None):
         several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
     kept = _KEPT_OF_PARENT if beginning.parent is not None else _KEPT_STARTS
@@ -104,13 +105,13 @@ def _cheapest(at: Evaluated) -> Indices:
 
 def _guesses(names: Sequence[str], hypothesis: Hypothesis) -> list[list[float]]:
     """Fit coordinates of these mechanisms' parameters as the recordings suggest them; none where one has no guess."""
-    conditions, kind = hypothesis.lines.campaign, hypothesis.lines.kind
+    conditions, kind, known = hypothesis.lines.campaign, hypothesis.lines.kind, hypothesis.lines.mechanisms
     each = []
     for name in names:
-        entries = CATALOGUE[name].parameters(conditions, kind)
+        entries = known[name].parameters(conditions, kind)
         values = [
             dict(zip([one.name for one in entries], guess, strict=True))
-            for guess in CATALOGUE[name].guesses(conditions, kind)
+            for guess in known[name].guesses(conditions, kind)
         ]
         each.append([[_coordinate(one, guess) for one in entries] for guess in values])
     return [list(itertools.chain(*combined)) for combined in itertools.product(*each)] if names else []

@@ -11,18 +11,14 @@ from enum import StrEnum
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import order, preload_before, recording_axes
+from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
+from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
-from underskin.diagnosis.selection.recording_gp import relative_place_slopes
-from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
 _GRID = 40
-_LEAST_IN_ORDER = 8  # recordings
 ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
-PRELOAD_BEFORE, ORDER = "preload_before", "order"  # axes that are no fields of the campaign
 _LOGARITHMIC = (
     "preload_n",
     "indenter_radius_mm",
@@ -30,12 +26,11 @@ _LOGARITHMIC = (
     "load_cycles",
     "dwell_s",
     "frequency_hz",
-    PRELOAD_BEFORE,
 )
 
 
 class FormKind(StrEnum):
-    """A simple form of a residual over one axis; `CIRCLING` is a contact that circles about its place."""
+    """A simple form of a residual over one axis."""
 
     POWER_LAW = "power_law"
     DRIFT = "drift"
@@ -43,16 +38,14 @@ class FormKind(StrEnum):
     PERIODIC = "periodic"
     PEAK = "peak"
     BUMP = "bump"
-    CIRCLING = "circling"
 
 
 @dataclass(frozen=True)
 class ShapeForm:
     """A form, the value `at` which it lies (of periodic ones the period; NaN of none), and its size.
 
-    The size is in percent of the response, of curves in percent of the largest force; of circling contacts it is the
-    distance in mm, and the period counts recordings. `axis` is a field of the campaign, `PRELOAD_BEFORE` or `ORDER`;
-    `component` 0 or 1 is x or y of an axis of places. `gain` is the gain in information over a constant.
+    The size is in percent of the response, of curves in percent of the largest force. `axis` is a field of the
+    campaign; `component` 0 or 1 is x or y of an axis of places. `gain` is the gain in information over a constant.
     """
 
     kind: FormKind
@@ -98,12 +91,11 @@ def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeF
     levels = explanation.best.levels
     left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     forms: list[ShapeForm] = []
-    for name, column in _axes(problem.lines.campaign).items():
+    for name, column in recording_axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             component = None if column.shape[1] == 1 else index
             best = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
             forms += [replace(form, component=component) for form in best]
-    forms += _circling(problem, explanation, left)
     line, centres = frequency_bins(problem.lines.frequency)
     if len(centres) >= 6:
         total = np.bincount(line, left.line_weight, len(centres)).astype(float)
@@ -113,37 +105,6 @@ def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeF
         ]
         forms += _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
     return forms
-
-
-def _axes(campaign: Campaign) -> dict[str, Floats]:
-    """The campaign's own, the order, and what the preload had been before."""
-    axes = recording_axes(campaign)
-    before = preload_before(campaign)
-    if before is not None:
-        axes[PRELOAD_BEFORE] = before
-    return {**axes, ORDER: order(campaign)[:, None]}
-
-
-def _circling(problem: FittingProblem, explanation: Explanation, left: Residuals) -> list[ShapeForm]:
-    """A contact that circles about its place while recordings are made, with the period that fits best."""
-    rank = order(problem.lines.campaign)
-    slopes = 1e-3 * relative_place_slopes(explanation.best).T  # per mm
-    if not np.abs(slopes).max() > 0 or len(rank) < _LEAST_IN_ORDER:
-        return []
-    root = 1 / left.gain_deviation
-    best: list[ShapeForm] = []
-    plain = float((((left.gain - np.average(left.gain, weights=root**2)) * root) ** 2).sum())
-    for period in 2 * len(rank) / np.arange(1, len(rank)):
-        angle = 2 * np.pi * rank / period
-        waves = np.column_stack([np.sin(angle), np.cos(angle)])
-        basis = np.column_stack([np.ones(len(rank)), slopes[:, :1] * waves, slopes[:, 1:] * waves])
-        coefficients = np.linalg.lstsq(basis * root[:, None], left.gain * root, rcond=None)[0]
-        square = float((((left.gain - basis @ coefficients) * root) ** 2).sum())
-        gain = 0.5 * (plain - square - 5 * np.log(len(rank)))
-        if gain > (best[0].gain if best else 0.0):
-            size = float(np.hypot(waves @ coefficients[1:3], waves @ coefficients[3:5]).max())
-            best = [ShapeForm(FormKind.CIRCLING, float(period), size, gain=gain)]
-    return best
 
 
 def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[ShapeForm]:

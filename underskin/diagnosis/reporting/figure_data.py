@@ -13,7 +13,6 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
 from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Complexes, Floats, Indices
 
 _MOST_POINTS = 600
@@ -58,7 +57,7 @@ class Thinned:
         self.lines = lines = problem.lines
         self.problem = problem
         along = any(axis in diagnosis.region for axis in lines.row_axes)
-        by_line = lines.curves or along or any(CATALOGUE[name].needs_lines for name in shown.names)
+        by_line = lines.curves or along or any(lines.mechanisms[name].needs_lines for name in shown.names)
         distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
         bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, _LEAST_BINS)) if by_line else 1
         key = lines.recording * bins + line.reshape(-1) * bins // len(distinct)

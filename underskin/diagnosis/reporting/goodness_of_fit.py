@@ -11,7 +11,7 @@ from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
 
 
 def explains_percent(
@@ -27,11 +27,11 @@ def explains_percent(
     effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
     `_share_of_variance`).
     """
-    own = CATALOGUE[name].parameters(problem.lines.campaign, problem.kind)
+    own = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
     if any(entry.acts_on == "line_variance" for entry in own):
         return round(100 * _share_of_variance(explanation), 1)
     rest = tuple(entry for entry in explanation.names if entry != name)
-    known = [entry for entry in search.explanations if entry.names == rest]
+    known = [entry for entry in (*search.explanations, *search.laws) if entry.names == rest]
     without = known[0] if known else problem.explain([Request(rest)])[0]
     assert without is not None  # alone, nothing is left out
     misfit = cross_validation.in_sample(problem, without)
@@ -68,12 +68,14 @@ def fit_summary(
     floor = outside[1].floor_percent if outside[1].recordings else inside[1].floor_percent
     return {
         **parts,
-        "mechanisms": list(explanation.names),  # of `after`, also where something beyond them is unexplained
+        "mechanisms": [
+            name for name in explanation.names if name in problem.lines.mechanisms.named
+        ],  # of `after`, also where something beyond them is unexplained
         "noise_floor_percent": rounded(floor),
         "groups": [
             {
                 "group": entry.group,
-                "chosen": list(entry.chosen) or [NOTHING_MISSING],
+                "chosen": [_plainly(problem, name) for name in entry.chosen] or [NOTHING_MISSING],
                 "before_rmse_percent": rounded(entry.before.rmse_percent),
                 "after_rmse_percent": rounded(entry.after.rmse_percent),
                 "noise_floor_percent": rounded(entry.after.floor_percent),
@@ -82,6 +84,14 @@ def fit_summary(
         ],
         "noise": _noise(explanation),
     }
+
+
+def _plainly(problem: FittingProblem, name: str) -> str:
+    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    law = problem.lines.mechanisms[name]
+    if not isinstance(law, UnnamedLaw):
+        return name
+    return f"unnamed: {law.spoken.acts_on} over {law.spoken.axis}, {law.spoken.form}"
 
 
 def _least_squares(problem: FittingProblem, explanation: Explanation) -> float | None:

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
@@ -21,6 +23,8 @@ from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, unnamed
+from underskin.diagnosis.reporting.unnamed_law import statement as law_statement
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
@@ -94,6 +98,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "statement": statements.insufficient_statement(diagnosis.lacking),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
+            "unnamed": None,
             "alternatives": [],
             "not_identifiable": [],
             "findings": [finding.in_report() for finding in diagnosis.findings],
@@ -108,7 +113,10 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     shown = search.shown_or_nothing(leader)
     fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
-    stands = stated in ("explained", "no_mismatch") and leader.probability >= EXPLAINED
+    leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
+    stated_set = named if leading is None else leading.explanation
+    law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
+    stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     modulus = fit["after"].get("youngs_modulus")
@@ -123,12 +131,18 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         idle=without_effect(named) if named is not None else (),
         imitating=shown.names if shown.names in search.imitating else (),
     )
+    if leading is not None and law is not None:
+        floor = float(fit["noise_floor_percent"] or float("nan"))
+        statement = " ".join(
+            part for part in (law_statement(leader.probability, leading, law, floor), caveats(findings)) if part
+        )
     return {
         **document,
         "probability": round(leader.probability, 3),
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
-        "mechanisms": [] if named is None else _mechanisms(search, problem, named),
+        "mechanisms": [] if stated_set is None else _mechanisms(search, problem, stated_set),
+        "unnamed": law,
         "alternatives": _alternatives(search),
         "not_identifiable": [
             {
@@ -151,6 +165,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
         "provenance": {
             **diagnosis.provenance,
+            **({} if leading is None else {"unnamed": leading.as_fitted}),
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
@@ -175,16 +190,36 @@ def _d33(
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
     places = own_places(explanation.names, explanation.best.hypothesis.lines)
     whole = cross_validation.in_sample(problem, explanation)
-    sets = [answer for answer in search.answers if answer.explanation is not None]
+    probabilities = _presence(search, problem)
     return [
         {
             "name": name,
-            "probability": round(sum(answer.probability for answer in sets if name in answer.names), 3),
+            "probability": round(probabilities.get(name, 0.0), 3),
             "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
             "explains_percent": explains_percent(search, problem, explanation, name, whole),
         }
         for name in explanation.names
+        if name in problem.lines.mechanisms.named
     ]
+
+
+def _presence(search: Search, problem: FittingProblem) -> dict[str, float]:
+    """The posterior that each mechanism is there, also beside a law that nobody listed."""
+    present: dict[str, float] = {}
+    for answer in search.answers:
+        if answer.explanation is not None:
+            for name in answer.names:
+                present[name] = present.get(name, 0.0) + answer.probability
+            continue
+        laws = [entry for entry in search.laws if search.shows(entry)]
+        weights = [search.log_weight(entry) for entry in laws]
+        total = np.logaddexp.reduce([*weights, *search.processes_showing]) if laws else 0.0
+        for entry, weight in zip(laws, weights, strict=True):
+            for name in entry.names:
+                if name in problem.lines.mechanisms.named:
+                    share = answer.probability * float(np.exp(weight - total))
+                    present[name] = present.get(name, 0.0) + share
+    return present
 
 
 def _alternatives(search: Search) -> list[dict[str, Any]]:

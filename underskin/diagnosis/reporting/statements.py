@@ -11,8 +11,6 @@ from underskin.diagnosis.localisation.effect_size import EffectSize
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
 from underskin.diagnosis.localisation.residual_shape import (
     ALONG_CURVES,
-    ORDER,
-    PRELOAD_BEFORE,
     FormKind,
     Shape,
     ShapeForm,
@@ -141,8 +139,6 @@ def shape_statement(shape: Shape | None) -> str:
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:
-    if form.kind == FormKind.CIRCLING:
-        return f"a place that runs round, up to {form.size:.2g} mm off, once in {form.at:.3g} recordings"
     words = _FORMS[form.kind].format(at=form.at, unit=ALONG_CURVES.get(form.axis, ""))
     size = f"{words}, up to {in_digits(form.size, 2)} %"
     return f"{size} of the largest force over {form.axis}" if shape.of_curves else f"{size} over {_form_axis(form)}"
@@ -156,11 +152,10 @@ _FORMS: Mapping[FormKind, str] = {
     FormKind.PEAK: "a peak or notch at {at:.3g} Hz",
     FormKind.BUMP: "a bump at {at:.3g} {unit}",
 }
-_OWN_AXES = {PRELOAD_BEFORE: "the preload of the recording before over its own", ORDER: "the order of recordings"}
 
 
 def _form_axis(form: ShapeForm) -> str:
-    words = _OWN_AXES[form.axis] if form.axis in _OWN_AXES else WORDS[form.axis][0]
+    words = WORDS[form.axis][0]
     return words if form.component is None else f"{words} ({'xy'[form.component]})"
 
 

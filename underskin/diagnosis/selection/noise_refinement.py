@@ -9,13 +9,14 @@ one estimate, though it was made beside one of them.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
@@ -25,16 +26,19 @@ _CHANGED = 0.03  # change of the noise of some line, relative, below which it st
 
 
 def frf_problem(
-    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable
+    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: Known
 ) -> tuple[FittingProblem, list[Explanation]]:
     """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
-    problem = FittingProblem(lines(campaign, uneven), table)
+    measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
+    mechanisms.bind(measured.campaign, table)
+    problem = FittingProblem(measured, table)
     nothing, *singles = known = _along_frequency(problem)
     fixed = [one for one in singles if not any(entry.acts_on == "line_variance" for entry in one.model.parameters)]
     best = max(fixed, key=lambda entry: entry.log_evidence, default=nothing)
     if best.log_evidence <= nothing.log_evidence + _SPEAKS:
         return problem, known
     refined = lines(campaign, uneven, (problem.lines, best.best.prediction.value))
+    refined = replace(refined, mechanisms=mechanisms)
     change = np.abs(refined.deviation / problem.lines.deviation - 1).max()
     return (FittingProblem(refined, table), []) if change > _CHANGED else (problem, known)
 
@@ -42,7 +46,7 @@ def frf_problem(
 def _along_frequency(problem: FittingProblem) -> list[Explanation]:
     """Nothing, and the single mechanisms that act on lines apart."""
     requests = [Request(())]
-    for name, mechanism in CATALOGUE.items():
+    for name, mechanism in problem.lines.mechanisms.named.items():
         if "frf" not in mechanism.kinds or not mechanism.needs_lines:
             continue
         try:

@@ -1,10 +1,8 @@
-"""Something that no mechanism here describes, from recording to recording: a process in gain, or in place.
+"""Something that no mechanism here describes, from recording to recording: a process in gain.
 
-FRF = model · (1 + δ), linear in the model's parameters at their best fit, in sensors' gains and in δ's features. δ is
-- a Matérn-3/2 process over one axis of the campaign, over all of them, or over how the preload had been before;
-- a sine over the order of the recordings, of one unknown period;
-- what follows where the contact's place itself wanders in order: δ = ∇m·o/m, with o smooth or running round.
-Scatter of gain, and beside a wandering place scatter of position too, are marginalised over their priors.
+FRF = model · (1 + δ), linear in the model's parameters at their best fit, in sensors' gains and in δ's features. δ is a
+Matérn-3/2 process over one axis of the campaign, or over all of them. Scatters of gain and of position are marginalised
+over their priors. The residual that it works on is also what laws that nobody listed are screened against.
 """
 
 from dataclasses import dataclass, replace
@@ -13,21 +11,20 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp
 
-from underskin.diagnosis.data.axes import order, preload_before, recording_axes
+from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
-from underskin.units import Floats, Indices
+from underskin.units import Floats, Indices, Mask
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
-_LEAST_RECORDINGS, _LEAST_IN_ORDER = 4, 8
-_WANDERING = np.array([0.1e-3, 0.3e-3, 1.0e-3])  # [m] amplitudes of a place that wanders
-_WANDERING_LANDMARKS = 12
-_SHORTEST_PERIOD, _MOST_PERIODS = 3.0, 100  # recordings
+_LEAST_RECORDINGS = 4
 _GAINS = np.geomspace(0.005, 0.5, 9)
+_USUAL_GAIN = 3  # of these
+_GONE = 60.0  # nats behind the best node, which a process of few features cannot lose there
 _USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
 _FAINT = 1e-12  # of the largest response, below which a recording has no direction
@@ -70,6 +67,10 @@ class _WithoutProcess:
         log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
         return cls(log_density, np.sqrt(precision), taken, weighed)
 
+    def of_gains(self, kept: Mask) -> "_WithoutProcess":
+        """At some of the scatters of gain."""
+        return _WithoutProcess(self.log_density[kept], self.root[kept], self.taken[kept], self.weighed[kept])
+
     def summed(self, alike: Indices) -> "_WithoutProcess":
         """With the sums over recordings that are alike, which have the same features, in their place."""
         order = np.argsort(alike, kind="stable")
@@ -88,16 +89,8 @@ def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[s
         return {}
     if len(axes) > 1:
         axes["all"] = np.concatenate(list(axes.values()), axis=1) / np.sqrt(len(axes))
-    before = preload_before(campaign)
-    if before is not None:
-        axes["preload_before"] = normalised(before)
     residual = GainResidual(problem, explanation)
-    gains = {name: _smooth(residual, column) for name, column in axes.items()}
-    rank = order(campaign)
-    if len(rank) >= _LEAST_IN_ORDER:
-        gains["order"] = mean_of_logs(residual.gains(_sines(rank), AMPLITUDES))
-        gains["place"] = mean_of_logs([_smooth_place(residual, rank), _round(residual, rank)])
-    return gains
+    return {name: _smooth(residual, column) for name, column in axes.items()}
 
 
 def mean_of_logs(log_values: list[float] | Floats) -> float:
@@ -111,24 +104,6 @@ def _smooth(residual: "GainResidual", column: Floats) -> float:
         return mean_of_logs(residual.gains(np.stack([features(column, length) for length in _LENGTHS]), AMPLITUDES))
     sets = np.stack([features(values, length) for length in _LENGTHS])
     return mean_of_logs(residual.gains(sets, AMPLITUDES, alike.reshape(-1)))
-
-
-def _sines(rank: Floats) -> Floats:
-    """Sine and cosine over the order, of periods from two times all recordings downwards (periods, recordings, 2)."""
-    count = len(rank)
-    halves = np.arange(1, min(_MOST_PERIODS, int(2 * count / _SHORTEST_PERIOD)) + 1)
-    angle = np.pi * halves[:, None] * rank / count
-    return np.stack([np.sin(angle), np.cos(angle)], axis=2)
-
-
-def _smooth_place(residual: "GainResidual", rank: Floats) -> float:
-    along = (rank / len(rank))[:, None]
-    sets = np.stack([features(along, length, _WANDERING_LANDMARKS) for length in _LENGTHS])
-    return mean_of_logs(residual.gains(residual.moved(sets), _WANDERING))
-
-
-def _round(residual: "GainResidual", rank: Floats) -> float:
-    return mean_of_logs(residual.gains(residual.moved(_sines(rank)), _WANDERING))
 
 
 class GainResidual:
@@ -165,10 +140,6 @@ class GainResidual:
             scatters.append(ScatterNodes(log_weights, ur / size - self._known, variances))
         return scatters
 
-    def moved(self, sets: Floats) -> Floats:
-        """Features of a place's two coordinates, as what the response makes of them (sets, recordings, 2 features)."""
-        return np.concatenate([sets * slope[None, :, None] for slope in self._moving], axis=2)
-
     @cached_property
     def _plain(self) -> float:
         """log p(residual) without a process."""
@@ -177,7 +148,20 @@ class GainResidual:
 
     @cached_property
     def _usual(self) -> list[_WithoutProcess]:
-        return [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+        """Of nodes that can matter: no process gains more in one than half of χ² there."""
+        each = [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+        least = max(float(entry.log_density.max()) for entry in each) - _GONE
+        mattering = []
+        for entry, nodes in zip(each, self.usual, strict=True):
+            kept = entry.log_density + 0.5 * (entry.weighed @ nodes.residual) > least
+            if kept.any():
+                mattering.append(entry.of_gains(kept))
+        return mattering
+
+    @cached_property
+    def _still(self) -> _WithoutProcess:
+        """Without scatter of place, at one usual scatter of gain."""
+        return _WithoutProcess.of(self.usual[0], self.fixed).of_gains(np.arange(len(_GAINS)) == _USUAL_GAIN)
 
     def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
@@ -188,6 +172,14 @@ class GainResidual:
         without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
         each = np.concatenate([_with(sets, amplitudes, entry) for entry in without])
         return np.asarray(logsumexp(each, axis=0) - self._plain)
+
+    def amplitudes(self, sets: Floats) -> Floats:
+        """The most probable amplitudes of features whose prior sd is 1, at a usual scatter (sets, features)."""
+        root, taken, weighed = (values[0] for values in (self._still.root, self._still.taken, self._still.weighed))
+        reduced = np.einsum("cr,srf->scf", taken, sets)
+        gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
+        gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
+        return np.asarray(np.linalg.solve(gram, np.einsum("srf,r->sf", sets, weighed)[..., None])[..., 0])
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:

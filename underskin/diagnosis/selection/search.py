@@ -15,14 +15,15 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
-from underskin.diagnosis.selection.occam_correction import without_occam
+from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
 
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
+_OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
@@ -64,21 +65,56 @@ class Search:
     unsupported: dict[str, str]
     contradicted: frozenset[tuple[str, ...]] = frozenset()
     imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
+    laws: tuple[Explanation, ...] = ()  # sets with one law that nobody listed
     tried: int = 0  # sets, of which the explanations are those that were not left out early
 
     @property
     def supported(self) -> int:
         """How many mechanisms the campaign supports."""
-        return len(CATALOGUE) - len(self.unsupported)
+        lines = self.explanations[0].best.hypothesis.lines
+        return len(lines.mechanisms.named) - len(self.unsupported)
 
     def log_weight(self, explanation: Explanation) -> float:
-        """Prior times evidence."""
-        return explanation.log_evidence + log_prior(len(explanation.names), self.supported)
+        """Prior times evidence; a law that nobody listed gains nothing by a narrower prior than mechanisms have."""
+        weight = explanation.log_evidence + self.log_prior(explanation)
+        if not self._holds_law(explanation):
+            return weight
+        rival = self._rival_of_size.get(len(explanation.names))
+        occam = explanation.log_evidence - fit_and_plausibility(explanation)
+        return weight if rival is None else weight - max(0.0, occam - rival)
+
+    @cached_property
+    def _rival_of_size(self) -> dict[int, float]:
+        """Occam's factor of the best set of mechanisms of each size, in nats."""
+        best: dict[int, Explanation] = {}
+        for entry in self.explanations:
+            size = len(entry.names)
+            if size not in best or entry.log_evidence > best[size].log_evidence:
+                best[size] = entry
+        return {size: entry.log_evidence - fit_and_plausibility(entry) for size, entry in best.items()}
+
+    @staticmethod
+    def _holds_law(explanation: Explanation) -> bool:
+        known = explanation.best.hypothesis.lines.mechanisms
+        return any(name not in known.named for name in explanation.names)
+
+    def log_prior(self, explanation: Explanation) -> float:
+        """The logarithm of its prior; a law that nobody listed has its share of that of something undescribed."""
+        known = explanation.best.hypothesis.lines.mechanisms
+        laws = [known[name] for name in explanation.names if name not in known.named]
+        if not laws:
+            return log_prior(len(explanation.names), self.supported)
+        prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
+        return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+
+    def log_prior_beneath(self, explanation: Explanation) -> float:
+        """The logarithm of the prior of a law that nobody listed on top of a set."""
+        return log_prior_beneath(len(explanation.names), self.supported) + math.log(_OF_LAWS)
 
     def shows(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
         no more than the smaller one, which stands for both."""
-        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in (*self.explanations, *self.laws)}
         whole = frozenset(explanation.names)
         smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
         return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
@@ -91,11 +127,28 @@ class Search:
         imitating = [entry for entry in self.explanations if entry.names in self.imitating]
         if imitating:
             return imitating[0]
+        if self.law is not None:
+            return self.law
         beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
     def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
-        return process.log_evidence + log_prior_beneath(len(explanation.names), self.supported)
+        prior = log_prior_beneath(len(explanation.names), self.supported) + math.log(1 - _OF_LAWS)
+        return process.log_evidence + prior
+
+    @cached_property
+    def processes_showing(self) -> list[float]:
+        """Prior times evidence of each process that shows."""
+        return [
+            self._log_weight_beneath(entry, process)
+            for entry, process in self.discrepancies
+            if process.log_evidence > entry.log_evidence + least_evidence(entry)
+        ]
+
+    @cached_property
+    def law(self) -> Explanation | None:
+        """The most probable set with a law that nobody listed, each member of which shows."""
+        return max((entry for entry in self.laws if self.shows(entry)), key=self.log_weight, default=None)
 
     @cached_property
     def answers(self) -> list[Answer]:
@@ -106,11 +159,7 @@ class Search:
         """
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
-        showing = [
-            self._log_weight_beneath(entry, process)
-            for entry, process in self.discrepancies
-            if process.log_evidence > entry.log_evidence + least_evidence(entry)
-        ]
+        showing = [*self.processes_showing, *(self.log_weight(entry) for entry in self.laws if self.shows(entry))]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
@@ -156,12 +205,13 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     explanations: Explanations = {frozenset(entry.names): entry for entry in known}
     tried = {frozenset[str]()}
     unsupported: dict[str, str] = {}
-    for name in CATALOGUE:
+    catalogue = problem.lines.mechanisms.named
+    for name in catalogue:
         try:
             problem.hypothesis((name,), placed=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
-    names = [name for name in CATALOGUE if name not in unsupported]
+    names = [name for name in catalogue if name not in unsupported]
     singles = [Request(()), *(Request((name,)) for name in names)]
     tried |= {frozenset(request.names) for request in singles}
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
@@ -176,7 +226,7 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             requests = _all_pairs(names, explanations)
         else:
             requests = [
-                Request(tuple(entry for entry in CATALOGUE if entry in {*parent.names, name}), parent)
+                Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
                 for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
                 for name in names
                 if name not in parent.names

@@ -7,7 +7,7 @@ floor is its expectation from the noise alone, for a new recording: gain, positi
 sensors' gains where the sensor was not seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 from typing import Any
 
@@ -17,7 +17,6 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
-from underskin.diagnosis.selection.search import log_prior
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.recordings.conditions import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
@@ -117,13 +116,24 @@ def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
     return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
 
 
+def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
+    """The rows of every third recording along an axis (recordings,), three times: what lies between is predicted."""
+    rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
+    names = ("every third recording from the first", "from the second", "from the third")
+    return {name: (rank % len(names) == place)[lines.recording] for place, name in enumerate(names)}
+
+
 def hold_out(
-    problem: FittingProblem, ranked: Sequence[Explanation], nothing: Explanation, supported: int
+    problem: FittingProblem,
+    ranked: Sequence[Explanation],
+    nothing: Explanation,
+    log_prior: Callable[[Explanation], float],
+    rows_by_group: Mapping[str, Mask],
 ) -> list[HeldOut]:
     """Predict each group from the rest; `ranked` are the sets found on everything, the best first."""
-    weights = [entry.log_evidence + log_prior(len(entry.names), supported) for entry in ranked]
+    weights = [entry.log_evidence + log_prior(entry) for entry in ranked]
     rivals = [entry for entry, w in zip(ranked, weights, strict=True) if w > weights[0] - _BEHIND][:_BEST]
-    each = (_without(problem, name, rows, rivals, nothing, supported) for name, rows in groups(problem.lines).items())
+    each = (_without(problem, name, rows, rivals, nothing, log_prior) for name, rows in rows_by_group.items())
     return [entry for entry in each if entry is not None]
 
 
@@ -133,7 +143,7 @@ def _without(
     rows: Mask,
     rivals: Sequence[Explanation],
     nothing: Explanation,
-    supported: int,
+    log_prior: Callable[[Explanation], float],
 ) -> HeldOut | None:
     """Predict one group from the rest; None where the rest does not support the null hypothesis."""
     smaller = FittingProblem(problem.lines.part(~rows), problem.table)
@@ -141,7 +151,7 @@ def _without(
     fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
     if nothing.names not in fits:
         return None
-    chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(len(entry.names), supported))
+    chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(entry))
     before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
     return HeldOut(name, chosen.names, before, after)
 

@@ -19,7 +19,6 @@ from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Array, Floats
 
 _ENDS = (0.1, 0.9)  # of a shape's usual range
@@ -45,7 +44,7 @@ class Signatures:
         self._known_products: dict[float, tuple[Floats, Floats]] = {}
         rows = None if problem.lines.curves else _Rows(problem, self._base.value, 0.0)
         parts = [] if rows is None else self._of_nuisances(rows)
-        for name, mechanism in CATALOGUE.items():
+        for name, mechanism in problem.lines.mechanisms.named.items():
             if problem.kind not in mechanism.kinds:
                 continue
             parameters = mechanism.parameters(problem.lines.campaign, problem.kind)

@@ -1,6 +1,6 @@
 """A model of recordings: the base model, and a set of mechanisms composed with it in a fixed order."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism
@@ -21,7 +21,13 @@ __all__ = ["Model", "Prediction", "compose"]
 Model = FrfModel | IndentationModel | CompressionModel
 
 
-def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kind: Kind | None = None) -> Model:
+def compose(
+    names: Sequence[str],
+    conditions: Conditions,
+    table: SigmaTable,
+    kind: Kind | None = None,
+    known: Mapping[str, Mechanism] = CATALOGUE,
+) -> Model:
     """The model of some mechanisms for all recordings of one kind, where these can support the mechanisms.
 
     Parameters
@@ -35,6 +41,8 @@ def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kin
         The σ table.
     kind
         Must be given where the conditions hold several kinds.
+    known
+        The mechanisms that names are of.
 
     Raises
     ------
@@ -45,7 +53,7 @@ def compose(names: Sequence[str], conditions: Conditions, table: SigmaTable, kin
     """
     kind = kind or kind_of(conditions)
     _require_kind(conditions, kind)
-    mechanisms = chosen(names, CATALOGUE)
+    mechanisms = chosen(names, known)
     check_supported(mechanisms, conditions, kind)
     return forward_model(mechanisms, conditions, table, kind)
 

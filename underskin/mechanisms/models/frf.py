@@ -51,6 +51,7 @@ class FrfModel:
         self.parameters = self._composition.parameters
         self.mechanisms = self._composition.mechanisms
         fields = {field for mechanism in mechanisms for field in mechanism.needs_fields}
+        fields |= {"id" for mechanism in mechanisms if mechanism.tells_recordings_apart}
         neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
         self.design = design = frf_design(conditions, fields, neighbours=neighbours)
         self.recording = design.recording

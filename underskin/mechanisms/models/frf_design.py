@@ -22,9 +22,11 @@ class FrfDesign:
     """Arrays over recordings, contacts, points, neighbours, lines and rows; SI."""
 
     def __init__(self, conditions: Conditions, fields: Collection[str], neighbours: bool) -> None:
-        """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n"."""
+        """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n", "id" (every recording)."""
         recordings = frf_of(conditions)
         count = len(recordings)
+        self.conditions = conditions
+        self.ids = tuple(entry.id for entry in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
         places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
         # Of each recording
@@ -38,10 +40,12 @@ class FrfDesign:
             ]
         )
         # Of each contact; the dynamic force and the dwell are 0 where no mechanism asks
-        contacts, contact = np.unique(
-            np.array([_contact_key(entry, fields) for entry in recordings]), axis=0, return_inverse=True
-        )
-        self.force, self.indenter_radius, self.dynamic_force, self.dwell = contacts.T
+        keys = np.array([_contact_key(entry, fields) for entry in recordings])
+        if "id" in fields:
+            keys = np.column_stack([keys, np.arange(count)])
+        contacts, first, contact = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        self.contact_recording: Indices = first
+        self.force, self.indenter_radius, self.dynamic_force, self.dwell = contacts.T[:4]
         # Of each point: its contact, and that contact's place seen from the sensor's centre; of each recording its
         # point beside its own sensor; of each pair of a recording and a neighbour of its sensor both
         pairs = _neighbours(places) if neighbours else np.zeros((len(places), len(places)), dtype=bool)
@@ -75,7 +79,7 @@ _kept = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models o
 
 def frf_design(conditions: Conditions, fields: Collection[str], *, neighbours: bool) -> FrfDesign:
     """The design, kept for the next model of the same conditions."""
-    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n"}, neighbours)
+    return _kept(conditions, frozenset(fields) & {"dwell_s", "dynamic_force_n", "id"}, neighbours)
 
 
 def frequencies(entry: FrfConditions) -> Floats:

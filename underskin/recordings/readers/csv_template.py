@@ -11,7 +11,8 @@
 
 Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A cell in quotes
 may hold the separator. An empty cell under a quantity that a recording has once repeats the one above; an empty `id`
-continues the recording, and so does its own id where every row has it. A cell too many, a field that comes again and a
+continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds whatever else
+the lab noted, numbers or words. A cell too many, a field that comes again and a
 recording that begins twice are refused.
 """
 
@@ -32,7 +33,8 @@ _POSITION = ("position_x_mm", "position_y_mm")
 _SENSOR = ("id", "x_mm", "y_mm")
 _TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
-_KNOWN = {entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)
+_KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)) - {"conditions"}
+_FURTHER = "conditions."  # what else the lab noted, a column each
 _FLAGS = {"true": True, "false": False}
 
 
@@ -176,7 +178,7 @@ class _Template:
 
     def _field(self, heading: str, index: int) -> tuple[str, float]:
         """The field of a heading and the factor to its unit."""
-        if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS:
+        if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS or heading.startswith(_FURTHER):
             return heading, 1.0
         known = lab_field(heading)
         if known is None:
@@ -230,4 +232,11 @@ class _Recording:
         """As in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
         columns = {name: column for name, column in self.columns.items() if any(entry is not None for entry in column)}
         position = [self.once.pop(name, None) for name in _POSITION]
-        return {**({} if position == [None, None] else {"position_mm": position}), **self.once, **columns}
+        noted = {name.removeprefix(_FURTHER): value for name, value in self.once.items() if name.startswith(_FURTHER)}
+        own = {name: value for name, value in self.once.items() if not name.startswith(_FURTHER)}
+        return {
+            **({} if position == [None, None] else {"position_mm": position}),
+            **own,
+            **({"conditions": noted} if noted else {}),
+            **columns,
+        }

@@ -1,0 +1,273 @@
+"""Laws that nobody listed: found with the right place, axis and form, predicted, adopted, and not seen elsewhere."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.draw import drawn, record
+from rig.recorded import campaign as recorded
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.diagnosis.pipeline import diagnose, diagnosis_report
+from underskin.diagnosis.reporting.hints import HINTS
+from underskin.diagnosis.reporting.report import report
+from underskin.errors import InvalidInput
+from underskin.mechanisms import registry
+from underskin.prediction.adopted_model import adopted, not_adopted
+from underskin.recordings.campaign import Campaign, FrfRecording, from_dict
+from underskin.recordings.conditions import frf_of
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Complexes, Floats
+
+TRUTH = "unlisted-open-truth.json"
+ALIKE = {"day_time": "time_of_day", "previous_preload": "previous_preload_n", "drift_then_plateau": "saturating"}
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def changed(made: Campaign, factor: Callable[[FrfRecording, int, Floats], Complexes | complex]) -> Campaign:
+    """Each recording's lines times a factor that its conditions, its number and its lines give."""
+    entries = []
+    for number, entry in enumerate(made.recordings):
+        assert isinstance(entry, FrfRecording)
+        assert entry.frequency_hz is not None
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        times = factor(entry, number, entry.frequency_hz)
+        value = (entry.frf_re_pc_per_n + 1j * entry.frf_im_pc_per_n) * times
+        entries.append(replace(entry, frf_re_pc_per_n=value.real, frf_im_pc_per_n=value.imag))
+    return replace(made, recordings=tuple(entries))
+
+
+def noted(made: Campaign, column: Callable[[int], dict[str, float | str]]) -> Campaign:
+    entries = [replace(entry, conditions=column(number)) for number, entry in enumerate(made.recordings)]
+    return replace(made, recordings=tuple(entries))
+
+
+@pytest.fixture(scope="module")
+def quiet(table: SigmaTable) -> Campaign:
+    return campaign(Made(sensors=3, offsets_mm=(0.0, 0.8), lines=20, highest_hz=1000.0), table)
+
+
+@pytest.fixture(scope="module")
+def warming(quiet: Campaign) -> Campaign:
+    """A gain that follows a temperature which comes and goes in no order."""
+    temperature = np.random.default_rng(4).uniform(18.0, 28.0, len(quiet.recordings))
+    warm = changed(quiet, lambda _, number, __: 1 + 0.03 * (temperature[number] - 18.0))
+    return noted(warm, lambda number: {"temperature_c": float(temperature[number])})
+
+
+@pytest.fixture(scope="module")
+def warming_report(warming: Campaign, table: SigmaTable) -> dict[str, Any]:
+    return diagnosis_report(warming, table)
+
+
+def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: dict[str, Any]) -> None:
+    law = warming_report["unnamed"]
+    assert warming_report["verdict"] == "unexplained"
+    assert warming_report["mechanisms"] == []
+    assert (law["acts_on"], law["axis"], law["form"]) == ("gain", "temperature_c", "linear")
+    (change,) = law["parameters"]
+    low, high = law["range"]["temperature_c"]
+    assert change["low"] < 0.03 * (high - low) < change["high"]
+    held_out, fit = law["heldout_rmse_percent"], warming_report["fit"]
+    assert held_out == {name: fit[name]["heldout_rmse_percent"] for name in ("before", "after")}
+    assert held_out["after"] < 1.5 * fit["noise_floor_percent"] < held_out["before"]
+    assert 0.5 < law["probability"] <= 1.0
+
+
+def test_the_statement_says_what_changes_with_what_and_what_it_is_worth(warming_report: dict[str, Any]) -> None:
+    statement = warming_report["statement"]
+    assert statement.startswith("No known mechanism describes this")
+    assert "changes the gain with temperature_c: +" in statement
+    assert "recordings held out are predicted to" in statement
+
+
+def test_the_same_recordings_give_the_same_report(
+    warming: Campaign, warming_report: dict[str, Any], table: SigmaTable
+) -> None:
+    assert json.dumps(diagnosis_report(warming, table)) == json.dumps(warming_report)
+
+
+def test_a_resonance_of_the_frame_is_a_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
+    def frame(_: FrfRecording, __: int, frequency: Floats) -> Complexes:
+        u = frequency / 150.0
+        return np.asarray(1 + 0.1 * u**2 / (1 - u**2 + 0.1j * u))
+
+    law = diagnosis_report(changed(quiet, frame), table)["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("frequency_response", "frequency_hz", "peak")
+    values = {entry["name"]: entry for entry in law["parameters"]}
+    assert values["centre"]["low"] < 150.0 < values["centre"]["high"]
+    assert values["damping"]["value"] == pytest.approx(0.05, rel=0.2)
+
+
+def test_a_loss_that_follows_the_amplitude_is_a_lag(table: SigmaTable) -> None:
+    made = campaign(Made(sensors=3, dynamic_forces_n=(0.03, 0.06, 0.12), lines=16), table)
+    lossy = changed(made, lambda entry, _, __: complex(np.exp(-2j * entry.dynamic_force_n)))
+    law = diagnosis_report(lossy, table)["unnamed"]
+    assert (law["acts_on"], law["axis"]) == ("frequency_response", "dynamic_force_n")
+    assert law["form"] in ("power", "linear")
+
+
+def test_what_is_taken_out_of_the_catalogue_is_found_as_a_law(table: SigmaTable) -> None:
+    made = campaign(Made(("ageing",), (0.5, 300.0, 0.0), sensors=3, repeats=2), table)
+    named = diagnosis_report(made, table)
+    assert named["verdict"] == "explained"
+    assert named["unnamed"] is None
+    document = report(diagnose(made, table, without=["ageing"]))
+    assert document["verdict"] == "unexplained"
+    assert document["unnamed"]["acts_on"] == "gain"
+    assert document["unnamed"]["axis"] in ("load_cycles", "order", "recorded_at")  # one and the same here
+    assert document["provenance"]["without"] == ["ageing"]
+    held_out = document["unnamed"]["heldout_rmse_percent"]
+    assert held_out["after"] < 1.5 * document["fit"]["noise_floor_percent"]
+    with pytest.raises(InvalidInput, match="without"):
+        diagnose(made, table, without=["gravity"])
+
+
+def test_nothing_is_found_where_nothing_is_missing(quiet: Campaign, table: SigmaTable) -> None:
+    """Nor in twenty columns of chance."""
+    random = np.random.default_rng(7)
+    columns = noted(quiet, lambda _: {f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
+    for recordings in (quiet, columns):
+        document = diagnosis_report(recordings, table)
+        assert document["verdict"] == "no_mismatch"
+        assert document["unnamed"] is None
+
+
+def test_a_law_is_adopted_within_its_range(
+    warming: Campaign, warming_report: dict[str, Any], quiet: Campaign, table: SigmaTable
+) -> None:
+    model = adopted(warming_report, warming, table)
+    plain = replace(model, law=None, of_law={})
+    ratio = model.response(warming, table).value / plain.response(warming, table).value
+    low = warming_report["unnamed"]["range"]["temperature_c"][0]
+    for number, entry in enumerate(frf_of(warming)):
+        assert entry.conditions is not None
+        expected = 1 + 0.03 * (float(entry.conditions["temperature_c"]) - low)
+        assert ratio[model.response(warming, table).recording == number] == pytest.approx(expected, rel=0.03)
+    hotter = noted(quiet, lambda number: {"temperature_c": 20.0 if number else 60.0})
+    inside = model.response(hotter, table)
+    assert not inside.inside[inside.recording == 0].any()
+    assert inside.inside[inside.recording > 0].all()
+    assert not model.response(quiet, table).inside.any()  # which says nothing of its temperature
+
+
+def test_an_order_cannot_be_adopted(warming_report: dict[str, Any]) -> None:
+    assert not_adopted(warming_report) is None
+    of_order = {**warming_report, "unnamed": {**warming_report["unnamed"], "axis": "order"}}
+    assert not_adopted(of_order) is not None
+
+
+def test_points_of_several_models_that_press_alike_contacts_keep_their_order(
+    quiet: Campaign, table: SigmaTable
+) -> None:
+    """A model with a material of its own between two without one."""
+    problem = FittingProblem(lines(quiet), table)
+    names = [("misalignment",), ("strain_stiffening",), ("preload_dependent_d33",)]
+    (nothing,) = problem.explain([Request(())])
+    together = problem.explain([Request(()), *map(Request, names)])
+    for own, explanation in zip(names, together[1:], strict=True):
+        (alone,) = problem.explain([Request(own)])
+        assert explanation is not None
+        assert alone is not None
+        assert explanation.log_evidence == pytest.approx(alone.log_evidence, abs=1e-3)
+        assert explanation.best.at.cost[0] == pytest.approx(explanation.best.cost, abs=1e-6)
+    assert nothing is not None
+
+
+def test_the_hints_are_those_of_the_page() -> None:
+    page = Path("docs/unnamed.md").read_text(encoding="utf-8")
+    for (acts_on, axis), hint in HINTS.items():
+        place = f"`{axis}`" if axis else "any other"
+        assert f"| `{acts_on}` | {place} | {hint} |" in page
+
+
+@pytest.mark.slow
+def test_what_remembers_the_preload_before_is_found(table: SigmaTable) -> None:
+    law = rig_report(table, {"hysteretic_d33": {"amplitude": 0.1}})["unnamed"]
+    assert law["axis"] == "previous_preload_n"
+
+
+@pytest.mark.slow
+def test_a_place_that_runs_round_is_a_periodic_place(table: SigmaTable) -> None:
+    law = rig_report(table, {"stage_wobble": {"amplitude_mm": 0.5, "period_recordings": 6.3}})["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("position", "order", "periodic")
+    period = next(entry for entry in law["parameters"] if entry["name"] == "period")
+    assert period["value"] == pytest.approx(6.3, rel=0.02)
+
+
+def rig_report(table: SigmaTable, effects: dict[str, Any]) -> dict[str, Any]:
+    """The report on three sensors of the virtual rig, pressed at four places each, in any order."""
+    description = drawn(5, 0, "none")
+    description["skin"] = {
+        "thickness_mm": 2.0,
+        "youngs_modulus_mpa": 3.0,
+        "sensor_radius_mm": 1.0,
+        "d33_pc_per_n": 15.0,
+        "array": {"columns": 3, "rows": 1, "pitch_mm": 8.0},
+    }
+    description["design"] = {
+        "indenters_mm": [4.0],
+        "preloads_n": [0.4, 0.8, 1.6, 3.0],
+        "dynamic_forces_n": [0.05],
+        "offsets_mm": [[0.0, 0.0], [0.8, 0.0], [0.0, -1.2], [-1.5, 0.6]],
+        "shuffled": True,
+    }
+    description["noise"] |= {"gain": 0.02, "position_mm": 0.0}
+    description["effects"] = effects
+    found, refused = from_dict(recorded(record(description)))
+    assert not refused
+    return diagnosis_report(found, table)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    "UNDERSKIN_CAMPAIGNS" not in os.environ, reason="UNDERSKIN_CAMPAIGNS does not name the folder of campaigns"
+)
+def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out(table: SigmaTable) -> None:
+    folder = Path(os.environ["UNDERSKIN_CAMPAIGNS"])
+    truths = {name: truth for name, truth in json.loads((folder / TRUTH).read_text()).items() if truth["identifiable"]}
+    right, shares = 0, []
+    for name, truth in truths.items():
+        found, _ = from_dict(json.loads((folder / "unlisted-open" / f"{name}.json").read_text()))
+        document = diagnosis_report(found, table)
+        law, own = document["unnamed"], truth["law"]
+        if law is None:
+            continue
+        good = all(
+            law[field] in {ALIKE.get(word, word) for word in (own[field], *truth[f"{field}_also"])}
+            for field in ("acts_on", "axis", "form")
+        )
+        right += good
+        before, after = law["heldout_rmse_percent"]["before"], law["heldout_rmse_percent"]["after"]
+        if good:
+            shares.append((before**2 - after**2) / (before**2 - document["fit"]["noise_floor_percent"] ** 2))
+    assert right >= 9
+    assert np.median(shares) > 0.8
+
+
+def test_what_the_lab_declared_is_recognised_by_name(
+    warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("UNDERSKIN_MECHANISMS", "examples/mechanisms")
+    registry._loaded.cache_clear()
+    try:
+        document = diagnosis_report(warming, table)
+    finally:
+        registry._loaded.cache_clear()
+    assert document["verdict"] == "explained"
+    (mechanism,) = document["mechanisms"]
+    assert mechanism["name"] == "warm_film"
+    assert mechanism["parameters"][0]["unit"] == "1/°C"
+    assert document["provenance"]["mechanisms"]["warm_film"].startswith("warm_film.yaml ")

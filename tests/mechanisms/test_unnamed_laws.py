@@ -1,0 +1,262 @@
+"""Laws of the grammar: finite, right derivatives, nothing at amplitudes of 0, and the physics of where they enter."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from underskin.mechanisms import CATALOGUE
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
+from underskin.mechanisms.unnamed.expressions import expression
+from underskin.mechanisms.unnamed.forms import shapes
+from underskin.mechanisms.unnamed.frequency_laws import frequency_laws, phase_of_bump
+from underskin.mechanisms.unnamed.grammar import Grammar, combination
+from underskin.mechanisms.unnamed.laws import RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unnamed.level_tables import LevelTables
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Conditions, frf_of
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Array, Floats
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+@pytest.fixture(scope="module")
+def campaign() -> Campaign:
+    """The reference campaign on two days, with a temperature and an operator."""
+    recordings: list[FrfRecording] = []
+    for number, entry in enumerate(reference_campaign("frf").recordings):
+        assert isinstance(entry, FrfRecording)
+        noted: dict[str, float | str] = {"temperature_c": 20.0 + 0.7 * number, "operator": "ab"[number % 2]}
+        at = f"2020-01-0{1 + number // 7}T{9 + number % 7:02d}:00:00Z"
+        recordings.append(replace(entry, recorded_at=at, conditions=noted))
+    return replace(reference_campaign("frf"), recordings=tuple(recordings))
+
+
+@pytest.fixture(scope="module")
+def grammar(campaign: Campaign, table: SigmaTable) -> Grammar:
+    return Grammar.of(campaign, lines_of(campaign), table, tuple(CATALOGUE.values()))
+
+
+def lines_of(conditions: Conditions) -> Floats:
+    lines = frf_of(conditions)[0].frequency_hz
+    assert lines is not None
+    return lines
+
+
+def of_each_combination(grammar: Grammar) -> list[UnnamedLaw]:
+    return list({(*combination(law), law.name.split("__")[-1][:3]): law for law in grammar.laws}.values())
+
+
+def predicted(model: FrfModel, own: Sequence[float]) -> Array:
+    return model.predict(point(model, own), slopes=False).value
+
+
+def point(model: FrfModel, own: Sequence[float]) -> Floats:
+    fit = np.array([entry.start for entry in model.parameters])
+    fit[: len(own)] = own
+    return fit
+
+
+def coordinates(law: UnnamedLaw, amplitude: float) -> list[float]:
+    """All amplitudes at a share of their priors' sd, what bends the law at the first of its grid."""
+    count = len(law.amplitudes)
+    sds = [entry.prior.sd for entry in law.parameters_bound[:count]]  # type: ignore[union-attr]
+    return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_bound) - count]]
+
+
+def test_the_grammar_holds_several_hundred_laws_whose_shares_are_a_prior(grammar: Grammar) -> None:
+    assert len(grammar.laws) > 500
+    assert len({law.name for law in grammar.laws}) == len(grammar.laws)
+    assert 0.3 < np.exp(grammar.log_shares).sum() <= 1.0
+    shares: dict[tuple[str, str, str], float] = {}
+    for law, share in zip(grammar.laws, np.exp(grammar.log_shares), strict=True):
+        shares[combination(law)] = shares.get(combination(law), 0.0) + share
+    # Always below a named law that does the same: 0.34 over all mechanisms against 0.05
+    assert 0.05 * max(shares.values()) < 0.34 / len(CATALOGUE)
+
+
+def test_amplitudes_of_0_are_the_base_model(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
+    base = predicted(FrfModel((), campaign, table, tuple(CATALOGUE.values())), ())
+    for law in of_each_combination(grammar):
+        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        assert predicted(model, coordinates(law, 0.0)) == pytest.approx(base, rel=1e-9), law.name
+
+
+def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
+    for law in of_each_combination(grammar)[::3]:
+        model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
+        fit = point(model, coordinates(law, 0.31))
+        exact = model.predict(fit).slopes
+        for place in range(len(law.parameters_bound)):
+            step = np.zeros(len(fit))
+            step[place] = 1e-6
+            ahead, behind = (model.predict(fit + sign * step, slopes=False).value for sign in (1, -1))
+            scale = np.abs(exact[place]).max() + 1e-6 * np.abs(ahead).max()
+            assert np.abs((ahead - behind) / 2e-6 - exact[place]).max() < 2e-4 * scale, (law.name, place)
+
+
+def one_law(acts_on: str, axis: Axis, campaign: Campaign, table: SigmaTable) -> tuple[RecordingLaw, FrfModel]:
+    """A linear law over an axis, from its least value on, in a model."""
+    shape = next(entry for entry in shapes(axis) if entry.form == "linear")
+    beside = tuple(CATALOGUE.values())
+    law = RecordingLaw(acts_on, axis, shape, LevelTables(campaign, table, beside))  # type: ignore[arg-type]
+    return law, FrfModel([law], campaign, table, beside)
+
+
+def along(campaign: Campaign, name: str) -> Axis:
+    return next(axis for axis in axes_of(campaign) if axis.name == name)
+
+
+@pytest.mark.parametrize(("acts_on", "size"), [("modulus", 0.8), ("thickness", 0.2), ("contact_radius", -0.3)])
+def test_a_law_is_the_base_model_of_a_skin_that_changes(
+    acts_on: str, size: float, campaign: Campaign, table: SigmaTable
+) -> None:
+    """Each recording against a base model of its own, with that modulus, thickness, or sphere and modulus."""
+    axis = along(campaign, "order")
+    _, model = one_law(acts_on, axis, campaign, table)
+    found = predicted(model, [size])
+    for number, entry in enumerate(frf_of(campaign)):
+        factor = 1 + size * axis.values[entry.id] / axis.span
+        radius, modulus, thickness = entry.indenter_radius_mm, 2.0, 2.5
+        if acts_on == "contact_radius":  # at the same L: R a, E/a²
+            radius, modulus = radius * factor, modulus / factor**2
+        elif acts_on == "modulus":
+            modulus *= factor
+        else:
+            thickness *= factor
+        skin = replace(campaign.skin, youngs_modulus_mpa=modulus, thickness_mm=thickness)
+        alone = Conditions("one", skin, (replace(entry, indenter_radius_mm=radius),))
+        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), (acts_on, number)
+
+
+def test_a_force_that_is_lost_is_a_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
+    lost = next(law for law in grammar.laws if combination(law) == ("force", "preload_n", "threshold"))
+    model = FrfModel([lost], campaign, table, tuple(CATALOGUE.values()))
+    found = predicted(model, [0.2])
+    for number, entry in enumerate(frf_of(campaign)):
+        alone = Conditions("one", campaign.skin, (replace(entry, preload_n=entry.preload_n - 0.2),))
+        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), number
+
+
+def test_a_place_that_wanders_is_a_press_elsewhere(campaign: Campaign, table: SigmaTable) -> None:
+    axis = along(campaign, "order")
+    _, model = one_law("position", axis, campaign, table)
+    found = predicted(model, [0.8, -0.5])
+    for number, entry in enumerate(frf_of(campaign)):
+        share = axis.values[entry.id] / axis.span
+        assert entry.position_mm is not None
+        there = entry.position_mm[0] + 0.8 * share, entry.position_mm[1] - 0.5 * share
+        alone = Conditions("one", campaign.skin, (replace(entry, position_mm=there),))
+        expected = predicted(FrfModel((), alone, table, tuple(CATALOGUE.values())), ())
+        assert found[model.recording == number] == pytest.approx(expected, rel=3e-3), number
+
+
+def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign: Campaign, table: SigmaTable) -> None:
+    law, model = one_law("gain", along(campaign, "previous_preload_n"), campaign, table)
+    part = replace(campaign, recordings=campaign.recordings[3:9])
+    of_part = FrfModel([law], part, table, tuple(CATALOGUE.values()))
+    kept = (model.recording >= 3) & (model.recording < 9)
+    assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
+
+
+def hilbert_phase(log_magnitude: Floats, log_frequency: Floats) -> Floats:
+    """Bode's integral by brute force: φ = (1/π) ∫ dM/dx ln coth(|x − x0|/2) dx on a grid of equal strides."""
+    stride = log_frequency[1] - log_frequency[0]
+    slope = np.diff(log_magnitude) / stride
+    between = log_frequency[:-1] + stride / 2
+    kernel = -np.log(np.tanh(np.abs(between - log_frequency[:, None]) / 2))
+    return np.asarray(kernel @ slope * stride / np.pi)
+
+
+def test_laws_over_frequency_are_of_minimum_phase_or_turn_the_phase_alone() -> None:
+    wide = np.linspace(np.log(1e-5), np.log(1e8), 6001)
+    inner = slice(2500, 3700)  # some 2 to 5000 Hz
+    for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
+        if law.variant in ("echo", "magnitude"):  # neither falls off: their integrals have no end
+            continue
+        values = dict(zip([entry.name for entry in law.parameters_bound], coordinates(law, 0.5), strict=True))
+        seeds = {
+            name: differentiated(entry.from_fit(values[name]))
+            for entry in law.parameters_bound
+            for name in [entry.name]
+        }
+        factor = law.factor(np.exp(wide), seeds).value[0]
+        if law.variant == "phase":
+            assert np.abs(factor) == pytest.approx(1.0)
+            continue
+        if law.variant == "corner":
+            continue  # rises without end
+        expected = hilbert_phase(np.log(np.abs(factor)), wide)
+        assert np.unwrap(np.angle(factor))[inner] == pytest.approx(expected[inner], abs=0.02), law.name
+
+
+def differentiated(value: float):  # type: ignore[no-untyped-def]
+    from underskin.autodiff import Differentiated
+
+    return Differentiated(np.array([[value]]), np.zeros((0, 1, 1)))
+
+
+def test_the_phase_of_a_bump_is_odd_and_that_of_its_slope() -> None:
+    u = np.linspace(-4.0, 4.0, 81)
+    phase = phase_of_bump(u, 1.0)
+    assert phase == pytest.approx(-phase[::-1], abs=1e-6)
+    assert phase[u < -0.5].min() > 0  # the magnitude rises there
+
+
+def test_the_order_is_that_of_times_of_cycles_or_of_the_list(campaign: Campaign) -> None:
+    entries = frf_of(campaign)
+    turned = [replace(entry, load_cycles=7) for entry in entries[::-1]]
+    assert recording_order(turned).tolist() == list(range(len(turned)))[::-1]
+    untimed = [replace(entry, recorded_at=None, load_cycles=100 - number) for number, entry in enumerate(entries)]
+    assert recording_order(untimed).tolist() == list(range(len(untimed)))[::-1]
+    listed = [replace(entry, recorded_at=None, load_cycles=None) for entry in entries]
+    assert recording_order(listed).tolist() == list(range(len(listed)))
+
+
+def test_the_time_of_day_is_local(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = frf_of(campaign)[0].id
+    assert along(campaign, "time_of_day").values[first] == 9.0
+    monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Asia/Tokyo")
+    assert along(campaign, "time_of_day").values[first] == 18.0
+
+
+def test_columns_that_a_lab_adds_are_axes_where_most_recordings_have_them(campaign: Campaign) -> None:
+    temperature = along(campaign, "temperature_c")
+    assert temperature.high - temperature.low == pytest.approx(0.7 * (len(campaign.recordings) - 1))
+    assert along(campaign, "operator").words == ("a", "b")
+    few = tuple(
+        replace(entry, conditions={"seldom": 1.0 * number} if number < 4 else None)
+        for number, entry in enumerate(frf_of(campaign))
+    )
+    assert "seldom" not in [axis.name for axis in axes_of(Conditions("few", campaign.skin, few))]
+
+
+def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, table: SigmaTable) -> None:
+    random = np.random.default_rng(3)
+    entries = tuple(
+        replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
+        for entry in frf_of(campaign)
+    )
+    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()))
+    shares = np.exp(many.log_shares)
+    added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.spoken.axis)
+    one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.spoken.axis == "order")
+    assert added < 2 * one
+
+
+def test_every_law_has_an_expression_without_powers_of_ten(grammar: Grammar) -> None:
+    for law in grammar.laws:
+        own = zip(law.parameters_bound, coordinates(law, 0.3), strict=True)
+        text = expression(law, {entry.name: entry.from_fit(at) for entry, at in own})
+        assert "=" in text
+        assert "e-" not in text
+        assert "nan" not in text

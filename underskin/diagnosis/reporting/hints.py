@@ -1,0 +1,62 @@
+"""Which physics usually does such a thing: hints, by where an unnamed law enters and what it follows.
+
+The same table stands in docs/unnamed.md.
+"""
+
+from collections.abc import Mapping
+
+_ANY = ""
+HINTS: Mapping[tuple[str, str], str] = {
+    ("modulus", "recorded_at"): "A skin that warms up, cures on or swells would do this; note its temperature.",
+    ("modulus", "time_of_day"): "The temperature of the room would do this; at equal temperature it should vanish.",
+    ("modulus", "order"): "A skin that warms up or softens with use would do this; repeat in another order.",
+    ("modulus", "previous_preload_n"): "Softening by the press before (Mullins' effect) would do this; wait longer "
+    "between recordings, or come to each preload from the same one.",
+    ("modulus", "load_cycles"): "Fatigue or Mullins' effect would do this.",
+    ("modulus", "dwell_s"): "Relaxation that the known creep does not follow would do this.",
+    ("modulus", "x_mm"): "Uneven mixing or curing along x would do this.",
+    ("modulus", "y_mm"): "Uneven mixing or curing along y would do this.",
+    ("modulus", "preload_n"): "Stiffening or softening by another exponent than the known law's would do this.",
+    ("thickness", "recorded_at"): "Swelling or shrinking would do this; measure the thickness again.",
+    ("thickness", "order"): "Swelling, shrinking or a skin that is replaced would do this.",
+    ("thickness", "x_mm"): "A mould that is not level gives a wedge along x; measure the thickness at both ends.",
+    ("thickness", "y_mm"): "A mould that is not level gives a wedge along y; measure the thickness at both ends.",
+    ("contact_radius", "preload_n"): "A contact that grows with another power of the force than Hertz's would do this: "
+    "roughness, a worn sphere.",
+    ("contact_radius", "order"): "A sphere that was changed, worn or dirty from then on would do this; look at it.",
+    ("contact_radius", "recorded_at"): "A sphere that was changed or wears would do this; look at it.",
+    ("force", "preload_n"): "Friction in the guide takes a constant part of the force; a cell below the skin would "
+    "show it.",
+    ("force", "previous_preload_n"): "Friction or hysteresis of the stage would do this; come to each preload from "
+    "the same side.",
+    ("force", "recorded_at"): "A cell whose zero drifts would do this; set it to zero before each recording.",
+    ("force", "time_of_day"): "A cell whose zero follows the temperature would do this.",
+    ("force", "order"): "A cell whose zero drifts would do this; set it to zero before each recording.",
+    ("gain", "recorded_at"): "An amplifier that drifts, or d33 that follows the temperature, would do this; repeat the "
+    "first recording at the end.",
+    ("gain", "time_of_day"): "Temperature or humidity of the room would do this; at equal temperature it should "
+    "vanish.",
+    ("gain", "order"): "An amplifier or a plug that was changed on the way would do this; repeat the first recording.",
+    ("gain", "previous_preload_n"): "A film that remembers the press before would do this; wait longer in between.",
+    ("gain", "x_mm"): "A film that was drawn or poled unevenly along x would do this.",
+    ("gain", "y_mm"): "A film that was drawn or poled unevenly along y would do this.",
+    ("gain", "dynamic_force_n"): "A film or an amplifier that is not linear in the force would do this.",
+    ("gain", "preload_n"): "A film whose d33 depends on the stress otherwise than the known law has it would do this.",
+    ("gain", "load_cycles"): "Ageing by another law than the known one would do this.",
+    ("position", "order"): "A stage that loses steps or runs round would do this; return to its zero now and then.",
+    ("position", "recorded_at"): "A frame that creeps or warms up would do this.",
+    ("position", "time_of_day"): "A frame that follows the temperature would do this.",
+    ("position", "previous_preload_n"): "Play of the stage would do this; come to each place from the same side.",
+    ("frequency_response", "frequency_hz"): "A resonance of the frame, an electronic filter or a cable would do this; "
+    "record a stiff steel block in place of the skin.",
+    ("frequency_response", "dynamic_force_n"): "Friction that grows with the amplitude would do this; record at "
+    "several dynamic forces.",
+    ("frequency_response", "preload_n"): "Losses in the contact that grow with the preload would do this.",
+    ("frequency_response", "recorded_at"): "A clock or filter that drifts would do this.",
+    ("frequency_response", _ANY): "Electronics or a frame that follow this axis would do this.",
+}
+
+
+def hint(acts_on: str, axis: str) -> str:
+    """A sentence, or none."""
+    return HINTS.get((acts_on, axis), HINTS.get((acts_on, _ANY), ""))

@@ -1,0 +1,299 @@
+"""The report's `unnamed`: a law that nobody listed, its numbers, its rivals, what it is worth, and where it holds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.reporting.hints import hint
+from underskin.diagnosis.reporting.numbers import parameter, rounded
+from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.unnamed_search import law_of
+from underskin.diagnosis.validation import cross_validation
+from underskin.findings.formatting import in_digits, in_percent
+from underskin.mechanisms.unnamed.axes import Axis, time_zone
+from underskin.mechanisms.unnamed.expressions import course, expression, wave
+from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES
+from underskin.units import Floats
+
+_QUANTILE = float(ndtri(0.975))
+_RIVALS, _LEAST_RIVAL = 5, 0.01
+_PLACES = 41  # along the axis, at which a course is looked at
+_STEP = 1e-4  # of fit coordinates, for a course's band
+_SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
+
+
+@dataclass(frozen=True)
+class LeadingLaw:
+    """The law of an explanation that leads, its parameters in their units, and the quadratic around them."""
+
+    law: UnnamedLaw
+    values: Mapping[str, float]
+    explanation: Explanation
+
+    @classmethod
+    def of(cls, problem: FittingProblem, explanation: Explanation) -> "LeadingLaw | None":
+        """None where the explanation holds no law."""
+        law = law_of(problem, explanation)
+        if law is None:
+            return None
+        values = {
+            entry.name: entry.from_fit(at)
+            for entry, at in zip(law.parameters_bound, explanation.own(law.name), strict=True)
+        }
+        return cls(law, values, explanation)
+
+    @property
+    def as_fitted(self) -> dict[str, Any]:
+        """What an adopted model is made of."""
+        return {"law": self.law.name, "parameters": {name: rounded(value, 10) for name, value in self.values.items()}}
+
+    @property
+    def form(self) -> str:
+        """A peak of negative size is a notch."""
+        if self.law.spoken.form == "peak" and self.values["law_change"] < 0:
+            return "notch"
+        return self.law.spoken.form
+
+    @property
+    def axis(self) -> Axis | None:
+        """That of recordings; None of frequency."""
+        return self.law.axis if isinstance(self.law, RecordingLaw | LagLaw) else None
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Of the axis, as measured."""
+        if self.axis is not None:
+            return self.axis.low, self.axis.high
+        frequency = self.explanation.best.hypothesis.lines.frequency
+        return float(frequency.min()), float(frequency.max())
+
+    def largest(self) -> tuple[float, float, float]:
+        """Where along the measured axis the change is largest, the change there and its standard deviation.
+
+        Of a place it is the distance, over frequency the magnitude less 1, or where that hardly changes the phase.
+        """
+        low, high = self.ends
+        if self.axis is not None:
+            x = self.axis.levels if len(self.axis.levels) <= _PLACES else np.linspace(low, high, _PLACES)
+        else:
+            x = np.geomspace(low, high, 8 * _PLACES)
+        sizes = self._change(x, self.values)
+        place = int(np.argmax(np.abs(sizes)))
+        return float(x[place]), float(sizes[place]), float(np.sqrt(self.variance(x[[place]])[0]))
+
+    def _change(self, x: Floats, values: Mapping[str, float]) -> Floats:
+        change = course(self.law, values, x)
+        if change.ndim == 2:
+            return np.hypot(*change.T)
+        if np.iscomplexobj(change):
+            return np.angle(1 + change) if self.is_phase else np.abs(1 + change) - 1
+        return np.asarray(change, dtype=float)
+
+    @property
+    def is_phase(self) -> bool:
+        """Whether it turns the phase alone."""
+        return isinstance(self.law, FrequencyLaw) and self.law.variant == "phase"
+
+    def variance(self, x: Floats) -> Floats:
+        """Of the change, from the quadratic of the law's own parameters."""
+        places = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
+        mean = self.explanation.best.hypothesis.mean_places
+        rows = [mean.index(place) for place in range(places.start, places.stop)]
+        covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
+        here = self._change(x, self.values)
+        slopes = []
+        for entry in self.law.parameters_bound:
+            moved = {**self.values, entry.name: entry.from_fit(entry.to_fit(self.values[entry.name]) + _STEP)}
+            slopes.append((self._change(x, moved) - here) / _STEP)
+        jacobian = np.array(slopes)
+        return np.maximum(np.einsum("px,pq,qx->x", jacobian, covariance, jacobian), 0.0)
+
+
+def unnamed(
+    search: Search, problem: FittingProblem, leading: LeadingLaw, groups: Sequence[cross_validation.HeldOut]
+) -> dict[str, Any]:
+    """The document."""
+    shares = _shares(search, problem)
+    own = _combination(problem, leading.explanation)
+    before, after = cross_validation.total(groups)
+    low, high = leading.ends
+    return {
+        "acts_on": leading.law.spoken.acts_on,
+        "axis": leading.law.spoken.axis,
+        "form": leading.form,
+        "expression": expression(leading.law, leading.values),
+        "parameters": _parameters(leading),
+        "probability": round(shares[own], 3),
+        "rivals": [
+            {"acts_on": acts_on, "axis": axis, "form": form, "probability": round(share, 3)}
+            for (acts_on, axis, form), share in list(shares.items())[: _RIVALS + 1]
+            if (acts_on, axis, form) != own and share >= _LEAST_RIVAL
+        ],
+        "heldout_rmse_percent": {"before": rounded(before.rmse_percent), "after": rounded(after.rmse_percent)},
+        "range": {_range_name(leading): _range(leading, low, high)},
+    }
+
+
+def _range_name(leading: LeadingLaw) -> str:
+    name = leading.law.spoken.axis
+    if name in _SHOWN_AS_HOURS:
+        return f"{name}_h"
+    return f"{name}_over_own" if leading.axis is not None and leading.axis.relative else name
+
+
+def _range(leading: LeadingLaw, low: float, high: float) -> list[Any]:
+    if leading.axis is not None and leading.axis.words:
+        return list(leading.axis.words)
+    return [rounded(low), rounded(high)]
+
+
+def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str, str, str]:
+    leading = LeadingLaw.of(problem, explanation)
+    assert leading is not None
+    return leading.law.spoken.acts_on, leading.law.spoken.axis, leading.form
+
+
+def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
+    """Of each combination in what is undescribed, the largest first."""
+    weights: dict[tuple[str, str, str], float] = {}
+    for entry in search.laws:
+        if search.shows(entry):
+            key = _combination(problem, entry)
+            weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(entry)))
+    total = np.logaddexp.reduce([*weights.values(), *search.processes_showing])
+    ranked = sorted(weights.items(), key=lambda item: -item[1])
+    return {key: float(np.exp(weight - total)) for key, weight in ranked}
+
+
+def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
+    """Those of the fit, with the names that readers know; of a sine its amplitude, start and period."""
+    law, explanation = leading.law, leading.explanation
+    first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
+    stated = [parameter(explanation, first + place) for place in range(len(law.parameters_bound))]
+    if isinstance(law, RecordingLaw | LagLaw):
+        if law.shape.form == "periodic" and law.spoken.acts_on != "position":
+            stated = [*_wave(leading, law), *stated[2:]]
+        if law.shape.form == "step" and not law.axis.words:
+            stated.append(_edge(law))
+    return [{**entry, "name": entry["name"].removeprefix("law_")} for entry in stated]
+
+
+def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw) -> list[dict[str, Any]]:
+    amplitudes = [leading.values[name] for name in law.amplitudes]
+    size, start = wave(law, leading.values, amplitudes)
+    quarter = np.array([start + leading.values["law_period"] / 4])
+    half_width = _QUANTILE * float(np.sqrt(leading.variance(quarter)[0]))
+    ends = {"value": rounded(size), "low": rounded(max(size - half_width, 0.0)), "high": rounded(size + half_width)}
+    turn = half_width / max(size, 1e-12) * leading.values["law_period"] / (2 * np.pi)
+    begins = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}
+    unit = law.parameters_bound[0].unit
+    return [{"name": "amplitude", "unit": unit, **ends}, {"name": "start", "unit": law.axis.unit, **begins}]
+
+
+def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
+    """A step lies between two levels, nobody knows where."""
+    at, levels = float(law.shape.variant), law.axis.levels
+    low, high = levels[levels < at].max(), levels[levels > at].min()
+    ends = {"value": rounded(at), "low": rounded(float(low)), "high": rounded(float(high))}
+    return {"name": "at", "unit": law.axis.unit, **ends}
+
+
+def statement(probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float) -> str:
+    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this."""
+    law = leading.law
+    acts_on, axis = law.spoken.acts_on, law.spoken.axis
+    beside = tuple(name for name in leading.explanation.names if name != law.name)
+    known = f" beside {_listed(beside)}" if beside else ""
+    held = document["heldout_rmse_percent"]
+    parts = [
+        f"No known mechanism describes this (probability {in_percent(probability)}).",
+        f"What is missing{known} {_does(acts_on)} {_axis_words(leading)}: {_size(leading)}; {_worth(held, floor)}.",
+    ]
+    if document["rivals"]:
+        rivals = "; ".join(
+            f"{ACTS_ON[entry['acts_on']][0]} over {_plain_axis(entry['axis'])}, {entry['form']} "
+            f"({in_percent(entry['probability'])} of it)"
+            for entry in document["rivals"][:2]
+        )
+        parts.append(f"In these recordings this may also be: {rivals}.")
+    told = hint(acts_on, axis)
+    return " ".join([*parts, *([told] if told else [])])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(name.replace("_", " ") for name in names)
+
+
+def _does(acts_on: str) -> str:
+    return {
+        "position": "moves the place of the contact with",
+        "frequency_response": "changes the frequency response with",
+        "gain": "changes the gain with",
+        "force": "changes the force on the skin with",
+    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]} with")  # type: ignore[index]
+
+
+def _plain_axis(name: str) -> str:
+    return AXES[name][0] if name in AXES else name
+
+
+def _axis_words(leading: LeadingLaw) -> str:
+    words = _plain_axis(leading.law.spoken.axis)
+    if leading.axis is not None and leading.axis.relative:
+        return f"{words} over its own"
+    if leading.law.spoken.axis in _SHOWN_AS_HOURS:
+        return f"{words} ({time_zone()})"
+    return words
+
+
+def _size(leading: LeadingLaw) -> str:
+    """−8 % (−10 to −6) at 14:00."""
+    at, size, deviation = leading.largest()
+    law = leading.law
+    where = _where(leading, at)
+    half = _QUANTILE * deviation
+    if law.spoken.acts_on in ("force", "position"):
+        unit = "N" if law.spoken.acts_on == "force" else "mm"
+        return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}) {where}"
+    if isinstance(law, LagLaw) and law.kind == "corner":
+        hz = [law.lowest_hz * (size + way * half) for way in (0, -1, 1)]
+        return f"lines below a corner of {hz[0]:.3g} Hz ({hz[1]:.3g} to {hz[2]:.3g}) fall off {where}"
+    if leading.is_phase or (isinstance(law, LagLaw) and law.kind != "power"):
+        turned = np.degrees([size, size - half, size + half]) * (1 if leading.is_phase else -1)
+        low, high = sorted(turned[1:])
+        return f"the phase by {turned[0]:+.3g}° ({low:+.3g} to {high:+.3g}) {where}"
+    if isinstance(law, LagLaw):
+        return f"by a power of frequency of {-size:+.3g} ({-size - half:+.3g} to {-size + half:+.3g}) {where}"
+    return f"{100 * size:+.3g} % ({100 * (size - half):+.3g} to {100 * (size + half):+.3g}) {where}"
+
+
+def _where(leading: LeadingLaw, at: float) -> str:
+    axis = leading.axis
+    if axis is None:
+        return f"at {in_digits(at, 3)} Hz"
+    if axis.words:
+        return f"at {axis.words[round(at)]}"
+    if axis.name == "time_of_day":
+        return f"at {int(at):02d}:{int(60 * (at % 1)):02d}"
+    if axis.name == "recorded_at":
+        return f"{in_digits(at, 3)} h after the first midnight"
+    if axis.name == "order":
+        return f"at recording {in_digits(at + 1, 3)}"
+    return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
+
+
+def _worth(held: Mapping[str, float | None], floor: float) -> str:
+    noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
+    if held["before"] is None or held["after"] is None:
+        return "too few recordings to hold any out"
+    after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
+    if held["after"] >= held["before"]:
+        return f"it predicts recordings held out no better: to {after} % instead of {before} %{noise}"
+    return f"with it, recordings held out are predicted to {after} % instead of {before} %{noise}"

@@ -1,0 +1,144 @@
+"""Laws that nobody listed, as rivals of the mechanisms: which are fitted, alone and beside named ones.
+
+A score test (unnamed_screening.py) ranks them on top of nothing, of the best sets of mechanisms, and of what is left of
+the best set without one member, for which a law may stand. The few that may matter are fitted like any other set. What
+they gain on top of nothing is then tried beside each named mechanism.
+"""
+
+from collections.abc import Sequence
+
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.explanation import integrated as integrate
+from underskin.diagnosis.selection.search import Search, least_evidence
+from underskin.diagnosis.selection.unnamed_screening import Score, Screening
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.grammar import Grammar, combination
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
+
+_BENEATH = 1  # sets of mechanisms, the most probable, on top of which laws are tried, and nothing
+_FITTED = 8  # laws at most
+_BEHIND, _BEHIND_SHARE = (
+    12.0,
+    0.35,
+)  # nats of the best by its score, or that share of what it gains, behind which none is
+_MAY_MATTER = 6.0  # nats behind the most probable answer by its score
+_ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism
+_INTEGRATED, _WITHIN = 4, 6.0
+
+
+def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
+    """The explanations that hold a law, fitted, of those that may matter; none of recordings that show too little."""
+    if problem.kind != "frf":
+        return []
+    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values()))
+    if not grammar.laws:
+        return []
+    screening = Screening(problem, grammar)
+    nothing = next(entry for entry in search.explanations if not entry.names)
+    ranked = sorted((entry for entry in search.explanations if search.shows(entry)), key=search.log_weight)[::-1]
+    best = search.log_weight(ranked[0])
+    candidates: list[tuple[float, Explanation, Score]] = []
+    for beneath in _beneath(search, nothing, ranked):
+        prior = search.log_prior_beneath(beneath)
+        candidates += [
+            (beneath.log_evidence + prior + score.gain + score.log_share, beneath, score)
+            for score in _of_combinations(screening.scores(beneath))
+        ]
+    candidates.sort(key=lambda entry: -entry[0])
+    least = candidates[0][0] - max(_BEHIND, _BEHIND_SHARE * (candidates[0][0] - best))
+    chosen = [entry for entry in candidates[:_FITTED] if entry[0] > max(least, best - _MAY_MATTER)]
+    fitted = _fitted(problem, [(beneath, score) for _, beneath, score in chosen])
+    fitted += _beside_named(problem, search, fitted)
+    fitted += _without_company(problem, fitted)
+    fitted.sort(key=search.log_weight, reverse=True)
+    close = [entry for entry in fitted if search.log_weight(entry) > search.log_weight(fitted[0]) - _WITHIN]
+    some = close[:_INTEGRATED]
+    return [*integrate(some), *(entry for entry in fitted if entry not in some)] if some else []
+
+
+def _beneath(search: Search, nothing: Explanation, ranked: Sequence[Explanation]) -> list[Explanation]:
+    """On top of which laws are tried."""
+    chosen = {nothing.names: nothing}
+    named = [entry for entry in ranked if entry.names][:_BENEATH]
+    known = {frozenset(entry.names): entry for entry in search.explanations}
+    for entry in named:
+        chosen[entry.names] = entry
+    for entry in named[:1]:
+        for name in entry.names:
+            smaller = known.get(frozenset(entry.names) - {name})
+            if smaller is not None:
+                chosen[smaller.names] = smaller
+    return list(chosen.values())
+
+
+def _of_combinations(scores: Sequence[Score]) -> list[Score]:
+    """The best of each combination of where, what and form."""
+    best: dict[tuple[str, str, str], Score] = {}
+    for score in scores:
+        key = combination(score.law)
+        if key not in best or score.gain + score.log_share > best[key].gain + best[key].log_share:
+            best[key] = score
+    return list(best.values())
+
+
+def _fitted(problem: FittingProblem, chosen: Sequence[tuple[Explanation, Score]]) -> list[Explanation]:
+    requests = []
+    for beneath, score in chosen:
+        _admit(problem, score)
+        requests.append(Request((*beneath.names, score.law.name), beneath))
+    explained = problem.explain(requests) if requests else []
+    return [entry for entry in explained if entry is not None]
+
+
+def _admit(problem: FittingProblem, score: Score) -> None:
+    """Let models hold the law, and fits begin where the screening found it."""
+    law = score.law
+    law.log_share = score.log_share
+    law.found = (*law.found, score.guess)
+    problem.lines.mechanisms.add(law)
+
+
+def _beside_named(problem: FittingProblem, search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
+    """The best laws that were fitted alone, beside each mechanism, where they may lead."""
+    alone = [entry for entry in fitted if len(entry.names) == 1]
+    alone = sorted(alone, key=search.log_weight, reverse=True)[:_ALONE_IN_COMPANY]
+    known = {frozenset(entry.names) for entry in fitted}
+    best = max((search.log_weight(entry) for entry in search.explanations), default=0.0)
+    requests: list[Request] = []
+    for entry in alone:
+        if search.log_weight(entry) < best - _MAY_MATTER:
+            continue
+        requests += [
+            Request((name, *entry.names), entry)
+            for name in problem.lines.mechanisms.named
+            if name not in search.unsupported and frozenset((name, *entry.names)) not in known
+        ]
+    explained = problem.explain(requests) if requests else []
+    return [entry for entry in explained if entry is not None]
+
+
+def _without_company(problem: FittingProblem, fitted: Sequence[Explanation]) -> list[Explanation]:
+    """Laws without one of their companions, where that was not fitted: whether the companion shows is read from it."""
+    known = {frozenset(entry.names) for entry in fitted}
+    requests = []
+    for entry in fitted:
+        companions = [name for name in entry.names if name in problem.lines.mechanisms.named]
+        for name in companions:
+            rest = tuple(other for other in entry.names if other != name)
+            if frozenset(rest) not in known:
+                known.add(frozenset(rest))
+                requests.append(Request(rest))
+    explained = problem.explain(requests) if requests else []
+    return [entry for entry in explained if entry is not None]
+
+
+def law_of(problem: FittingProblem, explanation: Explanation) -> UnnamedLaw | None:
+    """The law that an explanation holds."""
+    for name in explanation.names:
+        mechanism = problem.lines.mechanisms[name]
+        if isinstance(mechanism, UnnamedLaw):
+            return mechanism
+    return None
+
+
+__all__ = ["law_of", "least_evidence", "with_laws"]

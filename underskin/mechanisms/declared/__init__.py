@@ -1,0 +1,1 @@
+"""Mechanisms that a lab declares in files (`mechanism/1`): a law as an expression, read and never executed."""

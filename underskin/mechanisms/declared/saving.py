@@ -1,0 +1,144 @@
+"""A law that a diagnosis found, as the document of a declared mechanism."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import yaml
+
+from underskin.errors import InvalidInput
+from underskin.mechanisms.declared.document import SCHEMA
+from underskin.mechanisms.unnamed.laws import PREFIX
+
+_WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
+_ADDS = {"force", "position"}
+
+
+def document(report: Mapping[str, Any], name: str, description: str | None = None) -> str:
+    """The YAML of the law that a report holds; raises InvalidInput where it holds none that an expression can say."""
+    law = report.get("unnamed")
+    if law is None:
+        raise InvalidInput("report", report.get("verdict"), "must hold a law that nobody listed (unnamed)")
+    found = report["provenance"].get("unnamed")
+    if found is None:
+        raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
+    values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
+    expressions, bending = _expressions(law, found["law"], values)
+    parameters = {key: _declared(value, logarithmic=key in bending) for key, value in values.items()}
+    axes = [law["axis"], *(["preload_n"] if "__relative__" in found["law"] else [])]
+    body = {
+        "schema": SCHEMA,
+        "name": name,
+        "description": description or f"Found by a diagnosis: {law['acts_on']} over {law['axis']}, {law['form']}.",
+        "acts_on": law["acts_on"],
+        "axes": axes,
+        "law": expressions[0] if len(expressions) == 1 else expressions,
+        "parameters": parameters,
+        "source": f"Diagnosis of the campaign {report['campaign']}: {law['expression']}",
+    }
+    return str(yaml.safe_dump(body, sort_keys=False, allow_unicode=True, width=110))
+
+
+def _declared(value: float, *, logarithmic: bool) -> dict[str, Any]:
+    if logarithmic:
+        low, high = float(f"{value / 10:.4g}"), float(f"{value * 10:.4g}")
+        return {"unit": "-", "low": low, "high": high, "scale": "log", "prior": {"mean": value, "sd": _WIDER}}
+    size = max(abs(value), 1e-6)
+    ends = float(f"{value - 6 * size:.4g}"), float(f"{value + 6 * size:.4g}")
+    sd = float(f"{_WIDER * size:.4g}")
+    return {"unit": "-", "low": ends[0], "high": ends[1], "prior": {"mean": value, "sd": sd}, "limit": 0}
+
+
+_BENDING = {  # what lies on a logarithmic scale
+    *("growth_length", "approach", "period", "width", "corner", "centre", "damping"),
+}
+
+
+def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float]) -> tuple[list[str], set[str]]:
+    """The law's expressions, and which of its parameters lie on a logarithmic scale."""
+    parts = name.removeprefix(PREFIX).split("__")
+    bending = {key for key in values if key in _BENDING}
+    if law["axis"] == "frequency_hz":
+        low, high = next(iter(law["range"].values()))
+        return [_over_frequency(parts[-1], float(np.sqrt(low * high)))], bending
+    ends = next(iter(law["range"].values()))
+    if law["form"] == "free" or not all(isinstance(end, int | float) for end in ends):
+        raise InvalidInput(
+            "report", law["form"], "a smooth course, or one of words, is no expression: it cannot be kept"
+        )
+    x = f"{law['axis']}/preload_n" if "relative" in parts else law["axis"]
+    low, high = (float(end) for end in ends)
+    form = parts[parts.index("relative") + 1 if "relative" in parts else 2]
+    variant = parts[-1]
+    if law["form"] in ("peak", "notch") and "centre" in bending:
+        bending.discard("centre")  # along an axis of recordings a place may be negative
+    kind = next((entry for entry in parts if entry in ("angle", "delay", "power", "corner")), None)
+    if law["acts_on"] == "frequency_response":
+        raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")
+    amplitudes = [key for key in values if key.startswith("change")]
+    shape = _SHAPES[form](x, low, high, variant)
+    if form == "power" and law["acts_on"] != "position":
+        middle = float(np.sqrt(low * high))
+        return [f"({x}/{middle:.6g}) ** {amplitudes[0]}"], bending
+    features = len(shape)
+    changes = [
+        " + ".join(f"{key} * {feature}" for key, feature in zip(amplitudes[first:], shape, strict=False))
+        for first in range(0, len(amplitudes), features)
+    ]
+    return [change if law["acts_on"] in _ADDS else f"1 + {change}" for change in changes], bending
+
+
+def _linear(x: str, low: float, high: float, variant: str) -> list[str]:
+    zero = (low + high) / 2 if variant == "middle" else low
+    return [f"({x} - {zero:.6g}) / {high - low:.6g}"]
+
+
+def _threshold(x: str, low: float, high: float, variant: str) -> list[str]:
+    if variant == "lost":
+        return ["(0 - 1)"]
+    if variant == "above":
+        return [f"max(0, {x} - onset) / ({high:.6g} - onset)"]
+    return [f"max(0, onset - {x}) / (onset - {low:.6g})"]
+
+
+def _exponential(x: str, low: float, high: float, _: str) -> list[str]:
+    return [f"(exp(({x} - {low:.6g}) / growth_length) - 1) / (exp({high - low:.6g} / growth_length) - 1)"]
+
+
+def _saturating(x: str, low: float, high: float, _: str) -> list[str]:
+    return [f"(1 - exp(-({x} - {low:.6g}) / approach)) / (1 - exp(-{high - low:.6g} / approach))"]
+
+
+def _periodic(x: str, low: float, _: float, __: str) -> list[str]:
+    angle = f"2 * pi * ({x} - {low:.6g}) / period"
+    return [f"sin({angle})", f"cos({angle})"]
+
+
+_SHAPES: Mapping[str, Callable[[str, float, float, str], list[str]]] = {
+    "linear": _linear,
+    "power": lambda x, low, high, _: [f"log({x} / {float(np.sqrt(low * high)):.6g})"],
+    "exponential": _exponential,
+    "saturating": _saturating,
+    "threshold": _threshold,
+    "step": lambda x, _, __, edge: [f"step({x} - {float(edge):.6g})"],
+    "periodic": _periodic,
+    "peak": lambda x, *_: [f"1 / (1 + (({x} - centre) / width) ** 2)"],
+}
+
+
+def _over_frequency(variant: str, middle: float) -> str:
+    ratio = f"frequency_hz / {middle:.6g}"
+    resonance = "(1 - u ** 2 + 2 * i * damping * u)".replace("u", "(frequency_hz / centre)")
+    told = {
+        "phase": f"exp(-i * lag * ({ratio}) ** exponent)",
+        "magnitude": f"exp(exponent * (log({ratio}) + i * pi / 2))",
+        "step": "1 + change * (i * frequency_hz / corner) / (1 + i * frequency_hz / corner)",
+        "corner": "exp(exponent * log(1 + i * frequency_hz / corner))",
+        "echo": "1 + change * exp(-2 * pi * i * frequency_hz / period)",
+        "inertia": f"1 + change * (frequency_hz / centre) ** 2 / {resonance}",
+        "loss": f"1 + change * 2 * i * damping * (frequency_hz / centre) / {resonance}",
+        "spring": f"1 + change / {resonance}",
+    }
+    if variant not in told:
+        raise InvalidInput("report", variant, "a smooth course is no expression: it cannot be kept")
+    return told[variant]

@@ -1,0 +1,188 @@
+"""What a law that nobody listed may follow, from recording to recording: fields, times, places, order, `conditions`.
+
+An axis holds one number a recording, by the recording's id: laws are bound to it, so that a campaign of which some
+recordings are left out has the same order, the same preload before, and the same range.
+"""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, tzinfo
+from functools import cached_property
+from zoneinfo import ZoneInfo
+
+import numpy as np
+
+from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
+from underskin.units import Floats
+
+TIME_ZONE = "UNDERSKIN_TIME_ZONE"  # the setting; UTC where it is not set
+_SAME = 1e-9  # of the range, within which values are one level
+UNITS: Mapping[str, str] = {
+    "preload_n": "N",
+    "previous_preload_n": "N",
+    "indenter_radius_mm": "mm",
+    "dynamic_force_n": "N",
+    "load_cycles": "cycles",
+    "dwell_s": "s",
+    "recorded_at": "h",
+    "time_of_day": "h",
+    "order": "-",
+    "x_mm": "mm",
+    "y_mm": "mm",
+    "sensor": "-",
+}
+BUILT_IN = tuple(UNITS)
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One number a recording. `relative`: to that of the recording itself (the preload before over its own).
+
+    `words`: what the numbers 0, 1, … stand for, of an axis of words.
+    """
+
+    name: str
+    values: Mapping[str, float]  # by the recording's id
+    words: tuple[str, ...] = ()
+    relative: bool = False
+    range: tuple[float, float] | None = None  # where laws are bound to that of another campaign
+    origin: datetime | None = None  # from which times count
+
+    @property
+    def unit(self) -> str:
+        """Of its values, as in UNITS of mechanisms."""
+        return "-" if self.relative else UNITS.get(self.name, "-")
+
+    @cached_property
+    def levels(self) -> Floats:
+        """The distinct values, rising."""
+        values = np.unique(list(self.values.values()))
+        step = _SAME * max(float(np.ptp(values)), 1e-300)
+        return np.asarray(values[np.append(True, np.diff(values) > step)])
+
+    @property
+    def low(self) -> float:
+        """The least value."""
+        return float(self.levels[0]) if self.range is None else self.range[0]
+
+    @property
+    def high(self) -> float:
+        """The largest value."""
+        return float(self.levels[-1]) if self.range is None else self.range[1]
+
+    @property
+    def span(self) -> float:
+        """The range."""
+        return self.high - self.low
+
+    @property
+    def positive(self) -> bool:
+        """Whether a power of it makes sense: positive, and over a factor of 1.5 at least."""
+        return not self.words and self.low > 0 and self.high > 1.5 * self.low
+
+    def of(self, ids: Sequence[str]) -> Floats:
+        """The values of these recordings (recordings,)."""
+        return np.array([self.values[name] for name in ids])
+
+
+def axes_of(conditions: Conditions) -> list[Axis]:
+    """The axes on which the FRF recordings differ; a field that one of them lacks is none.
+
+    A column of `conditions` is one as well, where at least two thirds of the recordings have it.
+    """
+    axes = [axis for axis in every_axis(conditions) if len(axis.levels) > 1]
+    days = {int(value // 24) for axis in axes if axis.name == "recorded_at" for value in axis.values.values()}
+    return axes if len(days) > 1 else [axis for axis in axes if axis.name != "time_of_day"]  # which then is the time
+
+
+def every_axis(conditions: Conditions, origin: datetime | None = None) -> list[Axis]:
+    """The axes that the FRF recordings have, whether or not they differ; times count from the `origin` where one is
+    given, else from the first midnight."""
+    entries = frf_of(conditions)
+    columns: dict[str, list[float | None]] = {
+        name: [getattr(entry, name) for entry in entries]
+        for name in ("preload_n", "indenter_radius_mm", "dynamic_force_n", "load_cycles", "dwell_s")
+    }
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors}
+    position = np.array([entry.position_mm or places[entry.sensor] for entry in entries])
+    columns |= {"x_mm": position[:, 0].tolist(), "y_mm": position[:, 1].tolist()}
+    times = _times(entries)
+    if times is not None:
+        origin = origin or min(times).replace(hour=0, minute=0, second=0, microsecond=0)
+        columns["recorded_at"] = [(time - origin).total_seconds() / 3600 for time in times]
+        columns["time_of_day"] = [(time.hour * 3600 + time.minute * 60 + time.second) / 3600 for time in times]
+    rank = recording_order(entries)
+    columns["order"] = rank.tolist()
+    ids = [entry.id for entry in entries]
+    axes = [
+        Axis(name, dict(zip(ids, known, strict=True)), origin=origin if name == "recorded_at" else None)
+        for name, column in columns.items()
+        if len(known := [value for value in column if value is not None]) == len(ids)
+    ]
+    axes += _previous(entries, rank)
+    axes.append(_worded("sensor", ids, [entry.sensor for entry in entries]))
+    axes += _further(entries)
+    return axes
+
+
+def recording_order(entries: Sequence[FrfConditions]) -> Floats:
+    """Which recording came how late, from 0 (recordings,): by its time, else by its load cycles, else as listed."""
+    times = _times(entries)
+    seconds = None if times is None else [time.timestamp() for time in times]
+    cycles = [float(entry.load_cycles) for entry in entries if entry.load_cycles is not None]
+    for column in (seconds, cycles):
+        if column is not None and len(set(column)) == len(entries):
+            return np.argsort(np.argsort(np.array(column))).astype(float)
+    return np.arange(len(entries), dtype=float)
+
+
+def time_zone() -> tzinfo:
+    """That of times without one, and of the time of day."""
+    name = os.environ.get(TIME_ZONE, "UTC")
+    return UTC if name == "UTC" else ZoneInfo(name)
+
+
+def _times(entries: Sequence[FrfConditions]) -> list[datetime] | None:
+    """Local times; None where one is lacking."""
+    if any(entry.recorded_at is None for entry in entries):
+        return None
+    zone = time_zone()
+    read = [datetime.fromisoformat(str(entry.recorded_at).replace("Z", "+00:00")) for entry in entries]
+    return [time.astimezone(zone) if time.tzinfo else time.replace(tzinfo=zone) for time in read]
+
+
+def _previous(entries: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
+    """The preload of the recording before, and over the recording's own; the first has its own as the one before."""
+    place = np.argsort(rank)
+    preload = np.array([entry.preload_n for entry in entries])
+    before = preload.copy()
+    before[place[1:]] = preload[place[:-1]]
+    ids = [entry.id for entry in entries]
+    return [
+        Axis("previous_preload_n", dict(zip(ids, before.tolist(), strict=True))),
+        Axis("previous_preload_n", dict(zip(ids, (before / preload).tolist(), strict=True)), relative=True),
+    ]
+
+
+def _worded(name: str, ids: Sequence[str], words: Sequence[str]) -> Axis:
+    known = sorted(set(words))
+    return Axis(name, {key: float(known.index(word)) for key, word in zip(ids, words, strict=True)}, tuple(known))
+
+
+def _further(entries: Sequence[FrfConditions]) -> list[Axis]:
+    """The columns of `conditions`, numbers or words; where a value is missing, the middle one stands for it."""
+    axes = []
+    for name in sorted({name for entry in entries for name in entry.conditions or {}}):
+        given = {entry.id: (entry.conditions or {}).get(name) for entry in entries}
+        known = {key: value for key, value in given.items() if value is not None}
+        if 3 * len(known) < 2 * len(entries):
+            continue
+        if any(isinstance(value, str) for value in known.values()):
+            words = [str(value) for value in known.values()]
+            common = max(sorted(set(words)), key=words.count)
+            axes.append(_worded(name, list(given), [str(known.get(key, common)) for key in given]))
+        else:
+            middle = float(np.median([float(value) for value in known.values()]))
+            axes.append(Axis(name, {key: float(known.get(key, middle)) for key in given}))
+    return axes

@@ -1,0 +1,256 @@
+"""Forms of a law over one axis of the recordings: a few features, each times an amplitude, and what bends them.
+
+At amplitude 0 every law is the base model. A feature is 1 where the form's whole change over the measured range has
+happened, so that an amplitude is that change. Edges of steps and periods are tried one by one, each as a shape of its
+own, since a fit does not move from one to the next.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import get_args
+
+import numpy as np
+
+from underskin.autodiff import Differentiated, exp, where
+from underskin.mechanisms.base import Values
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.unnamed.axes import Axis
+from underskin.mechanisms.unnamed.vocabulary import Form
+from underskin.units import Floats
+
+Feature = Differentiated | Floats
+Features = Callable[[Floats, Values], Sequence[Feature]]
+
+FORMS: tuple[Form, ...] = get_args(Form)
+_LEAST_LEVELS = {"power": 3, "exponential": 5, "saturating": 4, "threshold": 4, "periodic": 6, "peak": 6, "free": 4}
+_MOST_EDGES, _MOST_PERIODS = 24, 48
+_SHORTEST_PERIOD = 3.0  # levels
+_LANDMARKS, _LENGTH = 6, 0.3  # of a free process, over the range
+_FROM_PLACES = ("x_mm", "y_mm")
+_LATE, _SHARP = "how soon it sets in, over the measured range", "anywhere within the measured range"
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One form over an axis. `variant` tells shapes of a form apart; `share` of the form's prior is the shape's."""
+
+    form: Form
+    features: Features
+    count: int = 1  # of features
+    variant: str = ""
+    share: float = 1.0
+    bending: tuple[Parameter, ...] = ()  # not amplitudes
+    grid: tuple[tuple[float, ...], ...] = ((),)  # their values that a screening tries
+    logarithmic: bool = False  # the feature is that of the logarithm: a power
+    needs_peak: bool = False
+
+
+def shapes(axis: Axis) -> list[Shape]:
+    """All that an axis with so many levels can show."""
+    if axis.words:
+        return _of_words(axis)
+    count = len(axis.levels)
+    each: list[Shape] = [*_linear(axis), *_step(axis)]
+    if axis.positive and count >= _LEAST_LEVELS["power"]:
+        each.append(_power(axis))
+    for form, make in (
+        ("exponential", _exponential),
+        ("saturating", _saturating),
+        ("threshold", _threshold),
+        ("periodic", _periodic),
+        ("peak", _peak),
+        ("free", _free),
+    ):
+        if count >= _LEAST_LEVELS[form]:
+            each += make(axis)
+    return each
+
+
+def reference(axis: Axis, variant: str) -> float:
+    """Where a linear law does nothing: at the least value, or in the middle."""
+    return (axis.low + axis.high) / 2 if variant == "middle" else axis.low
+
+
+def _linear(axis: Axis) -> list[Shape]:
+    variants = ("low", "middle")
+
+    def of(variant: str) -> Shape:
+        zero = reference(axis, variant)
+        return Shape("linear", lambda x, _: [(x - zero) / axis.span], variant=variant, share=0.5)
+
+    return [of(variant) for variant in variants]
+
+
+def _power(axis: Axis) -> Shape:
+    middle = float(np.sqrt(axis.low * axis.high))
+    return Shape("power", lambda x, _: [np.log(x / middle)], logarithmic=True)
+
+
+def _exponential(axis: Axis) -> list[Shape]:
+    """(e^(u/ξ) − 1)/(e^(1/ξ) − 1), u from 0 to 1 over the range; and the same from the other end."""
+    length = _bend("law_growth_length", axis, 0.08, 0.8, 0.3, _LATE)
+
+    def growing(x: Floats, values: Values) -> list[Feature]:
+        rate = axis.span / values["law_growth_length"]
+        return [(exp(((x - axis.low) / axis.span) * rate) - 1.0) / (exp(rate) - 1.0)]
+
+    return [Shape("exponential", growing, bending=(length,), grid=_over(axis, (0.15, 0.4)))]
+
+
+def _saturating(axis: Axis) -> list[Shape]:
+    """(1 − e^(−u/τ))/(1 − e^(−1/τ)), u from 0 to 1 over the range."""
+    length = _bend("law_approach", axis, 0.02, 1.2, 0.25, _LATE)
+
+    def approaching(x: Floats, values: Values) -> list[Feature]:
+        rate = axis.span / values["law_approach"]
+        return [(1.0 - exp(((axis.low - x) / axis.span) * rate)) / (1.0 - exp(-rate))]
+
+    return [Shape("saturating", approaching, bending=(length,), grid=_over(axis, (0.06, 0.2, 0.6)))]
+
+
+def _threshold(axis: Axis) -> list[Shape]:
+    """0 up to an onset, then straight to 1 at the end of the range; or straight down to an onset, then 0."""
+    onset = Parameter(
+        "law_onset",
+        axis.unit,
+        axis.low + 0.02 * axis.span,
+        axis.high - 0.05 * axis.span,
+        Uniform(),
+        "linear",
+        limit=None,
+        reason=_SHARP,
+    )
+    grid = tuple((axis.low + share * axis.span,) for share in (0.15, 0.3, 0.5, 0.7, 0.85))
+
+    def above(x: Floats, values: Values) -> list[Feature]:
+        ahead = (x - values["law_onset"]) / (axis.high - values["law_onset"])
+        return [where(ahead.value > 0, ahead, 0.0)]
+
+    def below(x: Floats, values: Values) -> list[Feature]:
+        behind = (values["law_onset"] - x) / (values["law_onset"] - axis.low)
+        return [where(behind.value > 0, behind, 0.0)]
+
+    each = (("above", above), ("below", below))
+    return [Shape("threshold", law, variant=name, share=0.5, bending=(onset,), grid=grid) for name, law in each]
+
+
+def _step(axis: Axis) -> list[Shape]:
+    """0 up to an edge, 1 beyond; an edge lies between neighbouring levels."""
+    levels = axis.levels
+    if len(levels) < 3:
+        return []
+    edges = (levels[1:] + levels[:-1]) / 2
+    if len(edges) > _MOST_EDGES:
+        edges = edges[np.unique(np.linspace(0, len(edges) - 1, _MOST_EDGES).round().astype(int))]
+
+    def of(edge: float) -> Shape:
+        return Shape("step", lambda x, _: [(x > edge).astype(float)], variant=f"{edge!r}", share=1 / len(edges))
+
+    return [of(edge) for edge in edges.tolist()]
+
+
+def _periodic(axis: Axis) -> list[Shape]:
+    """Sine and cosine of one period; a day for the time of day."""
+    if axis.name == "time_of_day":
+        periods, half_width = [24.0], 1e-3
+    else:
+        most = len(axis.levels) / _SHORTEST_PERIOD
+        turns = np.arange(0.75, max(most, 0.75) + 1e-9, max(0.5, (most - 0.75) / _MOST_PERIODS))  # resolved: 0.5
+        periods, half_width = (axis.span / turns).tolist(), 0.0
+
+    def of(place: int, period: float) -> Shape:
+        turn = axis.span / period
+        ends = (period * (1 - half_width), period * (1 + half_width))
+        if not half_width:
+            ends = (axis.span / (turn + 0.3), axis.span / max(turn - 0.3, 0.3))
+        length = Parameter(
+            "law_period", axis.unit, *ends, Normal(float(np.log(period)), 1.0), "log", limit=None, reason=_SHARP
+        )
+
+        def turning(x: Floats, values: Values) -> list[Feature]:
+            angle = (2 * np.pi * (x - axis.low)) / values["law_period"]
+            return [_sin(angle), _cos(angle)]
+
+        return Shape(
+            "periodic",
+            turning,
+            count=2,
+            variant=str(place),
+            share=1 / len(periods),
+            bending=(length,),
+            grid=((float(np.log(period)),),),
+        )
+
+    return [of(place, period) for place, period in enumerate(periods)]
+
+
+def _peak(axis: Axis) -> list[Shape]:
+    """1/(1 + ((x − x1)/w)²)."""
+    centre = Parameter("law_centre", axis.unit, axis.low, axis.high, Uniform(), "linear", limit=None, reason=_SHARP)
+    width = _bend("law_width", axis, 0.03, 0.35, 0.12, "from a few levels to a third of the measured range")
+    grid = tuple(
+        (axis.low + share * axis.span, float(np.log(wide * axis.span)))
+        for wide in (0.08, 0.2)
+        for share in np.linspace(0.05, 0.95, 10 if wide < 0.1 else 6).tolist()
+    )
+
+    def peaking(x: Floats, values: Values) -> list[Feature]:
+        away = (x - values["law_centre"]) / values["law_width"]
+        return [1.0 / (1.0 + away * away)]
+
+    return [Shape("peak", peaking, bending=(centre, width), grid=grid, needs_peak=True)]
+
+
+def _free(axis: Axis) -> list[Shape]:
+    """A Matérn-3/2 process, by landmarks along the range."""
+    count = min(_LANDMARKS, len(axis.levels))
+    landmarks = np.linspace(0.0, 1.0, count)
+
+    def matern(a: Floats, b: Floats) -> Floats:
+        scaled = np.sqrt(3.0) * np.abs(a[:, None] - b[None]) / _LENGTH
+        return np.asarray((1 + scaled) * np.exp(-scaled))
+
+    root = np.linalg.cholesky(matern(landmarks, landmarks) + 1e-8 * np.eye(count))
+
+    def free(x: Floats, _: Values) -> list[Feature]:
+        u = np.clip((x - axis.low) / axis.span, 0.0, 1.0)
+        return list(np.linalg.solve(root, matern(landmarks, u)))
+
+    return [Shape("free", free, count=count)]
+
+
+def _of_words(axis: Axis) -> list[Shape]:
+    """One word's recordings are off, or those of each word."""
+
+    def of(word: int) -> Shape:
+        return Shape(
+            "step",
+            lambda x, _: [(x == word).astype(float)],
+            variant=axis.words[word],
+            share=1 / len(axis.words),
+        )
+
+    words = range(len(axis.words))
+    each = [of(word) for word in (words if len(axis.words) > 2 else words[1:])]
+    if len(axis.words) > 2:
+        each.append(Shape("free", lambda x, _: [(x == word).astype(float) for word in words], count=len(axis.words)))
+    return each
+
+
+def _bend(name: str, axis: Axis, low: float, high: float, middle: float, reason: str) -> Parameter:
+    """A length along an axis, these shares of its range."""
+    ends = low * axis.span, high * axis.span
+    prior = Normal(float(np.log(middle * axis.span)), 0.9)
+    return Parameter(name, axis.unit, *ends, prior, "log", limit=None, reason=reason)
+
+
+def _over(axis: Axis, shares: Sequence[float]) -> tuple[tuple[float, ...], ...]:
+    return tuple((float(np.log(share * axis.span)),) for share in shares)
+
+
+def _sin(x: Differentiated) -> Differentiated:
+    return Differentiated(np.sin(x.value), np.cos(x.value) * x.slopes)
+
+
+def _cos(x: Differentiated) -> Differentiated:
+    return Differentiated(np.cos(x.value), -np.sin(x.value) * x.slopes)

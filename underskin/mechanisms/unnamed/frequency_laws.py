@@ -1,0 +1,205 @@
+"""Laws over frequency, the same in all recordings.
+
+Minimum phase: the phase follows from the magnitude by Kramers and Kronig's relations (Bode 1945), since what is
+measured is caused by what came before. Or a pure phase: a delay that disperses, a loss angle over the measured band.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from underskin.autodiff import Differentiated, exp, log
+from underskin.mechanisms.base import Stage, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.unnamed.laws import PREFIX, Spoken, UnnamedLaw
+from underskin.mechanisms.unnamed.vocabulary import Form
+from underskin.units import Array, Floats
+
+_REASON = "nothing is known of it; as large as what is usually left out"
+_BAND = "anywhere within the measured band"
+_BUMPS, _BUMP_WIDTH = 8, 0.55  # of a free response; width over the distance of neighbours
+
+Factor = Callable[[Floats, Values], Differentiated]  # at frequencies [Hz]
+
+
+@dataclass(frozen=True, eq=False)
+class _Law:
+    form: Form
+    variant: str
+    amplitudes: tuple[Parameter, ...]
+    bending: tuple[Parameter, ...]
+    grid: Sequence[Sequence[float]]
+    factor: Factor
+    share: float = 1.0
+
+
+class FrequencyLaw(UnnamedLaw):
+    """One of them, with the band that it was found in."""
+
+    stage = Stage.LINES
+    order = 210
+
+    def __init__(self, law: _Law, middle: float) -> None:
+        """`middle` of the band [Hz], to which powers refer."""
+        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
+        self.spoken = Spoken("frequency_response", "frequency_hz", law.form)
+        self.variant = law.variant
+        self.share = law.share
+        self.amplitudes = tuple(entry.name for entry in law.amplitudes)
+        self.parameters_bound = (*law.amplitudes, *law.bending)
+        self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
+        self.factor = law.factor
+        self.middle_hz = middle
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """The factor on each distinct line."""
+        return self.factor(design.line_frequency, values)
+
+    def tangents(self, frequency: Floats) -> Array:
+        """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
+        points, count = len(self.grid), len(self.amplitudes)
+        values: dict[str, Differentiated] = {}
+        for number, entry in enumerate(self.parameters_bound):
+            slopes = np.zeros((count, points, 1))
+            value = np.zeros((points, 1))
+            if number < count:
+                slopes[number] = 1.0
+            else:
+                at = self.grid[:, number - count, None]
+                value = np.exp(at) if entry.scale == "log" else at
+            values[entry.name] = Differentiated(value, slopes)
+        answer = self.factor(frequency, values)
+        return np.moveaxis(answer.slopes / answer.value, 0, -1)
+
+
+def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
+    """All over a band of lines [Hz]."""
+    low, high = float(frequency.min()), float(frequency.max())
+    if high < 1.5 * low or len(frequency) < 6:
+        return []
+    middle = float(np.sqrt(low * high))
+    each = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
+    return [FrequencyLaw(law, middle) for law in each]
+
+
+def _amplitude(sd: float, name: str = "law_change") -> Parameter:
+    return Parameter(name, "-", -6 * sd, 6 * sd, Normal(0.0, sd), "linear", 0.0, _REASON)
+
+
+def _corner(low: float, high: float, name: str = "law_corner") -> Parameter:
+    return Parameter(name, "Hz", low, high, Uniform(), "log", None, _BAND)
+
+
+def _over_band(low: float, high: float, count: int) -> list[float]:
+    return np.linspace(np.log(low), np.log(high), count).tolist()
+
+
+def _phases(middle: float) -> list[_Law]:
+    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses."""
+    exponent = Parameter("law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴")
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_lag"] * exp(values["law_exponent"] * np.log(frequency / middle)) * -1j)
+
+    grid = [(value,) for value in (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)]
+    return [_Law("power", "phase", (_amplitude(0.2, "law_lag"),), (exponent,), grid, factor)]
+
+
+def _powers(low: float, high: float, middle: float) -> list[_Law]:
+    """Minimum phase: (if)^n; a step from 1 to 1 + A; (1 + if/f1)^n beyond a corner."""
+
+    def power(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_exponent"] * (np.log(frequency / middle) + 0.5j * np.pi))
+
+    def step(frequency: Floats, values: Values) -> Differentiated:
+        ratio = 1j * frequency / values["law_corner"]
+        return 1.0 + values["law_change"] * (ratio / (1.0 + ratio))
+
+    def beyond(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_exponent"] * log(1.0 + 1j * frequency / values["law_corner"]))
+
+    corner = _corner(low, high)
+    grid = [(at,) for at in _over_band(low, high, 8)]
+    return [
+        _Law("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
+        _Law("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
+        _Law("threshold", "corner", (_amplitude(0.7, "law_exponent"),), (corner,), grid, beyond),
+    ]
+
+
+def _peaks(low: float, high: float) -> list[_Law]:
+    """A resonance at one frequency in all recordings, beside the response: 1 + A u²/(1 − u² + 2iζu), and its like."""
+    corner = _corner(0.8 * low, 1.25 * high, "law_centre")
+    damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
+    grid = [
+        (at, float(np.log(zeta)))
+        for zeta, count in ((0.03, 60), (0.1, 24), (0.35, 10))
+        for at in _over_band(low, high, count)
+    ]
+    numerators: dict[str, Callable[[Differentiated, Values], Differentiated | complex]] = {
+        "inertia": lambda u, _: u * u,
+        "loss": lambda u, values: 2j * values["law_damping"] * u,
+        "spring": lambda *_: 1.0,
+    }
+
+    def of(name: str) -> _Law:
+        def factor(frequency: Floats, values: Values) -> Differentiated:
+            u = frequency / values["law_centre"]
+            numerator = numerators[name](u, values)
+            return 1.0 + values["law_change"] * (numerator / (1.0 - u * u + 2j * values["law_damping"] * u))
+
+        return _Law("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
+
+    return [of(name) for name in numerators]
+
+
+def _echo(low: float, high: float) -> _Law:
+    """1 + A e^(−2πif/f1): an echo, whose ripples recur every f1."""
+    spacing = _corner(2.2 * (high - low) / 60, 2 * (high - low), "law_period")
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        return 1.0 + values["law_change"] * exp((-2j * np.pi * frequency) / values["law_period"])
+
+    turns = np.arange(1.0, 14.0, 0.5)
+    grid = [(float(np.log((high - low) / turn)),) for turn in turns.tolist()]
+    return _Law("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
+
+
+def _free(low: float, high: float) -> _Law:
+    """ln |FRF| a sum of bumps over ln f, the phase by Kramers and Kronig."""
+    centres = np.linspace(np.log(low), np.log(high), _BUMPS)
+    width = _BUMP_WIDTH * (centres[1] - centres[0])
+    names = tuple(f"law_change_{number + 1}" for number in range(_BUMPS))
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        total: Differentiated | None = None
+        away = (np.log(frequency) - centres[:, None]) / width
+        for name, log_magnitude, phase in zip(
+            names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True
+        ):
+            part = values[name] * (log_magnitude + 1j * phase)
+            total = part if total is None else total + part
+        assert total is not None
+        return exp(total)
+
+    return _Law("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
+
+
+@lru_cache(maxsize=8)
+def _phase_table(width: float) -> tuple[Floats, Floats]:
+    """The phase of a bump of this width in ln ω, over u: φ = (1/π) ∫ dM/dx ln coth(|x − x0|/2) dx (Bode 1945)."""
+    stride = width / 60
+    x = np.arange(-6 * width, 6 * width, stride) + stride / 2
+    slope = -x / width**2 * np.exp(-0.5 * (x / width) ** 2)
+    at = np.linspace(-12 * width, 12 * width, 481)  # halfway between those, so that none meets the logarithm's pole
+    kernel = -np.log(np.tanh(np.abs(x - at[:, None]) / 2))
+    return at / width, np.asarray(kernel @ slope * stride / np.pi)
+
+
+def phase_of_bump(away: Floats, width: float) -> Floats:
+    """The phase [rad] that belongs to ln |H| = e^(−u²/2), u = ln(ω/ω0)/width, at u = `away`; 0 far off."""
+    return np.interp(away, *_phase_table(width))

@@ -1,0 +1,260 @@
+"""Laws that nobody listed, bound to the recordings of a campaign: mechanisms like any other."""
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+
+from underskin.autodiff import Differentiated, chain, exp
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.unnamed.axes import Axis
+from underskin.mechanisms.unnamed.forms import Feature, Shape
+from underskin.mechanisms.unnamed.level_tables import LevelTables
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES, ActsOn, Form
+from underskin.units import Array, Floats, Indices
+
+PREFIX = "unnamed_"
+LagKind = Literal["angle", "delay", "power", "corner"]
+LAG_KINDS: tuple[LagKind, ...] = get_args(LagKind)
+_USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a place in mm, of a lag in rad
+    "gain": 0.2,
+    "modulus": 0.4,
+    "thickness": 0.2,
+    "contact_radius": 0.2,
+    "force": 0.3,
+    "position": 0.5,
+    "frequency_response": 0.3,
+}
+_REASON = "nothing is known of it; as large as what is usually left out"
+_LEAST = 0.1  # of a quantity, below which a change is continued so that it stays positive
+_MOST = 6.0  # standard deviations of the prior that bound an amplitude
+
+
+@dataclass(frozen=True, eq=False)
+class Spoken:
+    """What a report says of a law: where it enters, what it follows, its form."""
+
+    acts_on: ActsOn
+    axis: str
+    form: Form
+
+
+class UnnamedLaw(Mechanism):
+    """What both kinds of laws share. Attributes: `spoken`, `share` of the prior of its combination, `grid` of values of
+    what bends it (points, parameters), and `amplitudes`, the names of its other parameters."""
+
+    plain = "Nobody listed it."
+    source = "None."
+    assumptions = "That of one form over one axis."
+    law = "See its expression."
+    kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
+    axes: ClassVar[tuple[str, ...]] = ()
+    begins_at_guesses = True
+    spoken: Spoken
+    share: float
+    grid: Floats
+    amplitudes: tuple[str, ...]
+    log_share: float = 0.0  # in the prior of something unnamed
+    found: tuple[Floats, ...] = ()  # fit coordinates where screenings found it
+
+    def parameters(self, conditions: object, kind: Kind = "frf") -> tuple[Parameter, ...]:
+        """The same for all campaigns: they are bound to one."""
+        return self.parameters_bound
+
+    parameters_bound: tuple[Parameter, ...]
+
+    def guesses(self, conditions: object, kind: Kind) -> Sequence[Sequence[float]]:
+        """Where screenings found it."""
+        return [
+            [entry.from_fit(at) for entry, at in zip(self.parameters_bound, found.tolist(), strict=True)]
+            for found in self.found
+        ]
+
+
+class RecordingLaw(UnnamedLaw):
+    """A law that changes the level of each recording: by its gain, what is pressed, how hard, or where."""
+
+    stage = Stage.RECORDING
+    order = 200
+    axes = ()
+
+    def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, tables: LevelTables) -> None:
+        """Bind the form to the axis of a campaign and to its levels."""
+        self.name = _name(acts_on, axis, shape)
+        self.spoken = Spoken(acts_on, axis.name, shape.form)
+        self.axis, self.shape = axis, shape
+        self.share = shape.share
+        self._acts_on, self.tables = acts_on, tables
+        self._unit = _unit_of_change(acts_on)
+        scale = float(np.median(list(tables.force.values()))) if acts_on == "force" else 1.0
+        usual = _USUAL[acts_on] * scale
+        count = shape.count * (2 if acts_on == "position" else 1)
+        if shape.form == "free":
+            usual = usual / 2
+        self.amplitudes = tuple(f"law_change_{number + 1}" if count > 1 else "law_change" for number in range(count))
+        changes = tuple(
+            Parameter(name, self._unit, -_MOST * usual, _MOST * usual, Normal(0.0, usual), "linear", 0.0, _REASON)
+            for name in self.amplitudes
+        )
+        self.parameters_bound = (*changes, *shape.bending)
+        self.grid = np.array(shape.grid, dtype=float).reshape(len(shape.grid), -1)
+
+    def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
+        """The same law on other recordings."""
+        other = copy(self)
+        other.axis, other.tables = axis, tables
+        return other
+
+    def features(self, ids: Sequence[str], values: Values) -> Sequence[Feature]:
+        """Of recordings (…, recordings)."""
+        return self.shape.features(self.axis.of(ids), values)
+
+    def on_recordings(self, design: FrfDesign, values: Values) -> Differentiated:
+        """The factor on each recording."""
+        features = self.features(design.ids, values)
+        rows = self._rows(design.ids)
+        if self._acts_on == "position":
+            half = len(self.amplitudes) // 2
+            x, y = (
+                _summed([values[name] * one for name, one in zip(names, features, strict=True)])
+                for names in (self.amplitudes[:half], self.amplitudes[half:])
+            )
+            return self.tables.moved(rows, x, y)
+        change = _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+        if self.shape.logarithmic:
+            log = change
+        elif self._acts_on == "force":
+            force = np.array([self.tables.force[name] for name in design.ids])
+            log = log_positive(change / force)
+        else:
+            log = log_positive(change)
+        if self._acts_on == "gain":
+            return exp(log)
+        return self.tables.factor(self._acts_on, rows, log)
+
+    def sensitivity(self, ids: tuple[str, ...]) -> Floats:
+        """∂ ln level by the law's features at amplitudes of 0 (recordings, 1); of a place by x and y (…, 2)."""
+        rows = self._rows(ids)
+        if self._acts_on == "position":
+            none = Differentiated(np.zeros((1, 1)), np.zeros((2, 1, 1)))
+            x, y = (Differentiated(none.value, np.eye(2)[place][:, None, None]) for place in (0, 1))
+            moved = self.tables.moved(rows, x, y)
+            return np.asarray((moved.slopes / moved.value)[:, 0].T)
+        if self._acts_on == "gain":
+            return np.ones((len(ids), 1))
+        seed = Differentiated(np.zeros((1, len(ids))), np.ones((1, 1, len(ids))))
+        by_log = self.tables.factor(self._acts_on, rows, seed).slopes[0, 0]
+        scale = np.array([self.tables.force[name] for name in ids]) if self._acts_on == "force" else 1.0
+        return np.asarray(by_log / scale)[:, None]
+
+    def _rows(self, ids: tuple[str, ...]) -> Indices:
+        return _rows(self.tables, ids)
+
+
+@lru_cache(maxsize=16)
+def _rows(tables: LevelTables, ids: tuple[str, ...]) -> Indices:
+    return tables.rows(ids)
+
+
+def log_positive(change: Differentiated) -> Differentiated:
+    """ln(1 + change), below a quantity of 0.1 continued by its tangent's exponential."""
+    return log_of(1.0 + change)
+
+
+def log_of(quantity: Differentiated) -> Differentiated:
+    """The logarithm of a relative quantity, below 0.1 continued along its tangent."""
+    factor = quantity.value
+    inside = factor > _LEAST
+    value = np.where(inside, np.log(np.where(inside, factor, 1.0)), np.log(_LEAST) + factor / _LEAST - 1)
+    return chain(value, (1 / np.where(inside, factor, _LEAST), quantity))
+
+
+def _summed(parts: Sequence[Differentiated]) -> Differentiated:
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    return total
+
+
+def _unit_of_change(acts_on: ActsOn) -> str:
+    return {"force": "N", "position": "mm"}.get(acts_on, "-")
+
+
+def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
+    parts = (acts_on, axis.name, *(["relative"] if axis.relative else []), shape.form, variant, shape.variant)
+    return PREFIX + "__".join(part for part in parts if part)
+
+
+class LagLaw(UnnamedLaw):
+    """A response that lags, or whose lines fall off, by something that follows an axis of the recordings.
+
+    `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. Of the lag φ
+    they make exp(−iφ), exp(−iφ f/f_highest), (if/f_middle)^(−φ) and 1/(1 + φ f_lowest/(if)).
+    """
+
+    stage = Stage.LINES
+    order = 200
+    tells_recordings_apart = True
+
+    def __init__(self, kind: LagKind, axis: Axis, shape: Shape, lines: Floats) -> None:
+        """Over the band of these lines [Hz]."""
+        self.name = _name("frequency_response", axis, shape, kind)
+        self.spoken = Spoken("frequency_response", axis.name, shape.form)
+        self.axis, self.shape, self.kind = axis, shape, kind
+        self.share = shape.share / len(LAG_KINDS)
+        self.lowest_hz, self.highest_hz = float(lines[0]), float(lines[-1])
+        self.middle_hz = float(np.exp(np.log(lines).mean()))
+        usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
+        power = shape.logarithmic
+        self.amplitudes = tuple(
+            f"law_lag_{number + 1}" if shape.count > 1 else "law_lag" for number in range(shape.count)
+        )
+        lags = tuple(
+            Parameter(name, "-", -_MOST * usual, _MOST * usual, Normal(0.0, usual), "linear", 0.0, _REASON)
+            for name in self.amplitudes
+        )
+        exponent = Parameter("law_exponent", "-", -4.0, 4.0, Normal(0.0, 1.5), "linear", None, _REASON)
+        self.parameters_bound = (*lags, *([exponent] if power else []), *shape.bending)
+        grid = [(value,) for value in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)] if power else shape.grid
+        self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
+
+    def on(self, axis: Axis) -> "LagLaw":
+        """The same law on other recordings."""
+        other = copy(self)
+        other.axis = axis
+        return other
+
+    def lag(self, ids: Sequence[str], values: Values) -> Differentiated:
+        """Of these recordings (…, recordings): an angle [rad] or an exponent."""
+        features = self.shape.features(self.axis.of(ids), values)
+        if self.shape.logarithmic:
+            features = [exp(values["law_exponent"] * features[0])]
+        return _summed([values[name] * one for name, one in zip(self.amplitudes, features, strict=True)])
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """The factor on each distinct line."""
+        ids = [design.ids[number] for number in design.contact_recording]
+        lag = self.lag(ids, values).spread(len(ids))[design.line_contact]
+        pattern = self.pattern(design.line_frequency)
+        return 1.0 / (1.0 - lag * pattern) if self.kind == "corner" else exp(lag * pattern)
+
+    def pattern(self, frequency: Floats) -> Array:
+        """∂ ln factor by the lag, where that is 0."""
+        match self.kind:
+            case "angle":
+                return np.full(len(frequency), -1j)
+            case "delay":
+                return np.asarray(-1j * frequency / self.highest_hz)
+            case "power":
+                return np.asarray(-(np.log(frequency / self.middle_hz) + 0.5j * np.pi))
+            case "corner":
+                return np.asarray(1j * self.lowest_hz / frequency)
+
+
+__all__ = ["ACTS_ON", "AXES", "LagLaw", "RecordingLaw", "Spoken", "UnnamedLaw", "log_positive"]

@@ -1,0 +1,30 @@
+"""The words of the grammar, as reports have them."""
+
+from typing import Literal
+
+ActsOn = Literal["gain", "modulus", "thickness", "contact_radius", "force", "position", "frequency_response"]
+Form = Literal["linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"]
+ACTS_ON: dict[ActsOn, tuple[str, str]] = {  # what it is called, and its symbol
+    "gain": ("gain of the charge", "Q"),
+    "modulus": ("modulus", "E"),
+    "thickness": ("thickness", "h"),
+    "contact_radius": ("contact radius", "a"),
+    "force": ("force on the skin", "F"),
+    "position": ("place of the contact", "x"),
+    "frequency_response": ("frequency response", "FRF"),
+}
+AXES: dict[str, tuple[str, str]] = {  # of built-in axes the words and the symbol
+    "preload_n": ("the preload", "F"),
+    "previous_preload_n": ("the preload of the recording before", "Fprev"),
+    "indenter_radius_mm": ("the radius of the sphere", "R"),
+    "dynamic_force_n": ("the dynamic force", "Fd"),
+    "load_cycles": ("the load cycles", "N"),
+    "dwell_s": ("the time under preload", "t"),
+    "recorded_at": ("the time", "t"),
+    "time_of_day": ("the time of day", "t"),
+    "order": ("the order of the recordings", "k"),
+    "x_mm": ("the place along x", "x"),
+    "y_mm": ("the place along y", "y"),
+    "sensor": ("the sensor", "sensor"),
+    "frequency_hz": ("frequency", "f"),
+}
