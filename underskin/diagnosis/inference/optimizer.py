@@ -28,6 +28,7 @@ _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's 
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
+_LEAST_CURVATURE = 1e-10
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 
@@ -269,9 +270,11 @@ class Fitter(Evaluator):
         low, high = self.low[owner], self.high[owner]
         free, every = self.free[owner], np.arange(fit.shape[1])
         diagonal = information[:, every, every]
+        # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
+        least = (high - low) ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
-            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + 1e-10, 1.0)
+            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
             step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
             scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
             step /= np.maximum(1.0, scale.max(axis=1))[:, None]
