@@ -138,7 +138,10 @@ class _Base:
         return self.bodies[radius]
 
     def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
-        """Force of the known effects, calculated at some samples and at those beside a jump; infinite beyond the rig's laws."""
+        """Force of the known effects, calculated at some samples and at those beside a jump.
+
+        Infinite beyond the rig's laws.
+        """
         displacement, curve = self._displacement(number, shift), self.recorded[number]
         radius = curve.entry["indenter_radius_mm"]
         body = replace(self._body(radius), modulus=self._modulus(log_modulus))
