@@ -18,6 +18,9 @@ _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
+_STANDS_OUT = 10.0  # times its noise, that a moving sphere's way is seen over
+_LEAST_HELD, _AS_NOISE = 8, 1.2  # samples of a hold; times the noise, about its line
+_LONG = 2  # times that many samples, beyond which what is still is a hold and no turn
 _FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples that tell a drift in the air; grids of contact points
 _LEAST_AIR, _SHORTER = 0.1, 0.9  # of the samples of a way; of those in the air, where these do not lie straight
 _PLAIN = 60.0  # F of a drift, beyond which it is plain
@@ -36,7 +39,8 @@ class Course:
 
     noise: float  # standard deviation of a sample of force
     turn: int  # the deepest sample
-    leave: int  # the last sample of the hold there
+    arrive: int  # the first sample of the hold there
+    leave: int  # the last one
     snap_in: int | None
     pull_off: int | None
     air: Indices
@@ -75,19 +79,48 @@ def _course(*columns: bytes) -> Course:
     up = np.flatnonzero((found > turn) & (step > least) & (np.abs(after - end) < in_air))
     snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else None
     pull_off = int(found[up[np.argmax(step[up])]]) if len(up) else None
-    steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
-    still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
-    leave = turn + int(np.argmin(still))
+    arrive, leave = _held(displacement, turn)
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
     if drifting is None and snap_in is None and pull_off is None:
         back = _drifting_after(displacement, force, time, leave, noise)
         if back is not None:
             air, drift = np.arange(len(force) - back[0], len(force)), back[1]
             zero = float(np.median(force[air] - drift * (time[air] - time[0])))
-            return Course(noise, turn, leave, None, None, air, zero, drift)
+            return Course(noise, turn, arrive, leave, None, None, air, zero, drift)
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+    return Course(noise, turn, arrive, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+
+
+def _held(displacement: Floats, turn: int) -> tuple[int, int]:
+    """The first and the last sample of the hold around the deepest one.
+
+    Where the displacement is noisy, changes over so many samples that a moving sphere's stand out tell it, if what is
+    between lies on a straight line. Else it begins with the deepest sample, and steps between samples tell its end.
+    """
+    noise = roughness(displacement)
+    steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
+    still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
+    plain = turn, turn + int(np.argmin(still))
+    slowest = float(2 * displacement[turn] - displacement[0] - displacement[-1]) / len(displacement)  # if never still
+    lag = int(np.ceil(_STANDS_OUT * noise / slowest)) if slowest > 0 else 0
+    if not 0 < lag < len(displacement) // 4:
+        return plain
+    resting = np.abs(displacement[lag:] - displacement[:-lag]) <= 0.5 * lag * slowest
+    about = np.flatnonzero(resting[max(turn - lag, 0) : turn + 1]) + max(turn - lag, 0)
+    if not len(about):
+        return plain
+    moving = np.flatnonzero(~resting)
+    before, after = moving[moving < about[0]], moving[moving > about[0]]
+    # A window at the edge lies in the hold by half
+    begin = (int(before[-1]) + 1 if len(before) else 0) + lag // 2
+    end = (int(after[0]) - 1 if len(after) else len(resting) - 1) + lag - lag // 2
+    held = displacement[begin : end + 1]
+    if end - begin < max(_LONG * lag, _LEAST_HELD):
+        return plain
+    place = np.arange(len(held)) - (len(held) - 1) / 2
+    line = held.mean() + place * float(place @ held) / float(place @ place)
+    return (begin, end) if np.std(held - line) < _AS_NOISE * noise else plain
 
 
 def roughness(force: Floats) -> float:
