@@ -77,7 +77,7 @@ def _course(*columns: bytes) -> Course:
     in_air = least + _RISE * span
     down = np.flatnonzero((found < turn) & (step < -least) & (np.abs(before - begin) < in_air) & (found > few))
     up = np.flatnonzero((found > turn) & (step > least) & (np.abs(after - end) < in_air))
-    snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else None
+    snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else _single_snap(force[: turn + 1], begin, noise)
     pull_off = int(found[up[np.argmax(step[up])]]) if len(up) else None
     arrive, leave = _held(displacement, turn)
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
@@ -90,6 +90,22 @@ def _course(*columns: bytes) -> Course:
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
     return Course(noise, turn, arrive, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+
+
+def _single_snap(force: Floats, begin: float, noise: float) -> int | None:
+    """The sample on the way in with which the force falls, where it rises again at once, so that no means show it: one
+    of the last that lie no higher than the air, `begin`."""
+    low = np.flatnonzero(force <= begin + _BEYOND_JUMP * noise)
+    if not len(low) or not noise > 0:
+        return None
+    first = max(int(low[-1]) - _AIR, _AIR)
+    fallen = [
+        place
+        for place in range(first, int(low[-1]) + 1)
+        if force[place] < np.median(force[place - _AIR : place]) - _BEYOND_JUMP * noise
+        and force[place] < force[place - 1] - _BEYOND_JUMP * noise
+    ]
+    return fallen[0] if fallen else None
 
 
 def _held(displacement: Floats, turn: int) -> tuple[int, int]:
