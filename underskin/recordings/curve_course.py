@@ -18,9 +18,9 @@ _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
-_STANDS_OUT = 10.0  # times its noise, that a moving sphere's way is seen over
-_LEAST_HELD, _AS_NOISE = 8, 1.2  # samples of a hold; times the noise, about its line
-_LONG = 2  # times that many samples, beyond which what is still is a hold and no turn
+_HELD_BLOCK = 8  # samples by which a hold is found
+_BESIDE_HOLD, _AS_NOISE = 4.0, 1.5  # standard deviations of a mean; times the noise about the mean of a hold
+_HIDDEN = 24.0  # times the noise: the way of a sphere that moved on for as long as a hold
 _FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples that tell a drift in the air; grids of contact points
 _LEAST_AIR, _SHORTER = 0.1, 0.9  # of the samples of a way; of those in the air, where these do not lie straight
 _PLAIN = 60.0  # F of a drift, beyond which it is plain
@@ -111,32 +111,32 @@ def _single_snap(force: Floats, begin: float, noise: float) -> int | None:
 def _held(displacement: Floats, turn: int) -> tuple[int, int]:
     """The first and the last sample of the hold around the deepest one.
 
-    Where the displacement is noisy, changes over so many samples that a moving sphere's stand out tell it, if what is
-    between lies on a straight line. Else it begins with the deepest sample, and steps between samples tell its end.
+    Where the displacement is noisy, a hold grows by blocks as long as their means are its own; it is none unless it is
+    much longer than what noise hides of a turn. Else it begins with the deepest sample, and steps tell its end.
     """
     noise = roughness(displacement)
     steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
-    still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
-    plain = turn, turn + int(np.argmin(still))
-    slowest = float(2 * displacement[turn] - displacement[0] - displacement[-1]) / len(displacement)  # if never still
-    lag = int(np.ceil(_STANDS_OUT * noise / slowest)) if slowest > 0 else 0
-    if not 0 < lag < len(displacement) // 4:
+    resting = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
+    plain = turn, turn + int(np.argmin(resting))
+    starts = [turn - _HELD_BLOCK, turn - _HELD_BLOCK // 2, turn]
+    starts = [start for start in starts if start >= 0 and start + _HELD_BLOCK <= len(displacement)]
+    if not noise > 0 or not starts:
         return plain
-    resting = np.abs(displacement[lag:] - displacement[:-lag]) <= 0.5 * lag * slowest
-    about = np.flatnonzero(resting[max(turn - lag, 0) : turn + 1]) + max(turn - lag, 0)
-    if not len(about):
-        return plain
-    moving = np.flatnonzero(~resting)
-    before, after = moving[moving < about[0]], moving[moving > about[0]]
-    # A window at the edge lies in the hold by half
-    begin = (int(before[-1]) + 1 if len(before) else 0) + lag // 2
-    end = (int(after[0]) - 1 if len(after) else len(resting) - 1) + lag - lag // 2
-    held = displacement[begin : end + 1]
-    if end - begin < max(_LONG * lag, _LEAST_HELD):
-        return plain
-    place = np.arange(len(held)) - (len(held) - 1) / 2
-    line = held.mean() + place * float(place @ held) / float(place @ place)
-    return (begin, end) if np.std(held - line) < _AS_NOISE * noise else plain
+    low = min(starts, key=lambda start: float(np.std(displacement[start : start + _HELD_BLOCK])))
+    high = low + _HELD_BLOCK
+    while True:
+        held = displacement[low:high]
+        least = _BESIDE_HOLD * noise * np.sqrt(1 / _HELD_BLOCK + 1 / len(held))
+        before, after = displacement[max(low - _HELD_BLOCK, 0) : low], displacement[high : high + _HELD_BLOCK]
+        earlier, later = (len(part) and abs(part.mean() - held.mean()) < least for part in (before, after))
+        if not (earlier or later):
+            break
+        low, high = low - len(before) * bool(earlier), high + len(after) * bool(later)
+    beyond = [displacement[max(low - 2 * _HELD_BLOCK, 0) : low], displacement[high : high + 2 * _HELD_BLOCK]]
+    falls = [(held.mean() - part.mean()) / len(part) for part in beyond if len(part) == 2 * _HELD_BLOCK]
+    speed = min(falls, default=0.0)  # of the sphere on its way, at least
+    still = bool(np.std(held) < _AS_NOISE * noise)
+    return (low, high - 1) if still and speed > 0 and len(held) * speed > _HIDDEN * noise else plain
 
 
 def roughness(force: Floats) -> float:

@@ -5,12 +5,14 @@ own damping, and rests once it has converged, while the others go on.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
-from underskin.diagnosis.inference.curve_starts import by_least_squares
+from underskin.diagnosis.inference.curve_starts import between_samples, by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, own_places
 from underskin.diagnosis.inference.objective import Evaluator
@@ -153,7 +155,18 @@ class Fitter(Evaluator):
         begun = by_least_squares(self, start)
         if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
             return begun
-        return self.settle(self.descend(begun, 1), _CURVE_SETTLING)
+        return self.settle(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
+
+    def _between_samples(self, at: Evaluated) -> Self:
+        """Of what sticks, with contact points held between the samples where they are at one point."""
+        (hypothesis,) = self.hypotheses
+        if not any(CATALOGUE[name].moves_contact_points for name in hypothesis.model.names):
+            return self
+        held = copy(self)
+        held.low, held.high = (
+            bound[None] for bound in between_samples(hypothesis, at.points.fit[0], self.low[0], self.high[0])
+        )
+        return held
 
     def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's.
@@ -271,7 +284,7 @@ class Fitter(Evaluator):
         free, every = self.free[owner], np.arange(fit.shape[1])
         diagonal = information[:, every, every]
         # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
-        least = (high - low) ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
+        least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
             matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
