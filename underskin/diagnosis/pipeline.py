@@ -27,7 +27,7 @@ from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
-from underskin.diagnosis.validation.imitation import imitation
+from underskin.diagnosis.validation.imitation import imitation, unseen
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.diagnosis.validation.power import power
 from underskin.diagnosis.validation.residual_noise import above_noise, keeps_structure, largest_floor_percent
@@ -157,10 +157,13 @@ def _work_out(
 def _beside_unlisted(
     begun: DiagnosisResult, problem: FittingProblem, result: Search, nothing: Explanation
 ) -> tuple[DiagnosisResult, Search]:
-    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them."""
+    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them; where
+    nothing is missing, with those that would not show."""
     leader = result.answers[0].explanation
-    if problem.kind != "indentation" or leader is None or not leader.names:
+    if problem.kind != "indentation" or leader is None:
         return begun, result
+    if not leader.names:
+        return begun, replace(result, imitating={(): unseen(leader, result.supported).odds})
     found = imitation(leader, nothing, result.supported)
     if found is None or found.odds < _WORTH_SAYING:
         return begun, result
