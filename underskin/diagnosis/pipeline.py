@@ -42,7 +42,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
-_FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
+_FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
@@ -123,7 +123,7 @@ def _work_out(
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
     after = cross_validation.total(groups)[1]
-    if problem.kind == "indentation" and after.recordings and after.rmse_percent > _FAR_ABOVE * after.floor_percent:
+    if problem.kind == "indentation" and after.recordings and after.is_missed(_FAR_ABOVE):
         contradicted |= {entry.names for entry in ranked[:1] if entry.names}
     if contradicted:
         result = replace(result, contradicted=frozenset(contradicted))
