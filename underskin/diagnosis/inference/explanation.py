@@ -216,7 +216,9 @@ def _fitted(
         fitter = Fitter([hypotheses[number] for number in members])
         points = _stacked([starts[number] for number in members])
         gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
-        hopeless = np.array([_HOPELESS if requests[number].names else np.inf for number in members])[points.owner]
+        least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
+        kept = [len(requests[number].names) <= least for number in members]
+        hopeless = np.where(kept, np.inf, _HOPELESS)[points.owner]
 
         def target(at: Evaluated, gains: Floats = gains, hopeless: Floats = hopeless, best: float = best) -> Floats:
             return np.minimum(gains, min(best, float(at.cost.min())) + hopeless)
