@@ -201,13 +201,12 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
 
 
 def _all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
-    """Of curves, on which few mechanisms act and two may hide each other: every pair, from the better of its two, and
-    from the other where the pair shows no more than that."""
+    """Of curves, on which few mechanisms act and two may hide each other: every pair, from the better of its two."""
     requests = []
     for one, other in itertools.combinations(names, 2):
         known = [explanations[key] for key in (frozenset([one]), frozenset([other])) if key in explanations]
-        parents: list[Explanation | None] = [*sorted(known, key=lambda entry: -entry.log_evidence)] or [None]
-        requests += [Request((one, other), parent) for parent in parents]
+        parent = max(known, key=lambda entry: entry.log_evidence, default=None)
+        requests.append(Request((one, other), parent))
     return requests
 
 
