@@ -76,6 +76,7 @@ class Request:
     names: tuple[str, ...]
     parent: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
+    larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
 
     @property
     def without_scatter(self) -> bool:
@@ -259,6 +260,9 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
         for number in members:
             parent, begin = requests[number].parent, requests[number].begin
             known = None if parent is None else {name: parent.own(name) for name in parent.names}
+            larger = requests[number].larger
+            if larger is not None:
+                known, begin = {name: larger.own(name) for name in requests[number].names}, larger.point
             beginnings.append(Beginning(known, parent.point if parent and begin is None else begin))
         starts |= dict(
             zip(members, best_starts(Fitter([hypotheses[number] for number in members]), beginnings), strict=True)

@@ -30,6 +30,7 @@ _SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no 
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _WITHIN = 8.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_STUCK = 1.0  # nats that a fit begun elsewhere must gain
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -193,6 +194,10 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             ]
         tried |= {frozenset(request.names) for request in requests}
         _explain(problem, explanations, requests)
+    if problem.lines.curves:
+        refitted = _from_larger(problem, explanations, unsupported)
+        explanations |= refitted
+        integrated = {names: entry for names, entry in integrated.items() if names not in refitted}
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
     result = Search(tuple(explanations.values()), (), unsupported, tried=len(tried))
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
@@ -208,6 +213,25 @@ def _all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request
         parent = max(known, key=lambda entry: entry.log_evidence, default=None)
         requests.append(Request((one, other), parent))
     return requests
+
+
+def _from_larger(problem: FittingProblem, explanations: Explanations, unsupported: dict[str, str]) -> Explanations:
+    """Of curves: the sets with one mechanism less than the best ones, or than those among them that fit better for it,
+    fitted from there: what was stuck elsewhere would ask for a companion."""
+    better: Explanations = {}
+    weight = Search(tuple(explanations.values()), (), unsupported).log_weight
+    least = max(map(weight, explanations.values())) - _WITHIN
+    waiting = [entry for entry in explanations.values() if weight(entry) > least]
+    while waiting:
+        larger = waiting.pop()
+        smaller = [tuple(one for one in larger.names if one != name) for name in larger.names if len(larger.names) > 1]
+        fitted = problem.explain([Request(names, larger=larger) for names in smaller])
+        for names, found in zip(smaller, fitted, strict=True):
+            before = (explanations | better).get(frozenset(names))
+            if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
+                better[frozenset(names)] = found
+                waiting.append(found)
+    return better
 
 
 def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:
