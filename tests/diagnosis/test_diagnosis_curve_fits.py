@@ -9,8 +9,9 @@ from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves
 from tests.support.pressed_curves import explained, pressed
+from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.curve_starts import between_samples
-from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.cross_validation import PredictionScore
@@ -64,6 +65,17 @@ def test_a_contact_point_of_what_sticks_stays_between_two_samples(stage: tuple[E
     others = np.arange(len(fit)) != place
     assert (low[others] == whole[0][others]).all()
     assert (high[others] == whole[1][others]).all()
+
+
+@pytest.mark.slow
+def test_a_set_fitted_from_a_larger_one_fits_as_well_as_from_nothing(table: SigmaTable) -> None:
+    campaign = pressed(3.0, (5.0,))
+    problem = FittingProblem(curve_lines(campaign, "indentation"), table)
+    both, _ = explained(campaign, ("contact_creep", "instrument_compliance"), table)
+    alone, _ = explained(campaign, ("instrument_compliance",), table)
+    (found,) = problem.explain([Request(("instrument_compliance",), larger=both)])
+    assert found is not None
+    assert found.best.cost == pytest.approx(alone.best.cost, abs=0.1)
 
 
 def held(noise: float, hold: int) -> Floats:
