@@ -19,6 +19,7 @@ from rig.errors import RigError
 from rig.layer import WAVENUMBERS, Floats, Layer, base_stress, hertz_shape
 
 _CONTACT_STRAIN = 0.2  # of a/R (Tabor)
+_LOCKS = 0.9  # of the limited law's c e, at which it would be infinite: as far as it goes
 _STIFFENING_STEPS = 40
 
 
@@ -154,6 +155,11 @@ def stiffening(values: Values, strain: Floats) -> Floats:
     grown = float(values["coefficient"]) * strain
     if values["law"] == "linear":
         return 1 + grown
-    if np.any(grown > 0.9):
+    if np.any(strain > locking(values)):
         raise RigError("effects.strain_stiffening.coefficient", values["coefficient"], "locks at this load: lower it")
     return 1 / (1 - grown)
+
+
+def locking(values: Values) -> float:
+    """The strain at which the limited law locks; infinite of the linear one."""
+    return _LOCKS / float(values["coefficient"]) if values["law"] == "limited" and values["coefficient"] else np.inf

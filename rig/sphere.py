@@ -19,7 +19,7 @@ from rig.contact import WIDEST, sphere_contact
 from rig.effects import Values
 from rig.errors import RigError
 from rig.layer import Floats, Layer
-from rig.layer_contacts import stiffening
+from rig.layer_contacts import locking, stiffening
 
 _NODES = 800
 _UNEVEN = 1.5  # power of the nodes: denser where the contact is small
@@ -77,7 +77,7 @@ def sphere_law(
     largest_mm : float
         Largest depth that is pressed.
     beyond_mm : float
-        Depth that the law is to reach besides, without any further stiffening.
+        Depth that the law is to reach besides, as far as it does not lock.
 
     Raises
     ------
@@ -101,10 +101,12 @@ def sphere_law(
     if "strain_stiffening" not in on:
         return law
     strain = 0.2 * law.radius / radius_mm
-    reached = float(np.interp(largest_mm, law.depth, strain))
-    stiffening(on["strain_stiffening"], np.array([reached]))  # raises where the law locks before the largest depth
-    stiffer = stiffening(on["strain_stiffening"], np.minimum(strain, 1.02 * reached))
-    return SphereLaw(law.radius, law.depth, law.punch, law.pull, stiffer)
+    values = on["strain_stiffening"]
+    stiffening(values, np.interp([largest_mm], law.depth, strain))  # raises where the law locks before
+    # What sticks is wider than that: a contact that grows up to where the law locks is refused on its way.
+    reached = strain <= locking(values)
+    radius, depth, punch, pull = (column[reached] for column in (law.radius, law.depth, law.punch, law.pull))
+    return SphereLaw(radius, depth, punch, pull, stiffening(values, strain[reached]))
 
 
 def _on_layer(layer: Layer, share: Floats, radius: float, thickness: float, widest: float) -> SphereLaw:

@@ -19,6 +19,7 @@ from rig.contact_course import Body, course
 from rig.curve_fit import Curve, Law, Priors, least_chi2
 from rig.effects import INDENTATION, Values
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
+from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.layer import Floats
 
@@ -137,12 +138,18 @@ class _Base:
         return self.bodies[radius]
 
     def _course(self, number: int, log_modulus: float, shift: float) -> Floats:
-        """Force of the known effects, calculated at some samples and at those beside a jump."""
+        """Force of the known effects, calculated at some samples and at those beside a jump.
+
+        Infinite beyond the rig's laws.
+        """
         displacement, curve = self._displacement(number, shift), self.recorded[number]
         radius = curve.entry["indenter_radius_mm"]
         body = replace(self._body(radius), modulus=self._modulus(log_modulus))
         jumps = np.flatnonzero(np.abs(np.diff(curve.exact_force_n)) > _JUMP * np.abs(curve.exact_force_n).max())
         even = np.linspace(0, len(displacement) - 1, min(_POINTS, len(displacement))).astype(int)
         at = np.unique(np.concatenate([even, jumps, jumps + 1]))
-        _, force = course(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
+        try:
+            _, force = course(body, curve.time_s[at], displacement[at], frame_compliance(self.on))
+        except RigError:  # a step of the fit that went far astray, which is then rejected
+            return np.full(len(displacement), np.inf)
         return np.interp(np.arange(len(displacement)), at, force)

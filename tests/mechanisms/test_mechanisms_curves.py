@@ -137,6 +137,20 @@ def test_a_held_indentation_relaxes_to_what_is_left() -> None:
     assert found[-8:] == pytest.approx(elastic * (1 - 0.4 * (1 - np.exp(-time[-8:] / 10.0))), rel=1e-4)
 
 
+def test_what_relaxes_and_stiffens_is_stiffer_by_the_contact_of_the_moment() -> None:
+    """On the way in and in a hold; on the way back the contact is that of Ting's law, smaller than in equilibrium."""
+    depth = np.concatenate([np.linspace(0.01, 0.5, 50), np.full(20, 0.5), np.linspace(0.49, 0.2, 30)])
+    time = np.arange(100.0)
+    creep = {"relaxed_fraction": 0.4, "relaxation_time": 10.0}
+    law = {"stiffening_coefficient": 8.0, "stiffening_form": 1.0, "stiffening_exponent": 2.0}
+    both = force_at(["contact_creep", "strain_stiffening"], depth, time, **creep, **law)
+    relaxed = force_at(["contact_creep"], depth, time, **creep)
+    stiffer = force_at(["strain_stiffening"], depth, time, **law) / hertz_force(depth, R_MM, E_MPA)
+    assert both[:70] == pytest.approx((stiffer * relaxed)[:70])
+    held = both[70:] > 0
+    assert (both[70:][held] < (stiffer * relaxed)[70:][held]).all()
+
+
 def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
     recorded = compression_campaign()
     ramp = CompressionRecording(

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from rig.contact_course import Body, course
+from rig.errors import RigError
 from rig.layer import Floats
 from rig.relaxation import Relaxation
 from rig.sphere import sphere_law
@@ -108,6 +109,33 @@ def test_the_cycle_dissipates_the_hysteresis() -> None:
     widest = float(np.interp(DEPTH, jkr(RADII, W)[0][RADII > 1e-3], RADII[RADII > 1e-3]))
     assert min(snap, tear) > 0
     assert work == pytest.approx((W_S - W) * np.pi * widest**2 + snap + tear, rel=5e-3)
+
+
+@pytest.mark.parametrize("law", ["linear", "limited"])
+def test_what_sticks_stiffens_as_far_as_its_contact_is_wide(law: str) -> None:
+    """Stiffening goes on beyond the strain that a contact without adhesion would reach at the largest depth."""
+    values = {"law": law, "coefficient": 4.0}
+    stiff = sphere_law({"strain_stiffening": values}, R, 1.0, DEPTH)
+    work = W
+    time, _, depth, force = there_and_back(Body(stiff, E, approach=work, separation=work), 0.0)
+    strain = 0.2 * RADII / R
+    ratio = 1 + 4 * strain if law == "linear" else 1 / (1 - 4 * strain)
+    kept = ratio > 0
+    a, modulus_there = RADII[kept], PLANE * ratio[kept]
+    depths = a**2 / R - np.sqrt(2 * np.pi * work * a / modulus_there)
+    forces = 4 * modulus_there * a**3 / (3 * R) - np.sqrt(8 * np.pi * work * modulus_there * a**3)
+    stable = np.arange(len(a)) >= np.argmin(depths)
+    growing = (time < 4) & (force != 0)
+    assert float(np.interp(DEPTH, depths[stable], a[stable])) > 1.05 * np.sqrt(R * DEPTH)
+    expected = np.interp(depth[growing], depths[stable], forces[stable])
+    assert force[growing] == pytest.approx(expected, abs=2e-3 * force.max())
+
+
+def test_a_contact_that_sticks_up_to_where_its_law_locks_is_refused() -> None:
+    coefficient = 0.88 / (0.2 * np.sqrt(DEPTH / R))
+    stiff = sphere_law({"strain_stiffening": {"law": "limited", "coefficient": coefficient}}, R, 1.0, DEPTH)
+    with pytest.raises(RigError, match="wider"):
+        there_and_back(Body(stiff, E, approach=W, separation=W), 0.0)
 
 
 def test_without_adhesion_the_contact_is_hertzian_and_with_little_nearly_so() -> None:

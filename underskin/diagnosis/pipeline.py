@@ -28,7 +28,7 @@ from underskin.diagnosis.selection.search import Search, search
 from underskin.diagnosis.selection.unnamed_search import law_of, with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
-from underskin.diagnosis.validation.imitation import imitation
+from underskin.diagnosis.validation.imitation import imitation, unseen
 from underskin.diagnosis.validation.platen_seating import without_seating
 from underskin.diagnosis.validation.power import power
 from underskin.diagnosis.validation.residual_noise import above_noise, keeps_structure, largest_floor_percent
@@ -44,7 +44,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
-_FAR_ABOVE = 3.0  # times the noise floor, beyond which an error of indentations held out contradicts an explanation
+_FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
 _LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
@@ -136,7 +136,7 @@ def _work_out(
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
     after = cross_validation.total(groups)[1]
-    if problem.kind == "indentation" and after.recordings and after.rmse_percent > _FAR_ABOVE * after.floor_percent:
+    if problem.kind == "indentation" and after.recordings and after.is_missed(_FAR_ABOVE):
         contradicted |= {entry.names for entry in ranked[:1] if entry.names}
     if contradicted:
         result = replace(result, contradicted=frozenset(contradicted))
@@ -192,10 +192,13 @@ def _held_out(
 def _beside_unlisted(
     begun: DiagnosisResult, problem: FittingProblem, result: Search, nothing: Explanation
 ) -> tuple[DiagnosisResult, Search]:
-    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them."""
+    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them; where
+    nothing is missing, with those that would not show."""
     leader = result.answers[0].explanation
-    if problem.kind != "indentation" or leader is None or not leader.names:
+    if problem.kind != "indentation" or leader is None:
         return begun, result
+    if not leader.names:
+        return begun, replace(result, imitating={(): unseen(leader, result.supported).odds})
     found = imitation(leader, nothing, result.supported)
     if found is None or found.odds < _WORTH_SAYING:
         return begun, result

@@ -18,6 +18,9 @@ _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
 _HELD = 0.2  # of the usual step between samples, below which a sphere is held
+_HELD_BLOCK = 8  # samples by which a hold is found
+_BESIDE_HOLD, _AS_NOISE = 4.0, 1.5  # standard deviations of a mean; times the noise about the mean of a hold
+_HIDDEN = 24.0  # times the noise: the way of a sphere that moved on for as long as a hold
 _FITTED, _LEAST_FITTED, _CLOSER = 200, 40, 3  # samples that tell a drift in the air; grids of contact points
 _LEAST_AIR, _SHORTER = 0.1, 0.9  # of the samples of a way; of those in the air, where these do not lie straight
 _PLAIN = 60.0  # F of a drift, beyond which it is plain
@@ -36,7 +39,8 @@ class Course:
 
     noise: float  # standard deviation of a sample of force
     turn: int  # the deepest sample
-    leave: int  # the last sample of the hold there
+    arrive: int  # the first sample of the hold there
+    leave: int  # the last one
     snap_in: int | None
     pull_off: int | None
     air: Indices
@@ -73,21 +77,66 @@ def _course(*columns: bytes) -> Course:
     in_air = least + _RISE * span
     down = np.flatnonzero((found < turn) & (step < -least) & (np.abs(before - begin) < in_air) & (found > few))
     up = np.flatnonzero((found > turn) & (step > least) & (np.abs(after - end) < in_air))
-    snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else None
+    snap_in = int(found[down[np.argmin(step[down])]]) if len(down) else _single_snap(force[: turn + 1], begin, noise)
     pull_off = int(found[up[np.argmax(step[up])]]) if len(up) else None
-    steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
-    still = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
-    leave = turn + int(np.argmin(still))
+    arrive, leave = _held(displacement, turn)
     drifting = None if snap_in is not None else _drifting_air(displacement, force, time, turn + 1, noise)
     if drifting is None and snap_in is None and pull_off is None:
         back = _drifting_after(displacement, force, time, leave, noise)
         if back is not None:
             air, drift = np.arange(len(force) - back[0], len(force)), back[1]
             zero = float(np.median(force[air] - drift * (time[air] - time[0])))
-            return Course(noise, turn, leave, None, None, air, zero, drift)
+            return Course(noise, turn, arrive, leave, None, None, air, zero, drift)
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
-    return Course(noise, turn, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+    return Course(noise, turn, arrive, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+
+
+def _single_snap(force: Floats, begin: float, noise: float) -> int | None:
+    """The sample on the way in with which the force falls, where it rises again at once, so that no means show it: one
+    of the last that lie no higher than the air, `begin`."""
+    low = np.flatnonzero(force <= begin + _BEYOND_JUMP * noise)
+    if not len(low) or not noise > 0:
+        return None
+    first = max(int(low[-1]) - _AIR, _AIR)
+    fallen = [
+        place
+        for place in range(first, int(low[-1]) + 1)
+        if force[place] < np.median(force[place - _AIR : place]) - _BEYOND_JUMP * noise
+        and force[place] < force[place - 1] - _BEYOND_JUMP * noise
+    ]
+    return fallen[0] if fallen else None
+
+
+def _held(displacement: Floats, turn: int) -> tuple[int, int]:
+    """The first and the last sample of the hold around the deepest one.
+
+    Where the displacement is noisy, a hold grows by blocks as long as their means are its own; it is none unless it is
+    much longer than what noise hides of a turn. Else it begins with the deepest sample, and steps tell its end.
+    """
+    noise = roughness(displacement)
+    steps = np.abs(np.diff(displacement[turn:], append=-np.inf))
+    resting = steps <= _HELD * float(np.median(np.abs(np.diff(displacement)))) + 1e-300
+    plain = turn, turn + int(np.argmin(resting))
+    starts = [turn - _HELD_BLOCK, turn - _HELD_BLOCK // 2, turn]
+    starts = [start for start in starts if start >= 0 and start + _HELD_BLOCK <= len(displacement)]
+    if not noise > 0 or not starts:
+        return plain
+    low = min(starts, key=lambda start: float(np.std(displacement[start : start + _HELD_BLOCK])))
+    high = low + _HELD_BLOCK
+    while True:
+        held = displacement[low:high]
+        least = _BESIDE_HOLD * noise * np.sqrt(1 / _HELD_BLOCK + 1 / len(held))
+        before, after = displacement[max(low - _HELD_BLOCK, 0) : low], displacement[high : high + _HELD_BLOCK]
+        earlier, later = (len(part) and abs(part.mean() - held.mean()) < least for part in (before, after))
+        if not (earlier or later):
+            break
+        low, high = low - len(before) * bool(earlier), high + len(after) * bool(later)
+    beyond = [displacement[max(low - 2 * _HELD_BLOCK, 0) : low], displacement[high : high + 2 * _HELD_BLOCK]]
+    falls = [(held.mean() - part.mean()) / len(part) for part in beyond if len(part) == 2 * _HELD_BLOCK]
+    speed = min(falls, default=0.0)  # of the sphere on its way, at least
+    still = bool(np.std(held) < _AS_NOISE * noise)
+    return (low, high - 1) if still and speed > 0 and len(held) * speed > _HIDDEN * noise else plain
 
 
 def roughness(force: Floats) -> float:

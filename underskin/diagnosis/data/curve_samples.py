@@ -48,7 +48,10 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         seen = course(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
-        thinned, deviation, way, counts = _thinned(_with_corner(columns, seen.turn), seen)
+        unsteady = roughness(columns[0])
+        thinned, deviation, way, counts = _thinned(
+            _with_corner(_with_still_hold(columns, seen), seen.turn), seen, unsteady
+        )
         displacement, force = thinned[:2]
         if kind == "compression":
             largest = float(np.abs(force).max())
@@ -83,6 +86,19 @@ def finite_samples(entry: CurveRecording) -> list[Floats]:
     return [column[finite] for column in columns]
 
 
+def _with_still_hold(columns: Sequence[Floats], seen: Course) -> list[Floats]:
+    """With the displacement of a hold that is noisy on a straight line.
+
+    Noise of the displacement moves no contact; a law would answer to it, the more the steeper it is.
+    """
+    whole = [column.copy() for column in columns]
+    if seen.arrive < seen.turn:
+        held = whole[0][seen.arrive : seen.leave + 1]
+        place = np.arange(len(held)) - (len(held) - 1) / 2
+        held[:] = held.mean() + place * float(place @ held) / float(place @ place)
+    return whole
+
+
 def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     """With the deepest sample where the way in and the way back meet, which was between two samples.
 
@@ -109,15 +125,15 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     return whole
 
 
-def _thinned(columns: Sequence[Floats], seen: Course) -> tuple[list[Floats], Floats, Floats, Floats]:
+def _thinned(columns: Sequence[Floats], seen: Course, unsteady: float) -> tuple[list[Floats], Floats, Floats, Floats]:
     """The means of the columns over blocks, the deviation of the force's, how far along the curve each lies, and the
-    samples in each."""
+    samples in each; `unsteady` is the noise of the displacement."""
     displacement, force = columns[:2]
     way = way_along(displacement, force, seen.noise)
     even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
-    straight = ((force, seen.noise), (displacement, max(roughness(displacement), unseen)))
+    straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
     starts = _split(np.union1d(even, _around(seen, len(force))), straight)
     counts = np.diff(np.append(starts, len(way)))
     *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
@@ -127,7 +143,8 @@ def _thinned(columns: Sequence[Floats], seen: Course) -> tuple[list[Floats], Flo
         thinned[number] = thinned[number] - sag
         unsure = doubt if number == 1 else unsure
     slope = np.gradient(thinned[1], place) / (np.gradient(thinned[0], place) + 1e-300) if len(starts) > 2 else 0.0
-    steep = np.where(np.isfinite(slope), slope, 0.0) * roughness(displacement)
+    held = (starts >= seen.arrive) & (starts <= seen.leave) & (seen.arrive < seen.turn)
+    steep = np.where(np.isfinite(slope) & ~held, slope, 0.0) * unsteady
     steep = np.clip(np.abs(steep), 0.0, 3 * seen.noise + 1e-2 * float(np.ptp(force)))
     least = _LEAST_NOISE * float(np.ptp(force))
     deviation = np.sqrt((seen.noise**2 + steep**2) / counts + least**2 + unsure**2)

@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from underskin.diagnosis.inference.hypothesis import Hypothesis
 from underskin.diagnosis.inference.least_squares import LeastSquares
 from underskin.diagnosis.inference.objective import Evaluator
 from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.conditions import curves_of
+from underskin.units import Floats
 
 _SETTLING = 20
+_OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
 _SOFTER = (1.0, 0.25, 0.06)
 _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
 _SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
@@ -55,6 +58,24 @@ def with_contact_points(fitter: Evaluator, at: Evaluated) -> Evaluated:
     chosen = at.points.fit.copy()
     chosen[:, places] = np.clip(deepest - depth, fitter.low[0, places], fitter.high[0, places])
     return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
+
+
+def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
+
+    Of what sticks: there the force jumps as a contact point passes a sample, and no slope says so.
+    """
+    assert isinstance(hypothesis.model, CurveModel)
+    low, high = low.copy(), high.copy()
+    curves = curves_of(hypothesis.lines.campaign)
+    for place, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
+        travel = curve.displacement_mm[: int(curve.displacement_mm.argmax()) + 1]
+        before, after = travel[travel < fit[place]], travel[travel >= fit[place]]
+        if len(before) and len(after):
+            first, last = float(before.max()), float(after.min())
+            low[place] = max(low[place], first + _OFF_SAMPLE * (last - first))
+            high[place] = min(high[place], last)
+    return np.minimum(low, fit), np.maximum(high, fit)
 
 
 def by_least_squares(fitter: Evaluator, start: Points) -> Evaluated:

@@ -75,6 +75,7 @@ class Request:
     names: tuple[str, ...]
     parent: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
+    larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
 
     @property
     def without_scatter(self) -> bool:
@@ -219,7 +220,9 @@ def _fitted(
         fitter = Fitter([hypotheses[number] for number in members])
         points = _stacked([starts[number] for number in members])
         gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
-        hopeless = np.array([_HOPELESS if requests[number].names else np.inf for number in members])[points.owner]
+        least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
+        kept = [len(requests[number].names) <= least for number in members]
+        hopeless = np.where(kept, np.inf, _HOPELESS)[points.owner]
 
         def target(at: Evaluated, gains: Floats = gains, hopeless: Floats = hopeless, best: float = best) -> Floats:
             return np.minimum(gains, min(best, float(at.cost.min())) + hopeless)
@@ -260,6 +263,9 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
         for number in members:
             parent, begin = requests[number].parent, requests[number].begin
             known = None if parent is None else {name: parent.own(name) for name in parent.names}
+            larger = requests[number].larger
+            if larger is not None:
+                known, begin = {name: larger.own(name) for name in requests[number].names}, larger.point
             beginnings.append(Beginning(known, parent.point if parent and begin is None else begin))
         starts |= dict(
             zip(members, best_starts(Fitter([hypotheses[number] for number in members]), beginnings), strict=True)

@@ -54,6 +54,7 @@ class Evaluator:
             self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
             self._precision[number, places], self._centre[number, places], height = hypothesis.priors[:, places]
             self._log_prior_height[number] = height.sum()
+        self._range = self.high - self.low
         # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
         self.own = np.array(
             [

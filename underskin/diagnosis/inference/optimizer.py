@@ -5,12 +5,14 @@ own damping, and rests once it has converged, while the others go on.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
-from underskin.diagnosis.inference.curve_starts import by_least_squares
+from underskin.diagnosis.inference.curve_starts import between_samples, by_least_squares
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, own_places
 from underskin.diagnosis.inference.objective import Evaluator
@@ -27,6 +29,7 @@ _SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's 
 _LARGEST_STEP = 1.0
 _CONVERGED = 0.01  # in log posterior
 _MOST_ITERATIONS = 25
+_LEAST_CURVATURE = 1e-10
 _MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 
@@ -151,7 +154,18 @@ class Fitter(Evaluator):
         begun = by_least_squares(self, start)
         if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
             return begun
-        return self.settle(self.descend(begun, 1), _CURVE_SETTLING)
+        return self.settle(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
+
+    def _between_samples(self, at: Evaluated) -> Self:
+        """Of what sticks, with contact points held between the samples where they are at one point."""
+        (hypothesis,) = self.hypotheses
+        if not any(CATALOGUE[name].moves_contact_points for name in hypothesis.model.names):
+            return self
+        held = copy(self)
+        held.low, held.high = (
+            bound[None] for bound in between_samples(hypothesis, at.points.fit[0], self.low[0], self.high[0])
+        )
+        return held
 
     def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
         """Steps of the mean parameters, each followed by so many of the covariance's.
@@ -268,9 +282,11 @@ class Fitter(Evaluator):
         low, high = self.low[owner], self.high[owner]
         free, every = self.free[owner], np.arange(fit.shape[1])
         diagonal = information[:, every, every]
+        # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
+        least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
         for _ in every:
             matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
-            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + 1e-10, 1.0)
+            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
             step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
             scale = np.abs(step) / np.maximum(_LARGEST_STEP, 0.3 * (high - low))
             step /= np.maximum(1.0, scale.max(axis=1))[:, None]

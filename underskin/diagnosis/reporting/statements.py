@@ -165,6 +165,8 @@ def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...
         return "the recordings hardly tell it from the leading explanation"
     if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
         return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
+    if answer.explanation is None and () in imitating:
+        return "few laws without a name would not show in these recordings"
     if answer.explanation is None and imitating:
         return "few laws without a name would look like the leading explanation in these recordings"
     if answer.names in imitating:

@@ -28,8 +28,11 @@ _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
+_IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_LEADING = 8.0  # nats behind the best within which sets of curves are fitted again with one mechanism less
+_STUCK = 1.0  # nats that a fit begun elsewhere must gain
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -56,8 +59,8 @@ class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
     `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_noise.py);
-    their probability is that of `none_of_these`. `imitating`: the odds of an unlisted law that looks like a set on
-    these recordings; `none_of_these` has them beside the leading set.
+    their probability, or of curves most of it, is that of `none_of_these`. `imitating`: the odds of an unlisted law
+    that looks like a set on these recordings, or does not show; `none_of_these` has them beside the leading set.
     """
 
     explanations: tuple[Explanation, ...]
@@ -163,12 +166,21 @@ class Search:
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
-        out = np.array([entry.names in self.contradicted for entry in kept] + [False])
-        probabilities[-1] += probabilities[out].sum()
-        probabilities = self._beside_unlisted(kept, np.where(out, 0.0, probabilities))
+        left = [self._left_to(entry) for entry in kept]
+        probabilities[-1] += ((1 - np.array(left)) * probabilities[:-1]).sum()
+        probabilities = self._beside_unlisted(kept, probabilities * [*left, 1.0])
         rivals: list[Explanation | None] = [*kept, None]
-        answers = [Answer(rivals[number], float(probabilities[number])) for number in np.flatnonzero(~out)]
+        answers = [
+            Answer(rivals[number], float(probabilities[number])) for number, share in enumerate([*left, 1.0]) if share
+        ]
         return sorted(answers, key=lambda answer: -answer.probability)
+
+    def _left_to(self, explanation: Explanation) -> float:
+        """The share that stays of a probability: all, unless the residual contradicts the explanation; of curves a
+        little even then, since laws of contact idealise and fits may miss."""
+        if explanation.names not in self.contradicted:
+            return 1.0
+        return _IDEALISED if explanation.names and explanation.best.hypothesis.lines.curves else 0.0
 
     def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
         """With the unlisted laws that the leading set imitates among `none_of_these`, the last."""
@@ -233,6 +245,10 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             ]
         tried |= {frozenset(request.names) for request in requests}
         _explain(problem, explanations, requests)
+    if problem.lines.curves:
+        refitted = _from_larger(problem, explanations, unsupported)
+        explanations |= refitted
+        integrated = {names: entry for names, entry in integrated.items() if names not in refitted}
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
     result = Search(tuple(explanations.values()), (), unsupported, tried=len(tried))
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
@@ -248,6 +264,25 @@ def _all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request
         parent = max(known, key=lambda entry: entry.log_evidence, default=None)
         requests.append(Request((one, other), parent))
     return requests
+
+
+def _from_larger(problem: FittingProblem, explanations: Explanations, unsupported: dict[str, str]) -> Explanations:
+    """Of curves: the sets with one mechanism less than the best ones, or than those among them that fit better for it,
+    fitted from there: what was stuck elsewhere would ask for a companion."""
+    better: Explanations = {}
+    weight = Search(tuple(explanations.values()), (), unsupported).log_weight
+    least = max(map(weight, explanations.values())) - _LEADING
+    waiting = [entry for entry in explanations.values() if weight(entry) > least]
+    while waiting:
+        larger = waiting.pop()
+        smaller = [tuple(one for one in larger.names if one != name) for name in larger.names if len(larger.names) > 1]
+        fitted = problem.explain([Request(names, larger=larger) for names in smaller])
+        for names, found in zip(smaller, fitted, strict=True):
+            before = (explanations | better).get(frozenset(names))
+            if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
+                better[frozenset(names)] = found
+                waiting.append(found)
+    return better
 
 
 def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:

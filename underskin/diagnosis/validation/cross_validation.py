@@ -39,6 +39,7 @@ class PredictionScore:
     log_score: float = 0.0  # Σ log predictive density of the recordings' levels, relative
     recordings: int = 0
     pickup: float = 0.0  # that part of `noise` which is mains pick-up
+    unsure: float = 0.0  # of curves: Σ of the variance that the parameters leave, which the rest of a curve told
 
     def __add__(self, other: "PredictionScore") -> "PredictionScore":
         return PredictionScore(*(one + more for one, more in zip(astuple(self), astuple(other), strict=True)))
@@ -47,6 +48,10 @@ class PredictionScore:
     def rmse_percent(self) -> float:
         """100 √(Σ|y − m|²/Σ|m|²)."""
         return 100 * float(np.sqrt(self.square / self.size)) if self.size > 0 else float("nan")
+
+    def is_missed(self, times: float) -> bool:
+        """Whether rows are missed by more than so many times what noise and the parameters' uncertainty give."""
+        return self.square > times**2 * (self.noise + self.unsure)
 
     @property
     def floor_percent(self) -> float:
@@ -163,7 +168,9 @@ def _predict(smaller: FittingProblem, explanation: Explanation, problem: Fitting
     point, levels = explanation.point, explanation.best.levels
     whole = model.predict(point.fit, slopes=False) if isinstance(model, FrfModel) else model.predict(point.fit)
     if left.curves:
-        return _predict_curves(problem.lines, levels, whole.value.real, rows, smaller)
+        slopes = whole.slopes[explanation.best.hypothesis.mean_places][:, rows]
+        unsure = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
+        return replace(_predict_curves(problem.lines, levels, whole.value.real, rows, smaller), unsure=unsure)
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     fitted_gains = explanation.best.sensor_gains

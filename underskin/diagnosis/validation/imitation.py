@@ -7,6 +7,10 @@ it: its parameters leave too little to be named, and without any one of its mech
 first order in the parameters). The prior of unlisted physics times the share of such laws that are imitated is the
 weight of those beside the set's own prior. It is never more than that of one listed mechanism that does the same, but
 it may be more than that of two or three that do so together.
+
+Where nothing is missing as far as one can see, an unlisted law of a usual strength may still be there and not show,
+since the nuisances take it up: the prior of unlisted physics times the share of such laws stands beside that of
+nothing.
 """
 
 import itertools
@@ -18,7 +22,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.curve_products import CurveProducts
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import Hypothesis, own_places
 from underskin.diagnosis.inference.likelihood import Likelihoods
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import PRIORS, least_evidence, log_prior
@@ -36,6 +40,7 @@ _FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 
     "step": lambda x: (x > 0.5).astype(float),
 }
 _FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
+_USUAL = 0.05  # of the force, as a root mean square: what a law changes that is taken for missing physics
 _TAKEN_UP = 1e-6  # of a law's own χ²: what is left beside the nuisances is rounding
 
 
@@ -58,19 +63,14 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     supported
         How many mechanisms the campaign supports, among which the prior is shared.
     """
-    hypothesis = explanation.best.hypothesis
-    model, fit = hypothesis.model, explanation.point.fit
-    assert isinstance(model, CurveModel)
-    force, slopes = (values[0] for values in model.forces_and_slopes(fit[None]))
-    stiffness = -slopes[model.contact_points].sum(axis=0)
-    recordings = [one for one in hypothesis.lines.campaign.recordings if isinstance(one, CurveConditions)]
-    unlisted = _unlisted(recordings, fit[model.contact_points], force, stiffness)
+    hypothesis, fit = explanation.best.hypothesis, explanation.point.fit
+    force, slopes, unlisted = _beside(explanation)
     null_model = null.best.hypothesis.model
     assert isinstance(null_model, CurveModel)
     change = force - null_model.forces(null.point.fit[None])[0]
     information = _information(explanation, np.concatenate([slopes, unlisted, change[None]]))
     every = np.arange(len(fit))
-    precision = hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2
+    precision = _precision(hypothesis)
     shown = _left(information, every[hypothesis.own_parameters :], precision)
     laws = shown[:-1] > _TAKEN_UP * np.diag(information)[len(fit) : -1]
     if not (laws.any() and shown[-1] > 0):
@@ -80,10 +80,44 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     imitated = strength * _left(information, every, precision)[:-1][laws] < least
     for own in own_places(explanation.names, hypothesis.lines).values():
         imitated &= strength * _left(information, np.delete(every, own), precision)[:-1][laws] > least
-    share = (imitated.sum() + 0.5) / (laws.sum() + 1)  # of all such laws, by Jeffreys' prior: these are but a sample
     size = len(explanation.names)
-    odds = float(PRIORS[NONE_OF_THESE] * share / np.exp(log_prior(size, supported)))
+    odds = _odds(int(imitated.sum()), int(laws.sum()), size, supported)
     return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0) if size == 1 else odds)
+
+
+def unseen(null: Explanation, supported: int) -> Imitation:
+    """How many unlisted laws of a usual strength would not show beside the null hypothesis of curves."""
+    hypothesis = null.best.hypothesis
+    force, slopes, unlisted = _beside(null)
+    size = np.sqrt((unlisted**2).mean(axis=1))
+    laws = unlisted[size > 0] * (_USUAL * np.sqrt((force**2).mean()) / size[size > 0])[:, None]
+    left = _left(_information(null, np.concatenate([slopes, laws])), np.arange(len(slopes)), _precision(hypothesis))
+    hidden = int((left < least_chi2(supported, least_evidence(null))).sum())
+    return Imitation(len(laws), hidden, _odds(hidden, len(laws), 0, supported))
+
+
+def _odds(counted: int, laws: int, size: int, supported: int) -> float:
+    """Of an unlisted law beside a set of so many mechanisms; the share is of all such laws, by Jeffreys' prior: these
+    are but a sample."""
+    share = (counted + 0.5) / (laws + 1)
+    return float(PRIORS[NONE_OF_THESE] * share / np.exp(log_prior(size, supported)))
+
+
+def _beside(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
+    """The force (samples,), its derivatives by the parameters (parameters, samples), and what each unlisted law changes
+    in it (laws, samples)."""
+    model, fit = explanation.best.hypothesis.model, explanation.point.fit
+    assert isinstance(model, CurveModel)
+    force, slopes = (values[0] for values in model.forces_and_slopes(fit[None]))
+    stiffness = -slopes[model.contact_points].sum(axis=0)
+    campaign = explanation.best.hypothesis.lines.campaign
+    recordings = [one for one in campaign.recordings if isinstance(one, CurveConditions)]
+    return force, slopes, _unlisted(recordings, fit[model.contact_points], force, stiffness)
+
+
+def _precision(hypothesis: Hypothesis) -> Floats:
+    """Of the parameters' priors (parameters,)."""
+    return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
 
 def _unlisted(

@@ -53,7 +53,8 @@ class ContactCreep(Mechanism):
     instantaneous modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force,
     e = E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} e(t−s)
     dδ(s) = 0 (Ting's theory, exact for one growing and one shrinking of the contact, with holds between). With adhesion
-    the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous modulus. A stage gives by the
+    the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous modulus. Where the modulus
+    stiffens too, all of the force is multiplied by its ratio at the contact radius of the moment. A stage gives by the
     relaxed force. A sphere that presses again after it was drawn back meets a surface that has not recovered: refused.
     A cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
     source = """Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson,

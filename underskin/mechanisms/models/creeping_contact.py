@@ -9,10 +9,11 @@ go:
 
 (Ting, J. Appl. Mech. 33 (1966) 845: without adhesion the stretches ℓ, ℓ_s are 0, and so is H(t1,t)). K is the stiffness
 of the contact as large as at t1, ℓ its adhesive stretch when it was reached and ℓ_s that at which it lets go; an edge
-that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). Where all rings but those
-of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth [(1−g) δ + Σ g Y]/e with the
-work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ (relaxation). δ and u run
-straight between samples.
+that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). What stiffens has E times
+its secant ratio at the present contact: u, K and F above are those at rest, and F is multiplied by it. Where all
+rings but those of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth
+[(1−g) δ + Σ g Y]/e with the work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ
+(relaxation). δ and u run straight between samples.
 
 Exact for half space and layer through one growing and one shrinking of the contact, with holds in between. Of small
 returns on the way (noise) the rings are taken to have stuck throughout; larger ones are refused by contact_creep.
@@ -74,7 +75,7 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     least, lowest = sphere.pull_off(work)
     held = started & (depth > lowest) if adhesion is not None else started & (depth > 0)
     a = sphere.radius_at(depth, work, np.maximum(least, 1e-12))
-    force, stiffness, slack, parting = _elastic(sphere, a, adhesion)
+    force, stiffness, slack, parting, stiffer = _elastic(sphere, a, adhesion)
     force = np.where(held, force, 0.0)
     depth_memory, force_memory = memories(depth, time, relaxation), memories(force, time, relaxation)
     growing = relaxation.convolved(force, force_memory)
@@ -82,14 +83,15 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     record = np.maximum(record, begins)
     back = started & (record < number)
     if not back.any():
-        return np.where(held, growing, 0.0), held
+        return np.where(held, stiffer * growing, 0.0), held
     edge, carried, kept = (np.zeros(depth.shape) for _ in range(3))
     stuck = np.zeros(depth.shape, dtype=bool)
     reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
     edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
-    ring, stiffness, _, _ = _elastic(sphere, sphere.radius_at(edge, work, np.maximum(least, 1e-12)), adhesion)
-    receding = relaxation.unrelaxed * ring + kept + stiffness * carried
-    answer, held = np.where(back, receding, growing), np.where(back, stuck, held)
+    a = sphere.radius_at(edge, work, np.maximum(least, 1e-12))
+    ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept + stiffness * carried)
+    answer, held = np.where(back, receding, stiffer * growing), np.where(back, stuck, held)
     touch = back & ~held
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)
@@ -127,14 +129,16 @@ def relaxing_on_stage(
     return np.where(held, force, 0.0), held
 
 
-def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats]:
-    """F, K, ℓ and ℓ_s of the elastic contact that grows."""
+def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """F and K of the elastic contact that grows, at its modulus at rest; ℓ and ℓ_s; and how much stiffer it is."""
     force, _, stiffness, _ = sphere.at(a)
+    stiffer = sphere.stiffer(a)
+    force, stiffness = force / stiffer, stiffness / stiffer
     if adhesion is None:
         none = np.zeros_like(force)
-        return force, stiffness, none, none
+        return force, stiffness, none, none, stiffer
     stretch = sphere.stretch(a, adhesion.work)
-    return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation)
+    return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation), stiffer
 
 
 def _first_touch(

@@ -15,7 +15,7 @@ Arrays are (points, curves, samples), with 1 where nothing differs: points of th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
@@ -115,6 +115,12 @@ class Sphere:
     def stretch(self, a: Floats, work: Floats) -> Floats:
         """ℓ of an edge with the energy release rate `work` [J/m²]."""
         return np.asarray(self.at(a)[3] * np.sqrt(work))
+
+    def stiffer(self, a: Floats) -> Floats:
+        """E' at the strain of a contact over that at rest."""
+        if self.stiffening is None:
+            return np.ones_like(a)
+        return np.asarray(self.at(a)[2] / replace(self, stiffening=None).at(a)[2])
 
     def travel(self, a: Floats, work: Floats) -> Floats:
         """δ + F/k in equilibrium."""
