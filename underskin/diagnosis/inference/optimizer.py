@@ -159,7 +159,7 @@ class Fitter(Evaluator):
     def _between_samples(self, at: Evaluated) -> Self:
         """Of what sticks, with contact points held between the samples where they are at one point."""
         (hypothesis,) = self.hypotheses
-        if not any(CATALOGUE[name].moves_contact_points for name in hypothesis.model.names):
+        if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
             return self
         held = copy(self)
         held.low, held.high = (
