@@ -20,7 +20,7 @@ from service.jobs.worker import Job
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import json_file
 
-_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
+_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
 

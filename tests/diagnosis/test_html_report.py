@@ -77,3 +77,25 @@ def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:
     assert "preload [N]" in re.findall(r'<th scope="col">(.*?)</th>', shown)
     assert "<td>1, 2.5</td>" in shown
     assert "about 15 minutes" in texts(shown)
+
+
+def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_range() -> None:
+    parameter = {"name": "change", "unit": "-", "value": -0.08, "low": -0.1, "high": -0.06}
+    law = {
+        "acts_on": "gain",
+        "axis": "time_of_day",
+        "form": "periodic",
+        "expression": f"Q = Q0 {HOSTILE}",
+        "parameters": [parameter],
+        "probability": 0.93,
+        "rivals": [{"acts_on": "modulus", "axis": "temperature_c", "form": "linear", "probability": 0.04}],
+        "heldout_rmse_percent": {"before": 9.4, "after": 2.1},
+        "range": {"time_of_day_h": [8.0, 17.5], "operator": ["jd", "mb"], "preload_n_over_own": [0.5, 2.0]},
+    }
+    html = body_of({**EMPTY, "verdict": "unexplained", "unnamed": law}, {})
+    shown = texts(html)
+    assert "<script>alert" not in html
+    assert "acts on the gain of the charge and follows the time of day; its form is periodic" in shown
+    assert "change -0.08 -0.1 to -0.06" in shown
+    assert "modulus temperature_c linear 4 %" in shown
+    assert "the time of day 8 to 17.5 h; operator: jd, mb; the preload 0.5 to 2 N, over its own range." in shown

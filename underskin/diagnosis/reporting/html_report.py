@@ -32,7 +32,8 @@ plot.before(label);
 
 _FILTERS = (
     *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
-    *(wording.readable, wording.unit, wording.words, caveats, first_and_rest, in_percent, lacking_part),
+    *(wording.readable, wording.unit, wording.words, wording.acted_on, wording.followed, wording.law_range),
+    *(caveats, first_and_rest, in_percent, lacking_part),
 )
 
 Report = Mapping[str, Any]

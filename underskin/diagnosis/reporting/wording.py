@@ -9,6 +9,10 @@ from typing import Any
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.reporting.figures import AXES
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON
+from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
+
+_UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
 
 
 def readable(text: str) -> str:
@@ -35,6 +39,27 @@ def words(name: str) -> str:
 def axis(name: str) -> str:
     """An axis with its unit."""
     return AXES.get(name, words(name))
+
+
+def acted_on(name: str) -> str:
+    """What a law that nobody listed acts on."""
+    return next((spoken for key, (spoken, _) in ACTS_ON.items() if key == name), words(name))
+
+
+def followed(name: str) -> str:
+    """The axis that such a law follows; a column of a lab's own by its heading."""
+    return FOLLOWED.get(name, (name, ""))[0]
+
+
+def law_range(name: str, ends: Sequence[Any]) -> str:
+    """Where such a law was measured: "the preload 0.2 to 3 N", or the words that a column has."""
+    field = name.removesuffix("_over_own")
+    unit = _UNITS.get(field.rpartition("_")[2], "")
+    spoken = followed(field if field in FOLLOWED else field.removesuffix("_h"))
+    if all(isinstance(end, str) for end in ends):
+        return f"{spoken}: {', '.join(ends)}"
+    of_own = ", over its own range" if field != name else ""
+    return f"{spoken} {' to '.join(map(number, ends))} {unit}".rstrip() + of_own
 
 
 def group(name: str) -> str:
