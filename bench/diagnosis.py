@@ -4,10 +4,12 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 from statistics import median
 from typing import Any
 
-from bench.diagnosed import Effects
+from bench.diagnosed import Effects, document
 from bench.figures import Figure
 
 _TWO: Effects = {"amplifier_high_pass": {"corner_hz": 1.0}, "preload_dependent_d33": {"beta_per_mpa": 1.5}}
@@ -23,25 +25,28 @@ _MEMORY = 400.0  # MB
 _SMALL: dict[str, Any] = {"columns": 5, "preloads_n": PRELOADS_N, "lines": 60}
 _LARGE: dict[str, Any] = {"columns": 41, "preloads_n": (0.3, 0.6, 1, 1.4, 1.8, 2.2, 2.6, 3), "lines": 400}
 _ONE = """
-import json, resource, sys, time
-from bench.diagnosed import recorded
+import resource, sys, time
+from pathlib import Path
+from underskin.compiled import load_all
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.recordings import read_file
 from underskin.surrogate.sigma_table import load_table
 
-effects, design = json.loads(sys.argv[1])
-hidden = recorded(effects, **design)
+load_all()
+table = load_table()
+campaign = read_file(Path(sys.argv[1]), "campaign.json").campaign
 start = time.process_time()
-verdict = diagnosis_report(hidden, load_table())["verdict"]
+verdict = diagnosis_report(campaign, table)["verdict"]
 print(time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3, verdict)
 """
 
 
 def measure() -> list[Figure]:
-    """Seconds of processor time and peak memory of a process that diagnoses once, for each campaign."""
+    """Seconds of processor time of a diagnosis and peak memory of its process, which has read the campaign's file."""
     figures, memory = [], 0.0
     for name, (effects, position_mm) in CASES.items():
         seconds, peak = _diagnosed(effects, {**_SMALL, "position_mm": position_mm})
-        figures.append(Figure(f"100 recordings × 60 lines, {name}", seconds, "s", 5.0, "lower"))
+        figures.append(Figure(f"100 recordings × 60 lines, {name}", seconds, "s", 1.0, "lower"))
         memory = max(memory, peak)
     figures.append(Figure("Peak memory of the process", memory, "MB", _MEMORY, "lower"))
     effects, _ = CASES["one mechanism"]
@@ -55,13 +60,16 @@ def measure() -> list[Figure]:
 
 def _diagnosed(effects: Effects, design: dict[str, Any]) -> tuple[float, float]:
     """Median seconds and the largest peak memory [MB] over the rounds."""
-    seconds, memory = zip(*(_once(effects, design) for _ in range(ROUNDS)), strict=True)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "campaign.json"
+        file.write_text(json.dumps(document(effects, **design)))
+        seconds, memory = zip(*(_once(file) for _ in range(ROUNDS)), strict=True)
     return median(seconds), max(memory)
 
 
-def _once(effects: Effects, design: dict[str, Any]) -> tuple[float, float]:
+def _once(file: Path) -> tuple[float, float]:
     run = subprocess.run(
-        [sys.executable, "-c", _ONE, json.dumps([effects, design])],
+        [sys.executable, "-c", _ONE, str(file)],
         env={**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         check=True,
         capture_output=True,

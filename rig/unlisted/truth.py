@@ -1,0 +1,212 @@
+"""The truth about a campaign: the law, what its design cannot tell from the law, and what modelling it is worth.
+
+All fits are by one who owns the equations and the noise levels (`fits.py`). Rivals are those that leave less than
+`INDISTINCT` more chi2 than the law's own form at its best:
+
+- form_also: another form, acting on the same quantity along the same axis;
+- axis_also: another axis, acting on the same quantity, with any form;
+- acts_on_also: another quantity, along the same axis or one of axis_also, with any form. Modulus, force and contact
+  radius are always rivals of one another: E/s^3, F s^3 and a s are the same contact.
+
+A free form fits whatever a narrower one does; it counts as a rival of free laws only. Positions may move along x or y.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .bench import Companion, Measurement, State, base_state, companion_column, log_amplitude, responses, state
+from .design import Design, axes
+from .fits import Lines, base_chi2, fit_shapes, predict, value
+from .forms import MULTIPLICATIVE, Shape, candidates
+from .laws import STATIC, Law, multiplies
+from .observed import Observed, amplitudes, loss_angles
+from .response import FREQUENCY_FORMS
+from .wording import expression
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Index = npt.NDArray[np.intp]
+
+INDISTINCT = 10.0
+CONTACT = {"modulus", "force", "contact_radius"}
+IDENTIFIABLE = 20.0
+CLEAN_LINE = 0.05
+"""Lines with more relative noise than this are left out of the held-out percentages."""
+
+
+def observe(design: Design, data: Measurement, law: Law, companion: Companion | None) -> Observed:
+    """The numbers in which a law shows that does not go along frequency."""
+    truth = state(design, law)
+    if law.acts_on == "frequency_response":
+        return loss_angles(design, data, responses(design, None, companion, base_state(design)))
+    return amplitudes(design, data, responses(design, law, companion, truth), companion, truth)
+
+
+def size_percent(design: Design, law: Law) -> tuple[float, float]:
+    """Root mean square change of the FRF, with d33 refitted and with d33 kept."""
+    truth = state(design, law)
+    if law.acts_on != "frequency_response":
+        change = log_amplitude(design, truth) - log_amplitude(design, base_state(design))
+        return 100.0 * float(change.std()), 100.0 * float(np.sqrt((change**2).mean()))
+    h = responses(design, law, None, truth)
+    level = float(h.real.sum() / h.size)
+    return tuple(100.0 * float(np.sqrt((np.abs(h / a - 1.0) ** 2).mean())) for a in (level, 1.0))  # type: ignore[return-value]
+
+
+class Rivals:
+    """chi2 of every (acts_on, axis, form) that is asked for."""
+
+    def __init__(self, observed: Observed, law: Law) -> None:
+        self.observed, self.law = observed, law
+        self.shapes: dict[tuple[bool, str], list[Shape]] = {}
+
+    def forms(self, acts_on: str, axis: str) -> dict[str, float]:
+        """The least chi2 of each form of one quantity along one axis."""
+        design, law = self.observed.design, self.law
+        own = axis == law.axis
+        key = (multiplies(acts_on), axis)
+        if key not in self.shapes:
+            barred = {"free"} - {law.form} | (set() if multiplies(acts_on) else set(MULTIPLICATIVE))
+            usable = [s for s in candidates(axis, design.columns[axis]) if s.form not in barred]
+            fair = own and law.form not in barred
+            self.shapes[key] = [*usable, law.on(design)] if fair else usable
+        shapes = self.shapes[key]
+        start = np.array(law.coefficients) if own and acts_on == law.acts_on else None
+        found: dict[str, float] = {}
+        for along in ("x", "y") if acts_on == "position" else ("",):
+            for fit in fit_shapes(self.observed, acts_on, along, shapes, start):
+                name = "notch" if fit.shape.form == "peak" and fit.coefficients[0] < 0 else fit.shape.form
+                found[name] = min(found.get(name, np.inf), fit.chi2)
+        return found
+
+    def close(self, acts_on: str, names: Iterable[str], limit: float) -> list[str]:
+        """Axes on which some form of one quantity comes within the limit."""
+        return [n for n in names if min(self.forms(acts_on, n).values(), default=np.inf) < limit]
+
+
+def _static_truth(design: Design, data: Measurement, law: Law, companion: Companion | None) -> dict[str, Any]:
+    rivals = Rivals(observe(design, data, law, companion), law)
+    own = rivals.forms(law.acts_on, law.axis)
+    best = own[law.name] if law.name in own else own["peak" if law.name == "notch" else "notch"]
+    limit = best + INDISTINCT
+    axis_also = rivals.close(law.acts_on, [n for n in axes(design) if n != law.axis], limit)
+    others = [q for q in STATIC if q != law.acts_on] if law.acts_on != "frequency_response" else []
+    return {
+        "chi2_gain_over_base": base_chi2(rivals.observed) - best,
+        "form_also": sorted(n for n, chi2 in own.items() if n != law.name and chi2 < limit),
+        "axis_also": sorted(axis_also),
+        "acts_on_also": sorted(
+            q for q in others if {q, law.acts_on} <= CONTACT or rivals.close(q, [law.axis, *axis_also], limit)
+        ),
+    }
+
+
+def _spectral_truth(design: Design, data: Measurement, law: Law, companion: Companion | None) -> dict[str, Any]:
+    lines = Lines(design, data, companion, state(design, law))
+    _, base = lines.base()
+    found: dict[str, float] = {}
+    for form in FREQUENCY_FORMS:
+        if form == "free" and law.form != "free":
+            continue
+        p, chi2 = lines.fit(form, np.array(law.coefficients) if form == law.form else None)
+        found["notch" if form == "peak" and p[0] < 0 else form] = chi2
+    best = found.get(law.name, min(found.values()))
+    also = sorted(n for n, chi2 in found.items() if n != law.name and chi2 < best + INDISTINCT)
+    return {"chi2_gain_over_base": base - best, "form_also": also, "axis_also": [], "acts_on_also": []}
+
+
+def noise_floor(design: Design, data: Measurement) -> float:
+    """Root mean square relative noise of the clean lines, percent."""
+    clean = np.sqrt(data.line_variance) < CLEAN_LINE
+    total = design.noise.gain**2 + data.position_variance[:, None] + 2.0 * data.line_variance
+    return 100.0 * float(np.sqrt((total * clean).sum() / clean.sum()))
+
+
+def _error(data: Measurement, observed: Observed, level: Array, response: Complex, train: Index, test: Index,
+           change: Array) -> float:  # fmt: skip
+    predicted = np.exp(predict(observed, change, train, test) + level[test])[:, None] * response[test]
+    clean = np.sqrt(data.line_variance[test]) < CLEAN_LINE
+    error = np.abs(data.frf[test] / predicted - 1.0) ** 2
+    return 100.0 * float(np.sqrt((error * clean).sum() / clean.sum()))
+
+
+def held_out(
+    design: Design, data: Measurement, law: Law | None, companion: Companion | None, test: Index
+) -> dict[str, float]:
+    """Errors on held-out recordings: base model, base model with its companion, and with the law fitted."""
+    train = np.setdiff1d(np.arange(design.count), test)
+    truth = state(design, law)
+    base = log_amplitude(design, base_state(design))
+    zero, flat = np.zeros(design.count), np.ones(data.frf.shape, dtype=np.complex128)
+    bare = _error(data, amplitudes(design, data, flat, None, truth), base, flat, train, test, zero)
+    lines = Lines(design, data, companion, truth, train)
+    with_companion = lines.response("", lines.base()[0])
+    extra = static_extra(design, companion, truth)
+    observed = amplitudes(design, data, with_companion, companion, truth)
+    plain = _error(data, observed, base + extra, with_companion, train, test, zero)
+    if law is None:
+        ideal = plain
+    elif law.spectral:
+        h = lines.response(law.form, lines.fit(law.form, np.array(law.coefficients))[0])
+        ideal = _error(data, amplitudes(design, data, h, companion, truth), base + extra, h, train, test, zero)
+    else:
+        column = design.columns[law.axis]
+        shapes = [s for s in candidates(law.axis, column) if s.form == law.form] + [law.on(design)]
+        seen = observe(design, data, law, companion) if law.acts_on == "frequency_response" else observed
+        fits = fit_shapes(seen, law.acts_on, law.along, shapes, np.array(law.coefficients), train)
+        change = value(min(fits, key=lambda f: f.chi2), seen, law.acts_on, law.along)
+        if law.acts_on == "frequency_response":
+            h = with_companion * np.exp(-1j * change)[:, None]
+            ideal = _error(data, amplitudes(design, data, h, companion, truth), base + extra, h, train, test, zero)
+        else:
+            ideal = _error(data, observed, base + extra, with_companion, train, test, change)
+    return {"heldout_ideal_percent": ideal, "heldout_base_percent": plain, "heldout_bare_base_percent": bare}
+
+
+def static_extra(design: Design, companion: Companion | None, truth: State) -> Array:
+    """What a static companion adds to ln |FRF|; `amplitudes` takes it out, predictions put it back."""
+    return companion_column(design, companion, truth)[0] if companion else np.zeros(design.count)
+
+
+def describe(
+    design: Design, data: Measurement, law: Law | None, companion: Companion | None, test: Index
+) -> dict[str, Any]:
+    """The entry of one campaign in `truth.json`, without the numbers of its file."""
+    entry: dict[str, Any] = {
+        "effects": [companion.name] if companion else [],
+        "kind": "unknown" if law else "nothing",
+        "law": None,
+        "altered": bool(law and law.altered),
+        "identifiable": False,
+        "chi2_gain_over_base": 0.0,
+        "form_also": [], "axis_also": [], "acts_on_also": [],
+    }  # fmt: skip
+    if law is not None:
+        refit, kept = size_percent(design, law)
+        names = {"parameters": list(law.parameters), "coefficients": list(law.coefficients), "along": law.along}
+        entry["law"] = {
+            "acts_on": law.acts_on, "axis": law.axis, "form": law.name, "expression": expression(law, design),
+            "size_percent": refit, "size_with_d33_kept_percent": kept, "parameters": names,
+        }  # fmt: skip
+        entry |= (_spectral_truth if law.spectral else _static_truth)(design, data, law, companion)
+        entry["identifiable"] = entry["chi2_gain_over_base"] > IDENTIFIABLE
+    entry |= held_out(design, data, law, companion, test)
+    noise = design.noise
+    entry |= {
+        "noise_floor_percent": noise_floor(design, data),
+        "companion_parameters": list(companion.parameters) if companion else [],
+        "d33_pc_per_n": [float(v) for v in np.exp(data.log_d33)],
+        "noise": {
+            "gain": noise.gain, "line": noise.line, "low": noise.low, "high": noise.high, "floor": noise.floor,
+            "position_mm": noise.position_mm, "averages": noise.averages,
+        },
+        "finite_strain_chi2": design.finite_strain_chi2,
+        "recordings": design.count,
+        "lines": int(design.frequency_hz.size),
+    }  # fmt: skip
+    return entry
