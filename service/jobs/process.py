@@ -23,6 +23,7 @@ from underskin.recordings.readers import json_file
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
+_LOADING_S = 60.0  # within which a fork server must have loaded everything
 
 
 class ForkServer:
@@ -40,6 +41,7 @@ class ForkServer:
                 command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, stderr=self._stderr, env=environment
             )
             theirs.close()
+            self._socket.settimeout(_LOADING_S)
             self._shared = shared.pop_all()
 
     @property
@@ -48,7 +50,7 @@ class ForkServer:
         return self._process.poll() is None
 
     def fork(self) -> "WorkerProcess":
-        """A new worker; raises OSError with the process' last words where it has ended."""
+        """A new worker; raises OSError with the process' last words where it has ended or does not answer."""
         with ExitStack() as ours, ExitStack() as theirs:
 
             def pipe(*, to_worker: bool) -> BinaryIO:
@@ -66,7 +68,7 @@ class ForkServer:
             try:
                 socket.send_fds(self._socket, [b"f"], descriptors)
                 _, forked, _, _ = socket.recv_fds(self._socket, 1, 1)
-            except ConnectionError:
+            except (ConnectionError, TimeoutError):
                 forked = []
             if not forked:
                 raise OSError(f"no worker could be started: {_end_of(self._stderr)}")
@@ -140,7 +142,11 @@ class WorkerProcesses:
         content = json_file.write(campaign)
         job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits)
         with self._lock:
-            process = self._running().fork()
+            try:
+                process = self._running().fork()
+            except OSError:  # it was killed just now, or hangs: a new one may not
+                self._end()
+                process = self._running().fork()
             self._at_work += 1
         return Worker(job, content, process, self._is_done)
 
