@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -18,8 +18,13 @@ from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnose, diagnosis_report
 from underskin.diagnosis.reporting.hints import HINTS
 from underskin.diagnosis.reporting.report import report
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
 from underskin.errors import InvalidInput
 from underskin.mechanisms import registry
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.expressions import expression
+from underskin.mechanisms.unnamed.grammar import Grammar
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, Form
 from underskin.prediction.adopted_model import adopted, not_adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict
 from underskin.recordings.conditions import frf_of
@@ -271,3 +276,17 @@ def test_what_the_lab_declared_is_recognised_by_name(
     assert mechanism["name"] == "warm_film"
     assert mechanism["parameters"][0]["unit"] == "1/°C"
     assert document["provenance"]["mechanisms"]["warm_film"].startswith("warm_film.yaml ")
+
+
+def test_every_law_of_the_grammar_can_be_put_into_words(warming: Campaign, table: SigmaTable) -> None:
+    """Of a place, of a lag and over frequency too, whose parameters have other names than a factor's."""
+    problem = FittingProblem(lines(warming), table)
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    frequency = problem.lines.frequency
+    grammar = Grammar.of(problem.collapsed.campaign, frequency, table, tuple(CATALOGUE.values()))
+    for law in grammar.laws:
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        assert LeadingLaw(law, values, nothing).form in get_args(Form), law.name
+        assert expression(law, values), law.name
+    assert {law.spoken.acts_on for law in grammar.laws} == set(ACTS_ON)

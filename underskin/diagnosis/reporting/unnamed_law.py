@@ -56,8 +56,8 @@ class LeadingLaw:
 
     @property
     def form(self) -> str:
-        """A peak of negative size is a notch."""
-        if self.law.spoken.form == "peak" and self.values["law_change"] < 0:
+        """A peak of negative size is a notch; that of a place or of a lag has a direction and no such sign."""
+        if self.law.spoken.form == "peak" and self.values.get("law_change", 0.0) < 0:
             return "notch"
         return self.law.spoken.form
 
