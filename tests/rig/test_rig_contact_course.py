@@ -114,7 +114,7 @@ def test_the_cycle_dissipates_the_hysteresis() -> None:
 @pytest.mark.parametrize("law", ["linear", "limited"])
 def test_what_sticks_stiffens_as_far_as_its_contact_is_wide(law: str) -> None:
     """Stiffening goes on beyond the strain that a contact without adhesion would reach at the largest depth."""
-    values = {"law": law, "coefficient": 4.0}
+    values: dict[str, float | str] = {"law": law, "coefficient": 4.0}
     stiff = sphere_law({"strain_stiffening": values}, R, 1.0, DEPTH)
     work = W
     time, _, depth, force = there_and_back(Body(stiff, E, approach=work, separation=work), 0.0)
