@@ -18,7 +18,7 @@ from underskin.diagnosis.validation.cross_validation import PredictionScore
 from underskin.diagnosis.validation.imitation import unseen
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.campaign import parse
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import course, touch
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
@@ -141,3 +141,21 @@ def test_more_spheres_leave_fewer_laws_that_would_not_show(table: SigmaTable) ->
         assert 0 < found.imitated < found.laws
         odds.append(found.odds)
     assert 0.05 / 0.45 > odds[0] > odds[1]
+
+
+def test_a_touch_lies_half_a_step_of_the_stage_beyond_the_last_sample_in_the_air() -> None:
+    """Under a stage that gives the depth jumps by more than a step."""
+    assert touch(np.array([-0.3, -0.2, -0.1, 0.4, 0.5]), 3) == pytest.approx(-0.05)
+    assert touch(np.array([-0.3, -0.2, -0.1, 0.0, 0.1]), 3) == pytest.approx(-0.05)
+
+
+@pytest.mark.slow
+def test_adhesion_under_a_soft_stage_is_fitted_to_its_noise_from_far_off(table: SigmaTable) -> None:
+    """On a drawn campaign with jumps on both ways, where fits ended above the null hypothesis."""
+    experiment, curves = drawn_curves(31007, 28, INDENTATION, "single")
+    found, null = explained(parse(campaign_of_curves(experiment, curves)), ("adhesion",), table)
+    work, separation = found.own("adhesion")
+    true = experiment.effects["adhesion"]
+    assert np.exp(work) == pytest.approx(true["work_j_per_m2"], rel=0.03)
+    assert np.exp(work + separation) == pytest.approx(true["work_of_separation_j_per_m2"], rel=0.03)
+    assert found.best.cost < null.best.cost - 1000

@@ -53,6 +53,14 @@ class Course:
         return len(self.air) >= _AIR
 
 
+def touch(displacement: Floats, snap_in: int) -> float:
+    """About where a sphere touches that snaps in with this sample: half a step of its stage beyond the one before,
+    since a stage that gives lets it jump further in."""
+    before = displacement[max(snap_in - 2, 0) : snap_in + 1]
+    steps = np.diff(before)
+    return float(before[-2] + 0.5 * max(min(steps), 0.0)) if len(before) > 1 else float(displacement[0])
+
+
 def course(displacement: Floats, force: Floats, time: Floats | None = None) -> Course:
     """Of samples (samples,), all finite; without times they were taken at a steady rate."""
     time = np.arange(float(len(force))) if time is None else time

@@ -3,10 +3,12 @@ priors, a gain of each recording, and the zero and drift of its cell taken out (
 
 Scipy's trust-region reflective algorithm finds from far away what steps on the whole likelihood, whose covariance moves
 with the fit, do not. Where a sphere snaps in, the force jumps at the contact point, and no slope leads past a sample
-there: the curve is fitted again between those samples where it fits best.
+there: contact points begin where a snap-in is seen, and the curve is fitted again between those samples where it fits
+best.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -15,12 +17,15 @@ from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_pr
 from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT
 from underskin.diagnosis.noise.noise_priors import START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.recordings.conditions import curves_of
-from underskin.units import Floats
+from underskin.recordings.campaign import CurveRecording
+from underskin.recordings.conditions import CurveConditions, curves_of
+from underskin.recordings.curve_course import course, touch
+from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
 _TOLERANCE, _OF_STARTS, _EVALUATIONS = 1e-4, 1e-3, 40  # of the sum of squares; the likelihood goes on from starts
 _PASSED = 4  # samples at most, either way, past which a contact point is moved
+_RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
 
 
@@ -49,10 +54,21 @@ class LeastSquares:
         travels = [entry.displacement_mm for entry in curves_of(lines.campaign)]
         self._approach = [np.unique(travel[: int(travel.argmax()) + 1]) for travel in travels]
         self._jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
+        curves = curves_of(lines.campaign) if self._jumps else []
+        self._snapped = [_snapped(entry) for entry in curves]
+        seen = [_seen_contact(entry) for entry in curves]
+        each = [one for one in seen if one is not None]
+        self._seen = np.concatenate(each) if each and len(each) == len(seen) else None
 
     def fitted(self, start: Floats) -> tuple[Floats, float]:
         """The fit coordinates (parameters,) from a start, and half the sum of squares there."""
-        x, cost = self._descended(np.append(start, np.zeros(len(self._spans))), self._low, self._high)
+        begin, low, high = np.append(start, np.zeros(len(self._spans))), self._low.copy(), self._high.copy()
+        for place, gap in zip(self._model.contact_points.tolist(), self._snapped, strict=False):
+            if gap is not None and low[place] < gap[0] < gap[2] < high[place]:
+                low[place], begin[place], high[place] = gap
+        if self._seen is not None:  # while the parameters are far off, contact is where the jumps show it
+            begin, _ = self._descended(begin, low, high, self._seen)
+        x, cost = self._descended(begin, low, high)
         if self._jumps:
             other, less = self._descended(*self._between_samples(x))
             x, cost = (other, less) if less < cost else (x, cost)
@@ -80,27 +96,28 @@ class LeastSquares:
         moved[places], low[places], high[places] = fits[best, places], lower[best, curves], upper[best, curves]
         return moved, low, high
 
-    def _descended(self, start: Floats, low: Floats, high: Floats) -> tuple[Floats, float]:
-        """Fit coordinates and gains from a start, and half the sum of squares there."""
+    def _descended(self, start: Floats, low: Floats, high: Floats, held: Mask | None = None) -> tuple[Floats, float]:
+        """Fit coordinates and gains from a start, and half the sum of squares there; `held` are in contact."""
         count = len(low)
         gains = np.full(len(start) - count, 0.5)
         margin = _INSIDE * (high - low)
         begin = np.append(np.clip(start[:count], low + margin, high - margin), start[count:])
         bounds = np.append(low, -gains), np.append(high, gains)
         unit = np.append(_units(self._model, self._precision), np.ones(len(gains)))
-        return _solved(self._residuals, self._jacobian, begin, bounds, unit, _OF_STARTS)
+        functions = partial(self._residuals, held=held), partial(self._jacobian, held=held)
+        return _solved(*functions, begin, bounds, unit, _OF_STARTS)
 
-    def _residuals(self, x: Floats) -> Floats:
+    def _residuals(self, x: Floats, held: Mask | None) -> Floats:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
-        force = self._model.forces(fit[None])[0]
+        force = self._model.forces(fit[None], held)[0]
         left = (self._measured - (1 + gain[self._recording]) * force) / self._unit
         return np.concatenate([self._projected(left), (fit - self._centre) * self._precision, gain / START_GAIN])
 
-    def _jacobian(self, x: Floats) -> Floats:
+    def _jacobian(self, x: Floats, held: Mask | None) -> Floats:
         count = len(self._low)
         fit, gain = x[:count], x[count:]
-        force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None]))
+        force, slopes = (part[0] for part in self._model.forces_and_slopes(fit[None], held))
         by_fit = -(slopes * (1 + gain[self._recording])) / self._unit
         by_gain = np.where(self._recording == np.arange(len(gain))[:, None], -force / self._unit, 0.0)
         rows = np.concatenate([self._projected(by_fit), self._projected(by_gain)]).T
@@ -114,6 +131,29 @@ class LeastSquares:
             coefficients.append(rows[..., own] @ solved.T)
             parts.append(rows[..., own] - coefficients[-1] @ columns.T)
         return np.concatenate([*parts, *coefficients], axis=-1)
+
+
+def _snapped(curve: CurveConditions) -> tuple[float, float, float] | None:
+    """Between which displacements a curve snaps into contact, and about where between them [mm]; None where no snap-in
+    is seen."""
+    seen = course(curve.displacement_mm, curve.force_n, curve.time_s) if isinstance(curve, CurveRecording) else None
+    if seen is None or not seen.snap_in:
+        return None
+    before, after = curve.displacement_mm[seen.snap_in - 1 : seen.snap_in + 1].tolist()
+    begins = touch(curve.displacement_mm, seen.snap_in)
+    return (before, begins, after) if before < begins < after else None
+
+
+def _seen_contact(curve: CurveConditions) -> Mask | None:
+    """Which samples lie between the snap-in and the pull-off (samples,); None where these are not seen."""
+    if not isinstance(curve, CurveRecording):
+        return None
+    seen = course(curve.displacement_mm, curve.force_n, curve.time_s)
+    number = np.arange(len(curve.force_n))
+    back = float(curve.displacement_mm[seen.turn] - curve.displacement_mm[-1])
+    if seen.snap_in is None or (seen.pull_off is None and back > _RETURN * float(np.ptp(curve.displacement_mm))):
+        return None
+    return (number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off))
 
 
 def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:

@@ -68,16 +68,30 @@ class CurveModel(ABC):
         `contact` (points, curves, 1) [m]; the contacts are as `held`, where that is given.
         """
 
-    def forces(self, fit: Floats) -> Floats:
-        """F (points, rows) [N] at points (points, parameters)."""
+    def forces(self, fit: Floats, held: Mask | None = None) -> Floats:
+        """F (points, rows) [N] at points (points, parameters); `held` (rows,) are in contact, where that is known."""
         at_once = max(_AT_ONCE // self.displacement.size, 1)
-        parts = [self._forces(fit[first : first + at_once])[0] for first in range(0, len(fit), at_once)]
+        known = self._arranged_mask(held)
+        parts = []
+        for first in range(0, len(fit), at_once):
+            part = fit[first : first + at_once]
+            held_there = None if known is None else np.broadcast_to(known, (len(part), *known.shape))
+            parts.append(self._forces(part, held_there)[0])
         return np.concatenate(parts)[:, self.recording, self._sample]
 
-    def forces_and_slopes(self, fit: Floats) -> tuple[Floats, Floats]:
+    def forces_and_slopes(self, fit: Floats, held: Mask | None = None) -> tuple[Floats, Floats]:
         """F (points, rows) [N], and its derivatives by the fit coordinates (points, parameters, rows)."""
-        values, slopes, _ = zip(*(self._differentiated(point) for point in fit), strict=True)
+        known = self._arranged_mask(held)
+        values, slopes, _ = zip(*(self._differentiated(point, known) for point in fit), strict=True)
         return np.stack(values), np.stack(slopes)
+
+    def _arranged_mask(self, held: Mask | None) -> Mask | None:
+        """Of rows (rows,) as curves (curves, samples)."""
+        if held is None:
+            return None
+        arranged = np.zeros(self.displacement.shape, dtype=bool)
+        arranged[self.recording, self._sample] = held
+        return arranged
 
     def predict(self, fit: Floats) -> Prediction:
         """All samples at one point of the fit coordinates (parameters,); raises InvalidInput for another length."""
@@ -89,9 +103,10 @@ class CurveModel(ABC):
         contact = 1e-3 * fit[:, self.contact_points, None]
         return self._force(self._curve(own, nuisances), contact, held)
 
-    def _differentiated(self, fit: Floats) -> tuple[Floats, Floats, Mask]:
-        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside."""
-        middle, held, inside = self._forces(fit[None])
+    def _differentiated(self, fit: Floats, known: Mask | None = None) -> tuple[Floats, Floats, Mask]:
+        """F (rows,) at one point, its derivatives (parameters, rows), and which rows are inside; `known` (curves,
+        samples) are in contact, where that is given."""
+        middle, held, inside = self._forces(fit[None], None if known is None else known[None])
         points = np.tile(fit, (2 * len(self._moved), 1))
         for number, places in enumerate(self._moved):
             points[2 * number, places] += self._step[places]

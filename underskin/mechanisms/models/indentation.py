@@ -31,7 +31,7 @@ from underskin.mechanisms.parameter import Parameter
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
-from underskin.recordings.curve_course import course
+from underskin.recordings.curve_course import course, touch
 from underskin.units import Floats, Mask, to_si
 
 _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
@@ -164,7 +164,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
                 # A curve that does not load begins where it shows least force.
                 begins = float(to_si("displacement_mm", entry.displacement_mm[int(np.abs(force).argmin())]))
             if seen.snap_in is not None:
-                begins = float(to_si("displacement_mm", entry.displacement_mm[max(seen.snap_in - 1, 0)]))
+                begins = float(to_si("displacement_mm", touch(entry.displacement_mm, seen.snap_in)))
             if refused is not None and span == 0:
                 raise refused
         contact_points.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
