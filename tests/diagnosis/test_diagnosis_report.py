@@ -102,8 +102,11 @@ def test_what_has_no_name_is_declared_unexplained_and_described(table: SigmaTabl
         whole = changed(whole, number, notch)
     report = diagnosis_report(whole, table)
     assert report["verdict"] == "unexplained"
-    assert report["mechanisms"] == []
-    assert "peak or notch" in report["statement"]
+    law = report["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("frequency_response", "frequency_hz", "notch")
+    centre = next(entry["value"] for entry in law["parameters"] if entry["name"] == "centre")
+    assert centre == pytest.approx(20.0, abs=0.5)
+    assert law["heldout_rmse_percent"]["after"] < law["heldout_rmse_percent"]["before"]
     axes = {entry["axis"]: entry["p_value"] for entry in report["location"]["axes"]}
     assert axes["frequency_hz"] == 0.001
     assert axes["preload_n"] > 0.05

@@ -20,7 +20,6 @@ from underskin.diagnosis.reporting.hints import HINTS
 from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
 from underskin.errors import InvalidInput
-from underskin.mechanisms import registry
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.expressions import expression
 from underskin.mechanisms.unnamed.grammar import Grammar
@@ -266,11 +265,11 @@ def test_what_the_lab_declared_is_recognised_by_name(
     warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", "examples/mechanisms")
-    registry._loaded.cache_clear()
+    CATALOGUE.reload()
     try:
         document = diagnosis_report(warming, table)
     finally:
-        registry._loaded.cache_clear()
+        CATALOGUE.reload()
     assert document["verdict"] == "explained"
     (mechanism,) = document["mechanisms"]
     assert mechanism["name"] == "warm_film"

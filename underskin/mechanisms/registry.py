@@ -48,6 +48,10 @@ class Catalogue(Mapping[str, Mechanism]):
         """Load the mechanisms of other packages now; raises ExtensionError where one cannot be used."""
         _loaded()
 
+    def reload(self) -> None:
+        """Load the mechanisms of other packages and the lab's own again, as they are now."""
+        _loaded.cache_clear()
+
     @property
     def packages(self) -> Mapping[str, str]:
         """Package and version of each mechanism that comes from another package, by its name."""
