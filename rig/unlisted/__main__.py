@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from .campaign import write
+from rig.unlisted.campaign import write
 
 
 def main() -> None:

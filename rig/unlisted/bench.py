@@ -20,10 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .design import Design
-from .laws import Law
-from .layer import log_transmission, stiffness_ratio
-from .response import MinimumPhase, frequency_law
+from rig.unlisted.design import Design
+from rig.unlisted.laws import Law
+from rig.unlisted.layer import log_transmission, stiffness_ratio
+from rig.unlisted.response import MinimumPhase, frequency_law
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

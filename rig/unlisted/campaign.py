@@ -11,12 +11,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .bench import Companion, Measurement, base_state, draw_companion, log_amplitude, measure, responses, state
-from .design import Design, add_random_columns, draw_design
-from .fits import Lines, whitener
-from .laws import LIMIT, SPECTRAL_LIMIT, Law, choose, draw_law, needs, spectral_scaled
-from .observed import amplitudes
-from .truth import describe
+from rig.unlisted.bench import (
+    Companion,
+    Measurement,
+    base_state,
+    draw_companion,
+    log_amplitude,
+    measure,
+    responses,
+    state,
+)
+from rig.unlisted.design import Design, add_random_columns, draw_design
+from rig.unlisted.fits import Lines, whitener
+from rig.unlisted.laws import LIMIT, SPECTRAL_LIMIT, Law, choose, draw_law, needs, spectral_scaled
+from rig.unlisted.observed import amplitudes
+from rig.unlisted.truth import describe
 
 Generator = np.random.Generator
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from .layer import finite_strain_shift, hertz_radius
+from rig.unlisted.layer import finite_strain_shift, hertz_radius
 
 Array = npt.NDArray[np.float64]
 Generator = np.random.Generator

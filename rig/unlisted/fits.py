@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from .bench import SPECTRAL, Companion, Measurement, State, companion_response
-from .design import Design
-from .forms import Shape
-from .laws import multiplies
-from .observed import Observed, Table
-from .response import MinimumPhase, bounds, frequency_law, starts
+from rig.unlisted.bench import SPECTRAL, Companion, Measurement, State, companion_response
+from rig.unlisted.design import Design
+from rig.unlisted.forms import Shape
+from rig.unlisted.laws import multiplies
+from rig.unlisted.observed import Observed, Table
+from rig.unlisted.response import MinimumPhase, bounds, frequency_law, starts
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

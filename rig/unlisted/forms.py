@@ -30,7 +30,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from .design import Column
+from rig.unlisted.design import Column
 
 Array = npt.NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from .design import LOGARITHMIC, NUMBERS, Column, Design
-from .forms import MULTIPLICATIVE, Shape, combine, draw_parameters, possible, shape
-from .response import FREE_KNOTS, FREQUENCY_FORMS
+from rig.unlisted.design import LOGARITHMIC, NUMBERS, Column, Design
+from rig.unlisted.forms import MULTIPLICATIVE, Shape, combine, draw_parameters, possible, shape
+from rig.unlisted.response import FREE_KNOTS, FREQUENCY_FORMS
 
 Array = npt.NDArray[np.float64]
 Generator = np.random.Generator

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from .bench import SPECTRAL, Companion, Measurement, State, base_state, companion_column
-from .design import Design
-from .layer import log_transmission
+from rig.unlisted.bench import SPECTRAL, Companion, Measurement, State, base_state, companion_column
+from rig.unlisted.design import Design
+from rig.unlisted.layer import log_transmission
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

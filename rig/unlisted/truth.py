@@ -19,14 +19,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .bench import Companion, Measurement, State, base_state, companion_column, log_amplitude, responses, state
-from .design import Design, axes
-from .fits import Lines, base_chi2, fit_shapes, predict, value
-from .forms import MULTIPLICATIVE, Shape, candidates
-from .laws import STATIC, Law, multiplies
-from .observed import Observed, amplitudes, loss_angles
-from .response import FREQUENCY_FORMS
-from .wording import expression
+from rig.unlisted.bench import (
+    Companion,
+    Measurement,
+    State,
+    base_state,
+    companion_column,
+    log_amplitude,
+    responses,
+    state,
+)
+from rig.unlisted.design import Design, axes
+from rig.unlisted.fits import Lines, base_chi2, fit_shapes, predict, value
+from rig.unlisted.forms import MULTIPLICATIVE, Shape, candidates
+from rig.unlisted.laws import STATIC, Law, multiplies
+from rig.unlisted.observed import Observed, amplitudes, loss_angles
+from rig.unlisted.response import FREQUENCY_FORMS
+from rig.unlisted.wording import expression
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

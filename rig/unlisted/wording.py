@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .design import Column, Design
-from .forms import filled, from_unit
-from .laws import Law, multiplies
+from rig.unlisted.design import Column, Design
+from rig.unlisted.forms import filled, from_unit
+from rig.unlisted.laws import Law, multiplies
 
 SYMBOL = {
     "gain": "G = G0",
