@@ -119,16 +119,22 @@ class Lines:
         """Only some of the rows, each with the noise it had; recordings without a row are left out."""
         order = np.flatnonzero(kept)
         recordings, first = np.unique(self.recording[order], return_index=True)
-        entries = [self.campaign.recordings[number] for number in recordings]
-        rows = np.split(order, first[1:])
-        kept_entries = tuple(_with_rows(entry, self, own) for entry, own in zip(entries, rows, strict=True))
+        value, frequency = self.value[order], self.frequency[order]
+        ends = [*first[1:].tolist(), len(order)]
+        entries: list[Recording] = []
+        for number, low, high in zip(recordings.tolist(), first.tolist(), ends, strict=True):
+            entry = self.campaign.recordings[number]
+            if isinstance(entry, FrfRecording):
+                entries.append(FrfRecording.of_lines(entry, frequency[low:high], value[low:high]))
+            else:
+                entries.append(samples_of(entry, order[low:high] - self.first[number]))
         return replace(
             self,
-            campaign=replace(self.campaign, recordings=kept_entries),
-            value=self.value[order],
+            campaign=replace(self.campaign, recordings=tuple(entries)),
+            value=value,
             deviation=self.deviation[order],
-            frequency=self.frequency[order],
-            recording=np.repeat(np.arange(len(rows)), [len(own) for own in rows]),
+            frequency=frequency,
+            recording=np.repeat(np.arange(len(entries)), np.diff([*first, len(order)])),
             sensor=self.sensor[recordings],
             scatter=(0.0, self.scatter[1] and -len(order)),
             smooth=None if self.smooth is None else self.smooth.part(order),
@@ -144,9 +150,47 @@ def lines(
 
     Recordings of another kind and recordings without a finite line are left out of the `campaign` that comes with them.
     """
+    measured = _measured(campaign, uneven or {})
+    recording = np.repeat(np.arange(len(measured.entries)), measured.counts).astype(np.intp)
+    expected = None if known is None else known[1]
+    of_lines = measured.frequency, recording, measured.coherence, measured.unevenness
+    noise = line_noise(measured.value, *of_lines, expected)
+    if known is not None:
+        return replace(known[0], deviation=noise.deviation, noise=noise)
+    each = zip(measured.entries, np.cumsum(measured.counts).tolist(), measured.counts, strict=True)
+    entries = tuple(
+        FrfRecording.of_lines(entry, measured.frequency[end - count : end], measured.value[end - count : end])
+        for entry, end, count in each
+    )
+    return Lines(
+        campaign=replace(campaign, recordings=entries),
+        value=measured.value,
+        deviation=noise.deviation,
+        frequency=measured.frequency,
+        recording=recording,
+        sensor=measured.sensor,
+        noise=noise,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """The recordings with finite lines, the sensor of each and how many lines it has; and columns over all these lines
+    (rows,), `coherence` NaN where not given."""
+
+    entries: list[FrfRecording]
+    sensor: Indices
+    counts: list[int]
+    value: Complexes
+    frequency: Floats
+    coherence: Floats
+    unevenness: Floats
+
+
+def _measured(campaign: Campaign, uneven: Mapping[str, Floats]) -> _Measured:
     numbers = {sensor.id: index for index, sensor in enumerate(campaign.skin.sensors)}
     entries: list[FrfRecording] = []
-    values, frequencies, coherences, unevens, sensors = [], [], [], [], []
+    values, frequencies, coherences, unevens = [], [], [], []
     for entry in campaign.recordings:
         if not isinstance(entry, FrfRecording):
             continue
@@ -155,33 +199,13 @@ def lines(
         order = order[np.isfinite(measured.values[order]) & np.isfinite(measured.frequency[order])]
         if len(order) == 0:
             continue
-        value, frequency = measured.values[order], measured.frequency[order]
-        if known is None:
-            entries.append(FrfRecording.of_lines(entry, frequency, value))
-        values.append(value)
-        frequencies.append(frequency)
+        entries.append(entry)
+        values.append(measured.values[order])
+        frequencies.append(measured.frequency[order])
         coherences.append(measured.coherence_or_nan[order])
-        unevens.append((uneven or {}).get(entry.id, np.ones(len(measured.values)))[order])
-        sensors.append(numbers[entry.sensor])
-    recording = np.repeat(np.arange(len(values)), [len(value) for value in values]).astype(np.intp)
+        unevens.append(uneven.get(entry.id, np.ones(len(measured.values)))[order])
+    sensor = np.array([numbers[entry.sensor] for entry in entries], dtype=np.intp)
+    counts = [len(value) for value in values]
     value = np.concatenate([*values, np.zeros(0, dtype=complex)])
-    frequency, coherence, unevenness = (
-        np.concatenate([*columns, np.zeros(0)]) for columns in (frequencies, coherences, unevens)
-    )
-    noise = line_noise(value, frequency, recording, coherence, unevenness, None if known is None else known[1])
-    return Lines(
-        campaign=replace(campaign, recordings=tuple(entries)) if known is None else known[0].campaign,
-        value=value,
-        deviation=noise.deviation,
-        frequency=frequency,
-        recording=recording,
-        sensor=np.array(sensors, dtype=np.intp),
-        noise=noise,
-    )
-
-
-def _with_rows(entry: Recording, lines: Lines, own: Indices) -> Recording:
-    """A recording with only some of its rows, given by their places among all rows."""
-    if isinstance(entry, FrfRecording):
-        return FrfRecording.of_lines(entry, lines.frequency[own], lines.value[own])
-    return samples_of(entry, own - int(np.searchsorted(lines.recording, lines.recording[own[0]])))
+    columns = (np.concatenate([*each, np.zeros(0)]) for each in (frequencies, coherences, unevens))
+    return _Measured(entries, sensor, counts, value, *columns)

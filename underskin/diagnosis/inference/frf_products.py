@@ -48,7 +48,9 @@ class RowSums:
         """`weight` (rows,)."""
         shape = lines.recordings, len(design.line_frequency)
         by_recording = np.append(lines.first, len(weight))
-        self._sparse = csr_array((weight, design.line, by_recording), shape=shape)
+        sparse = csr_array((weight, design.line, by_recording), shape=shape)
+        self._sparse: csr_array | None = None
+        self._recordings = lines.recordings
         self._blocks: list[tuple[Indices, slice, Floats]] = []
         contact = design.line_contact[design.line[lines.first]]
         own = [np.flatnonzero(contact == number) for number in np.unique(contact)]
@@ -56,21 +58,24 @@ class RowSums:
         spans = [slice(low, high) for low, high in pairwise(edges.tolist())]
         numbers = sum(len(some) * (span.stop - span.start) for some, span in zip(own, spans, strict=True))
         if len(weight) > max(_LARGE * len(own), _FULL * numbers):
-            self._blocks = [(some, span, self._block(some, span)) for some, span in zip(own, spans, strict=True)]
-
-    def _block(self, recordings: Indices, span: slice) -> Floats:
-        """(recordings, lines) of one contact."""
-        return np.ascontiguousarray(self._sparse[recordings][:, span].toarray())
+            self._blocks = [(some, span, _block(sparse, some, span)) for some, span in zip(own, spans, strict=True)]
+        else:
+            self._sparse = sparse
 
     def __call__(self, values: Floats) -> Floats:
         """Of values on distinct lines."""
         flat = values.reshape(-1, values.shape[-1])
-        if not self._blocks:
+        if self._sparse is not None:
             return np.asarray((self._sparse @ flat.T).T.reshape(*values.shape[:-1], -1))
-        total = np.empty((len(flat), self._sparse.shape[0]))
+        total = np.empty((len(flat), self._recordings))
         for recordings, span, block in self._blocks:
             total[:, recordings] = flat[:, span] @ block.T
         return total.reshape(*values.shape[:-1], -1)
+
+
+def _block(sparse: csr_array, recordings: Indices, span: slice) -> Floats:
+    """(recordings, lines) of one contact."""
+    return np.ascontiguousarray(sparse[recordings][:, span].toarray())
 
 
 @cached_while_alive  # a diagnosis weighs dozens of models of one design

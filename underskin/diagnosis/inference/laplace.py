@@ -62,14 +62,22 @@ class Evidence:
 
     @cached_property
     def prediction(self) -> Prediction:
-        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives by parameters, of
-        curves with what the cell adds."""
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives, of curves with what
+        the cell adds."""
         model = self.hypothesis.model
         if isinstance(model, FrfModel):
-            return model.predict(self.point.fit, slopes=False)
+            return model.predict(self.point.fit, slopes=False, place=False)
         prediction = model.predict(self.point.fit)
         added = cell_response(self.hypothesis.lines, self.levels, prediction.value.real).offset
         return replace(prediction, value=prediction.value + added)
+
+    @cached_property
+    def relative_place_slopes(self) -> Floats:
+        """∇m/m of each recording over its contact's place [1/m] (2, recordings); 0 of curves."""
+        model = self.hypothesis.model
+        if isinstance(model, FrfModel):
+            return model.relative_place_slopes(self.point.fit)
+        return np.zeros((2, self.hypothesis.lines.recordings))
 
     @cached_property
     def levels(self) -> NoiseLevels:

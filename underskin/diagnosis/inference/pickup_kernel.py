@@ -16,6 +16,16 @@ _SUMS = "float64[:, :, ::1]"
 _ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
 
 
+@compiled()
+def _take(taken: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
+    """Take what a recording's rows lose (3, sets) from its sums, and begin anew."""
+    for number in range(taken.shape[1]):
+        uu[point, number, recording] -= taken[0, number]
+        uy[point, number, recording] -= taken[1, number]
+        yy[point, number, recording] -= taken[2, number]
+    taken[:] = 0.0
+
+
 @compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
 def lost(
     pickup: Floats,
@@ -46,33 +56,34 @@ def lost(
     factors, total, taken, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
     for point in range(points):
         factors[:], total[:] = 1.0, 0.0
-        count = 0
+        count, of = 0, 0
         for number in range(distinct):
             largest[number] = pickup[point, number].max()
         for row in range(len(y)):
-            square, weight = pickup[point, alike[row]], precision[row]
-            if largest[alike[row]] * weight > _NONE:
-                at, measured = u[point, line[row]], y[row]
-                uu_row = at.real * at.real + at.imag * at.imag
-                uy_row = at.real * measured.real + at.imag * measured.imag
-                yy_row = measured.real * measured.real + measured.imag * measured.imag
+            kind, weight = alike[row], precision[row]
+            if largest[kind] * weight <= _NONE:
+                continue
+            if recording[row] != of:
+                _take(taken, uu, uy, yy, point, of)
+                of = recording[row]
+            at, measured = u[point, line[row]], y[row]
+            uu_row = at.real * at.real + at.imag * at.imag
+            uy_row = at.real * measured.real + at.imag * measured.imag
+            yy_row = measured.real * measured.real + measured.imag * measured.imag
+            for number in range(sets):
+                x = pickup[point, kind, number] * weight
+                less = x / (1 + x) * weight
+                taken[0, number] += less * uu_row
+                taken[1, number] += less * uy_row
+                taken[2, number] += less * yy_row
+                factors[number] *= 1 + x
+            count += 1
+            if count == _TOGETHER:
                 for number in range(sets):
-                    x = square[number] * weight
-                    less = x / (1 + x) * weight
-                    taken[0, number] += less * uu_row
-                    taken[1, number] += less * uy_row
-                    taken[2, number] += less * yy_row
-                    factors[number] *= 1 + x
-                count += 1
-                if count == _TOGETHER:
-                    for number in range(sets):
-                        total[number] += np.log(factors[number])
-                    factors[:], count = 1.0, 0
-            if row + 1 == len(y) or recording[row + 1] != recording[row]:
-                uu[point, :, recording[row]] -= taken[0]
-                uy[point, :, recording[row]] -= taken[1]
-                yy[point, :, recording[row]] -= taken[2]
-                taken[:] = 0.0
+                    total[number] += np.log(factors[number])
+                    factors[number] = 1.0
+                count = 0
+        _take(taken, uu, uy, yy, point, of)
         for number in range(sets):
             log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
 

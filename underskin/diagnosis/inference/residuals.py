@@ -52,11 +52,7 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     precision = lines.deviation**-2
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
-    best = explanation.best
-    slopes, first = best.prediction.position_slopes, best.hypothesis.lines.first
-    if slopes is None:
-        slopes = np.zeros((2, len(best.prediction.value)))
-    relative = np.abs(slopes[:, first]) ** 2 / np.maximum(np.abs(best.prediction.value[first]) ** 2, 1e-60)
-    placed = position**2 * relative.sum(axis=0) + 0.5 * position**4 * problem.curvature.square
+    relative = explanation.best.relative_place_slopes
+    placed = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
     line, weight = line_residuals(problem, explanation)
     return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)

@@ -13,6 +13,7 @@ much larger.
 """
 
 import itertools
+import weakref
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,7 @@ _FREEDOM = 6.0
 _TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: where hardly any line says anything
 _SHARED = 8  # recordings at a frequency from which what they share is taken off
 _WINDOW = 5
+_BLOCK = 10_000  # windows that are copied at a time
 
 
 @dataclass(frozen=True)
@@ -54,16 +56,10 @@ def line_noise(
     if len(value) == 0:
         return LineNoise(np.zeros(0), 1.0, 0.0)
     amplitude = local_amplitude(value, recording)
-    middle = _interior(recording, frequency)
-    z = _without_shared(value, frequency, recording, value if expected is None else value - expected)
+    rest = value if expected is None else value - expected
+    middle, share, rough = _roughness(_without_shared(value, frequency, recording, rest), frequency, recording)
     distinct, line = np.unique(frequency, return_inverse=True)
-    log_f = np.log(frequency)
-    span = log_f[middle + 1] - log_f[middle - 1]
-    share = (log_f[middle + 1] - log_f[middle]) / span
-    weights = np.stack([np.ones(len(middle)), share**2, (1 - share) ** 2])
-    rows = np.stack([middle, middle - 1, middle + 1])
-    rough = np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
-    knots = _knots(log_f)
+    knots = _knots(np.log(distinct))
     hats = _hats(np.log(distinct), knots)
     scale = float(np.median(amplitude))
     rough /= scale**2
@@ -99,11 +95,13 @@ def line_noise(
 
     level = np.log(max(float(np.median(rough)), 1e-14)) if len(middle) else np.log(_TYPICAL)
     start = np.concatenate([np.full(len(knots), level - 1.0), [level - 2.0, -3.5]])
-    p = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x
+    # SciPy leaves cycles that hold the function, and all arrays with it.
+    p = minimize(weakref.proxy(objective), start, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x
     d2 = variance(p)
     freedom = len(middle) / 1.5  # neighbouring differences share lines
     if len(middle) > 10:
-        median = float(np.median(rough / (weights * d2[rows]).sum(axis=0)))
+        of_rough = d2[middle] + share**2 * d2[middle - 1] + (1 - share) ** 2 * d2[middle + 1]
+        median = float(np.median(rough / of_rough))
         d2 = d2 * (median / np.log(2.0)) ** (freedom / (freedom + 30.0))
     d2 = np.maximum(d2, (1e-5) ** 2 * size2)
     sd = float(np.hypot(0.03, 1.0 / np.sqrt(1.0 + 2.0 * freedom)))
@@ -120,7 +118,9 @@ def local_amplitude(value: Complexes, recording: Indices) -> Floats:
     half = _WINDOW // 2
     if len(size) >= _WINDOW:
         windows = np.lib.stride_tricks.sliding_window_view(size, _WINDOW)
-        smooth[half:-half] = np.partition(windows, half, axis=1)[:, half]
+        for low in range(0, len(windows), _BLOCK):
+            some = windows[low : low + _BLOCK]
+            smooth[half + low : half + low + len(some)] = np.partition(some, half, axis=1)[:, half]
     edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
     for low, high in itertools.pairwise(edges.tolist()):
         if high - low < _WINDOW:
@@ -136,6 +136,14 @@ def _interior(recording: Indices, frequency: Floats) -> Indices:
     same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
     apart = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
     return inner[same & apart & (frequency[inner - 1] > 0)]
+
+
+def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Indices, Floats, Floats]:
+    """The rows j with two neighbours, λ and |e_j|²/2 of each."""
+    middle = _interior(recording, frequency)
+    log_f = np.log(frequency)
+    share = (log_f[middle + 1] - log_f[middle]) / (log_f[middle + 1] - log_f[middle - 1])
+    return middle, share, np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
 
 
 def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:

@@ -104,8 +104,8 @@ class Thinned:
         variance = np.zeros(len(prediction.value))
         if self.lines.smooth is not None:
             variance += (levels.smooth * self.lines.smooth.scale) ** 2
-        if prediction.position_slopes is not None:
-            variance += levels.position**2 * (np.abs(prediction.position_slopes) ** 2).sum(axis=0)
+        placed = (explanation.best.relative_place_slopes**2).sum(axis=0)[explanation.best.hypothesis.lines.recording]
+        variance += levels.position**2 * placed * np.abs(prediction.value) ** 2
         variance += explanation.best.pickup_variance
         return variance if len(variance) == len(self.lines.value) else variance[self.lines.recording]
 

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from underskin.diagnosis.data.axes import recording_axes
-from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
 from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features, normalised
+from underskin.mechanisms.models.frf import FAINT
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats, Indices, Mask
@@ -27,7 +27,8 @@ _USUAL_GAIN = 3  # of these
 _GONE = 60.0  # nats behind the best node, which a process of few features cannot lose there
 _USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
-_FAINT = 1e-12  # of the largest response, below which a recording has no direction
+_BLOCK = 64  # sets of features worked on at once
+_FEW = 3  # features, up to which products of their pairs are fewer than copies of them weighed for each scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ class GainResidual:
         self._best, parameters = explanation.best, explanation.model.parameters
         best = self._best
         size, _, _ = best.marginal.along(best.levels.position)
-        self._least = _FAINT * np.abs(size).max()
+        self._least = FAINT * np.abs(size).max()
         slopes = best.marginal.slopes_along / self._not_faint(size)[:, None]
         centre = np.array([entry.start for entry in parameters]) - best.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
@@ -121,7 +122,7 @@ class GainResidual:
         sensors = np.eye(int(problem.lines.sensor.max()) + 1)[problem.lines.sensor]
         sensors = sensors[:, sensors.any(axis=0)]
         self.fixed = np.concatenate([slopes * scale, best.levels.spread * sensors], axis=1)
-        self._moving = relative_place_slopes(best)
+        self._moving = best.relative_place_slopes
         self.usual = self._scatters(_USUAL_POSITION)
 
     def _not_faint(self, size: Floats) -> Floats:
@@ -170,16 +171,26 @@ class GainResidual:
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
         without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
-        each = np.concatenate([_with(sets, amplitudes, entry) for entry in without])
-        return np.asarray(logsumexp(each, axis=0) - self._plain)
+        each = [np.concatenate([_with(some, amplitudes, entry) for entry in without]) for some in _blocks(sets)]
+        return np.asarray(logsumexp(np.concatenate(each, axis=1), axis=0) - self._plain)
 
     def amplitudes(self, sets: Floats) -> Floats:
         """The most probable amplitudes of features whose prior sd is 1, at a usual scatter (sets, features)."""
-        root, taken, weighed = (values[0] for values in (self._still.root, self._still.taken, self._still.weighed))
-        reduced = np.einsum("cr,srf->scf", taken, sets)
-        gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
-        gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
-        return np.asarray(np.linalg.solve(gram, np.einsum("srf,r->sf", sets, weighed)[..., None])[..., 0])
+        return np.concatenate([_most_probable(some, self._still) for some in _blocks(sets)])
+
+
+def _blocks(sets: Floats) -> list[Floats]:
+    """So few sets at a time that what is worked out from them stays in the processor's cache."""
+    return [sets[start : start + _BLOCK] for start in range(0, len(sets), _BLOCK)]
+
+
+def _most_probable(sets: Floats, without: _WithoutProcess) -> Floats:
+    """The most probable amplitudes of features at one scatter (sets, features)."""
+    root, taken, weighed = (values[0] for values in (without.root, without.taken, without.weighed))
+    reduced = np.einsum("cr,srf->scf", taken, sets)
+    gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
+    gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
+    return np.asarray(np.linalg.solve(gram, np.einsum("srf,r->sf", sets, weighed)[..., None])[..., 0])
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
@@ -188,7 +199,7 @@ def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
 
     count, rows, size = sets.shape
     columns = sets.transpose(1, 0, 2).reshape(rows, -1)
-    gram = _grams(columns * without.root[:, :, None], count) - _grams(without.taken @ columns, count)
+    gram = _weighed_grams(columns, count, without.root) - _grams(without.taken @ columns, count)
     moment = (without.weighed @ columns).reshape(-1, count, size).swapaxes(0, 1)
     each = np.empty((count * len(without.root), len(amplitudes)))
     gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment).reshape(-1, size), amplitudes, each)
@@ -202,13 +213,17 @@ def _grams(columns: Floats, count: int) -> Floats:
     return np.asarray(blocks @ blocks.swapaxes(-1, -2))
 
 
-def relative_place_slopes(best: Evidence) -> Floats:
-    """∇m/m of each recording over its contact's place [1/m] (2, recordings)."""
-    response = best.hypothesis.frf_model.respond(best.point.fit, slopes=False, place=True)
-    assert response.place_slopes is not None
-    value = response.level.value
-    answers = np.abs(value) > _FAINT * np.abs(value).max()
-    return np.asarray(response.place_slopes / np.where(answers, value, np.inf))
+def _weighed_grams(columns: Floats, count: int, root: Floats) -> Floats:
+    """The same of columns (rows, columns) whose rows weigh root² (gains, rows)."""
+    size = columns.shape[1] // count
+    if size > _FEW:
+        return _grams(columns * root[:, :, None], count)
+    one, other = np.triu_indices(size)
+    blocks = columns.reshape(len(columns), count, size)
+    products = root**2 @ (blocks[..., one] * blocks[..., other]).reshape(len(columns), -1)
+    grams = np.empty((count, len(root), size, size))
+    grams[..., one, other] = grams[..., other, one] = products.reshape(len(root), count, -1).swapaxes(0, 1)
+    return grams
 
 
 def _shares(positions: Floats) -> dict[float, float]:

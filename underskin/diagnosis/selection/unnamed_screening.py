@@ -5,9 +5,10 @@ linear algebra under the noise, no fit. A law that acts on whole recordings is w
 one that acts along frequency on what lines lie off their own recording's best real multiple (residuals.py).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from underskin.mechanisms.unnamed.grammar import Grammar
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.units import Array, Floats, Indices
 
+Law = TypeVar("Law", bound=UnnamedLaw)
 _USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 
 
@@ -48,23 +50,12 @@ class Screening:
     """The laws of a campaign, and the change that each would make by a small amplitude; the same for every score."""
 
     def __init__(self, problem: FittingProblem, grammar: Grammar) -> None:
-        """Differentiate the laws at amplitudes of 0."""
+        """Of all laws of the grammar."""
         self._problem, self._grammar = problem, grammar
         self._ids = tuple(entry.id for entry in problem.collapsed.campaign.recordings)
         self._features: dict[tuple[Axis, Shape], Floats] = {}
-        sensitivity: dict[str, Floats] = {}
 
-        def change(law: UnnamedLaw) -> Array:
-            assert isinstance(law, RecordingLaw)
-            acts_on = law.spoken.acts_on
-            if acts_on not in sensitivity:
-                sensitivity[acts_on] = law.sensitivity(self._ids)
-            features = self._features_of(law)
-            return np.concatenate([features * column[:, None] for column in sensitivity[acts_on].T], axis=2)
-
-        self._of_recordings = _Columns.of(self._some(RecordingLaw), change)
-
-    def _some(self, kind: type[UnnamedLaw]) -> list[tuple[int, UnnamedLaw]]:
+    def _some(self, kind: type[Law]) -> list[tuple[int, Law]]:
         return [(place, law) for place, law in enumerate(self._grammar.laws) if isinstance(law, kind)]
 
     def _features_of(self, law: RecordingLaw | LagLaw) -> Floats:
@@ -82,15 +73,27 @@ class Screening:
 
     def scores(self, explanation: Explanation) -> list[Score]:
         """Of every law, the grid of what bends it averaged."""
-        each: list[Score] = []
+        return [*self._along_recordings(explanation), *self._along_lines(explanation)]
+
+    def _along_recordings(self, explanation: Explanation) -> Iterator[Score]:
         residual = GainResidual(self._problem, explanation)
-        for columns in self._of_recordings:
-            gains = residual.gains(columns.changes.real, _USUAL_CHANGE)
-            amplitudes = residual.amplitudes(columns.changes.real)
-            each += self._collected(columns, gains, amplitudes)
-        for columns, gains, amplitudes in self._along_lines(explanation):
-            each += self._collected(columns, gains, amplitudes)
-        return each
+        for acts_on in self._sensitivity:
+            laws = [(place, law) for place, law in self._some(RecordingLaw) if law.spoken.acts_on == acts_on]
+            for columns in _Columns.of(laws, self._changes):
+                changes = columns.changes.real
+                gains, amplitudes = residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes)
+                yield from self._collected(columns, gains, amplitudes)
+
+    @cached_property
+    def _sensitivity(self) -> dict[str, Floats]:
+        """∂ ln level by the features of laws that act on this (recordings, 1 or 2)."""
+        laws = {law.spoken.acts_on: law for _, law in self._some(RecordingLaw)}
+        return {acts_on: law.sensitivity(self._ids) for acts_on, law in laws.items()}
+
+    def _changes(self, laws: Sequence[RecordingLaw]) -> Floats:
+        features = np.concatenate([self._features_of(law) for law in laws])
+        columns = self._sensitivity[laws[0].spoken.acts_on].T
+        return np.concatenate([features * column[:, None] for column in columns], axis=2)
 
     def _collected(self, columns: "_Columns", gains: Floats, amplitudes: Floats) -> list[Score]:
         first, counts = columns.first[:-1], np.diff(columns.first)
@@ -104,55 +107,35 @@ class Screening:
             )
         return scores
 
-    @cached_property
-    def _over_frequency(self) -> list["_Columns"]:
-        frequency = self._distinct[0]
+    def _tangents(self, laws: Sequence[FrequencyLaw]) -> Array:
+        return np.concatenate([law.tangents(self._distinct[0]) for law in laws])
 
-        def change(law: UnnamedLaw) -> Array:
-            assert isinstance(law, FrequencyLaw)
-            return law.tangents(frequency)
-
-        return _Columns.of(self._some(FrequencyLaw), change)
-
-    @cached_property
-    def _lags(self) -> list["_Columns"]:
+    def _lags(self, laws: Sequence[LagLaw]) -> Floats:
         """Features of the recordings; what they make of lines depends on the kind of lag."""
-
-        def change(law: UnnamedLaw) -> Array:
-            assert isinstance(law, LagLaw)
+        each = []
+        for law in laws:
             features = self._features_of(law)
-            return np.exp(law.grid[:, :, None] * features) if law.shape.logarithmic else features
-
-        return _Columns.of(self._some(LagLaw), change)
+            each.append(np.exp(law.grid[:, :, None] * features) if law.shape.logarithmic else features)
+        return np.concatenate(each)
 
     @cached_property
     def _distinct(self) -> tuple[Floats, Indices]:
         frequency, line = np.unique(self._problem.lines.frequency, return_inverse=True)
         return frequency, line
 
-    def _along_lines(self, explanation: Explanation) -> list[tuple["_Columns", Floats, Floats]]:
-        lines = self._problem.lines
-        frequency, line = self._distinct
+    def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
+        frequency = self._distinct[0]
         if len(frequency) < 2:
-            return []
-        relative, weight = line_residuals(self._problem, explanation)
-        size = lines.recordings, len(frequency)
-        place = lines.recording * len(frequency) + line
-        weights = np.bincount(place, weight, size[0] * size[1]).reshape(size)
-        moments = (
-            np.bincount(place, weight * relative.real, size[0] * size[1])
-            + 1j * np.bincount(place, weight * relative.imag, size[0] * size[1])
-        ).reshape(size)
-        noise = _Levels(float((weight * np.abs(relative) ** 2).sum()), 2 * len(relative) - lines.recordings)
-        found = []
+            return
+        weights, moments, noise = self._moments(explanation)
         total, moment, own = weights.sum(axis=0), moments.sum(axis=0), weights.sum(axis=1)
-        for columns in self._over_frequency:
+        for columns in _Columns.of(self._some(FrequencyLaw), self._tangents):
             changes = columns.changes.transpose(0, 2, 1)  # (points, features, frequencies)
             gram = np.einsum("pif,f,pjf->pij", changes.conj(), total, changes, optimize=True).real
             means = changes.real @ weights.T  # (points, features, recordings)
             gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
             along = (changes.conj() @ moment).real
-            found.append((columns, *noise.gains(gram, along)))
+            yield from self._collected(columns, *noise.gains(gram, along))
         sums: dict[str, tuple[Floats, Floats]] = {}  # of each kind of lag, by recording
         for _, law in self._some(LagLaw):
             assert isinstance(law, LagLaw)
@@ -160,7 +143,7 @@ class Screening:
                 pattern = law.pattern(frequency)
                 spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own
                 sums[law.kind] = spread, (moments @ pattern.conj()).real
-        for columns in self._lags:
+        for columns in _Columns.of(self._some(LagLaw), self._lags):
             kinds = np.array(
                 [law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)]
             )
@@ -175,8 +158,20 @@ class Screening:
                     gram[own, :, 0] = turned**2 @ gram_of
                 else:
                     gram[own] = (turned * gram_of) @ changes
-            found.append((columns, *noise.gains(gram, along)))
-        return found
+            yield from self._collected(columns, *noise.gains(gram, along))
+
+    def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_Levels"]:
+        """Of lines by recording and distinct frequency: the weights, the residuals times them, and their χ²."""
+        lines, (frequency, line) = self._problem.lines, self._distinct
+        relative, weight = line_residuals(self._problem, explanation)
+        size = lines.recordings, len(frequency)
+        place = lines.recording * len(frequency) + line
+        weights, real, imag = (
+            np.asarray(np.bincount(place, values, size[0] * size[1]), dtype=float).reshape(size)
+            for values in (weight, weight * relative.real, weight * relative.imag)
+        )
+        chi2 = float((weight * np.abs(relative) ** 2).sum())
+        return weights, real + 1j * imag, _Levels(chi2, 2 * len(relative) - lines.recordings)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,30 +189,22 @@ class _Columns:
     grid: Floats
 
     @classmethod
-    def of(cls, laws: Sequence[tuple[int, UnnamedLaw]], change: Callable[[UnnamedLaw], Array]) -> list["_Columns"]:
-        """`change` by the amplitudes of one law (points, rows, amplitudes)."""
-        groups: dict[int, list[tuple[int, UnnamedLaw]]] = {}
+    def of(cls, laws: Sequence[tuple[int, Law]], changes: Callable[[Sequence[Law]], Array]) -> Iterator["_Columns"]:
+        """Group by group, since all together take much memory; `changes` are by the amplitudes of some laws (points,
+        rows, amplitudes)."""
+        groups: dict[int, list[tuple[int, Law]]] = {}
         for place, law in laws:
             groups.setdefault(len(law.amplitudes), []).append((place, law))
-        each = []
         for members in groups.values():
-            changes = [change(law) * _sds(law) for _, law in members]
-            counts = [len(entry) for entry in changes]
-            widest = max((law.grid.shape[1] for _, law in members), default=0)
-            grid = np.zeros((sum(counts), widest))
+            places = [place for place, _ in members]
+            counts = [len(law.grid) for _, law in members]
             edges = np.cumsum([0, *counts])
+            grid = np.zeros((edges[-1], max(law.grid.shape[1] for _, law in members)))
             for (_, law), start, end in zip(members, edges[:-1], edges[1:], strict=True):
                 grid[start:end, : law.grid.shape[1]] = law.grid
-            each.append(
-                cls(
-                    [place for place, _ in members],
-                    edges,
-                    np.repeat([place for place, _ in members], counts),
-                    np.concatenate(changes),
-                    grid,
-                )
-            )
-        return each
+            scale = np.repeat([_sds(law) for _, law in members], counts, axis=0)
+            each = changes([law for _, law in members]) * scale[:, None, :]
+            yield cls(places, edges, np.repeat(places, counts), each, grid)
 
 
 def _at(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:

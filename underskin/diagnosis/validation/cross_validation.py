@@ -166,11 +166,12 @@ def _predict(smaller: FittingProblem, explanation: Explanation, problem: Fitting
     left = problem.lines if rows.all() else problem.lines.part(rows)
     model = problem.hypothesis(explanation.names, placed=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
-    whole = model.predict(point.fit, slopes=False) if isinstance(model, FrfModel) else model.predict(point.fit)
-    if left.curves:
+    if not isinstance(model, FrfModel):
+        whole = model.predict(point.fit)
         slopes = whole.slopes[explanation.best.hypothesis.mean_places][:, rows]
         unsure = float(np.einsum("ir,ij,jr->", slopes, explanation.best.covariance, slopes))
         return replace(_predict_curves(problem.lines, levels, whole.value.real, rows, smaller), unsure=unsure)
+    whole = model.predict(point.fit, slopes=False, place=False)
     seen = np.isin(left.sensor, smaller.lines.sensor)
     gains = np.zeros(max(int(left.sensor.max()), int(smaller.lines.sensor.max())) + 1)
     fitted_gains = explanation.best.sensor_gains
@@ -181,9 +182,9 @@ def _predict(smaller: FittingProblem, explanation: Explanation, problem: Fitting
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
     noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    if whole.position_slopes is not None:
-        noise = noise + p2 * (np.abs(whole.position_slopes[:, rows]) ** 2).sum(axis=0)
-        noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
+    placed = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
+    noise = noise + placed[recording] * np.abs(whole.value[rows]) ** 2
+    noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
     pickup_noise = 2 * whole.pickup_variance[rows]
     noise = noise + pickup_noise
     square = np.abs(left.value - value) ** 2

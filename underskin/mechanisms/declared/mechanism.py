@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from underskin.mechanisms.unnamed.vocabulary import ActsOn
 from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
+from underskin.weak_cache import cached_while_alive
 
 FREQUENCY = "frequency_hz"
 
@@ -38,7 +38,7 @@ class Bound:
         return cls(axes, LevelTables(conditions, table, ()))
 
 
-@lru_cache(maxsize=8)  # by the conditions' identity
+@cached_while_alive
 def _bound(conditions: Conditions) -> Bound:
     return Bound.to(conditions, load_table())
 

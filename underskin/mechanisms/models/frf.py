@@ -8,7 +8,7 @@ sensor under its own stress → neighbours' charge → ageing → dynamics of ti
 Pick-up stands beside, as a covariance.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices, Mask, to_si
 
 _NUISANCE_STRETCH = 1.06  # the thickness' bounds
+FAINT = 1e-12  # of the largest response, below which a recording has no direction
 _QUANTITIES = 6  # of a linear layer's contact
 
 
@@ -70,15 +71,16 @@ class FrfModel:
         pickups = [mechanism.pickup(conditions, design) for mechanism in self.mechanisms]
         self.pickup: Pickup | None = together([pickup for pickup in pickups if pickup is not None])
         self.force, self.increments = _force_nodes(self.mechanisms, design)
-        self._table = table
+        self._table, self._conditions = table, conditions
 
     @cached_property
     def valid(self) -> Mask:
         """Which rows lie inside the table as declared."""
         return self._declared_inside(self._table)[self.design.point][self.recording]
 
-    def predict(self, fit: Floats, *, slopes: bool = True) -> Prediction:
-        """The FRF on every row with its derivatives, those by the parameters on request.
+    def predict(self, fit: Floats, *, slopes: bool = True, place: bool = True) -> Prediction:
+        """The FRF on every row with its derivatives on request: `slopes` by the parameters, `place` by the contact's x
+        and y.
 
         Parameters
         ----------
@@ -99,22 +101,31 @@ class FrfModel:
         if fit.ndim != 1:
             raise InvalidInput("fit", fit.shape, "must be one point: (parameters,)", code=ErrorCode.UNEQUAL_LENGTHS)
         own, _, _ = self._composition.values(fit)
-        response = self.respond(fit, slopes=slopes, place=True)
+        response = self.respond(fit, slopes=slopes, place=place)
         value, by_all = response.on_rows(self.design)
         count = len(response.level.slopes)
         return Prediction(
             value=value,
             slopes=by_all[:count],
-            position_slopes=by_all[count:],
+            position_slopes=by_all[count:] if place else None,
             pickup=None if self.pickup is None else self.pickup.on_rows(self.pickup.deviation(_by_name(own))),
             pickup_rows=None if self.pickup is None else self.pickup.rows,
             inside=response.inside[self.recording],
         )
 
-    def values(self, fit: Floats) -> Array:
-        """The FRF (points, rows) at points (points, parameters), without derivatives."""
+    def relative_place_slopes(self, fit: Floats) -> Floats:
+        """∇m/m of each recording over its contact's place [1/m] (2, recordings) at one point; 0 of what is faint."""
+        response = self.respond(fit, slopes=False, place=True)
+        assert response.place_slopes is not None
+        value = response.level.value
+        answers = np.abs(value) > FAINT * np.abs(value).max()
+        return np.asarray(response.place_slopes / np.where(answers, value, np.inf))
+
+    def values(self, fit: Floats) -> Iterator[Array]:
+        """The FRF (rows,) at each of several points (points, parameters), without derivatives."""
         response = self.respond(fit, slopes=False)
-        return np.stack([response.part(point).on_rows(self.design)[0] for point in range(len(fit))])
+        for point in range(len(fit)):
+            yield response.part(point).on_rows(self.design)[0]
 
     def numbers(self, variables: int) -> int:
         """How many numbers the largest arrays of a response with derivatives by so many variables take, roughly: bounds

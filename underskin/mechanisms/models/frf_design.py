@@ -4,6 +4,7 @@ Recordings share contacts (sphere, preload and what else a mechanism asks for), 
 are points, and a contact at one frequency is a line. Only these distinct ones are computed.
 """
 
+import weakref
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -25,7 +26,7 @@ class FrfDesign:
         """`fields` may name what else tells contacts apart: "dwell_s", "dynamic_force_n", "id" (every recording)."""
         recordings = frf_of(conditions)
         count = len(recordings)
-        self.conditions = conditions
+        self._conditions = weakref.ref(conditions)  # which keep the design in a cache
         self.ids = tuple(entry.id for entry in recordings)
         number = {sensor.id: index for index, sensor in enumerate(conditions.skin.sensors)}
         places = to_si("thickness_mm", [(sensor.x_mm, sensor.y_mm) for sensor in conditions.skin.sensors])
@@ -59,8 +60,7 @@ class FrfDesign:
         # Of each row, and of each distinct line
         lines_hz = [frequencies(entry) for entry in recordings]
         self.recording: Indices = np.repeat(np.arange(count), [len(column) for column in lines_hz])
-        self.row_frequency = np.concatenate(lines_hz)
-        self.row_dynamic_force: Floats = np.array([entry.dynamic_force_n for entry in recordings])[self.recording]
+        self._dynamic_forces = np.array([entry.dynamic_force_n for entry in recordings])
         distinct, frequency = _distinct(lines_hz)
         self.line: Indices
         own_line = contact[self.recording] * len(distinct) + frequency
@@ -72,6 +72,23 @@ class FrfDesign:
             lines = np.flatnonzero(measured)
             self.line = (np.cumsum(measured) - 1)[own_line]
         self.line_contact, self.line_frequency = lines // len(distinct), distinct[lines % len(distinct)]
+
+    @property
+    def row_frequency(self) -> Floats:
+        """Of each row [Hz]."""
+        return self.line_frequency[self.line]
+
+    @property
+    def row_dynamic_force(self) -> Floats:
+        """Of each row [N]."""
+        return self._dynamic_forces[self.recording]
+
+    @property
+    def conditions(self) -> Conditions:
+        """Those that it was worked out from, which a model of them holds."""
+        conditions = self._conditions()
+        assert conditions is not None
+        return conditions
 
 
 _kept = cached_while_alive(FrfDesign)  # a diagnosis composes dozens of models of one campaign

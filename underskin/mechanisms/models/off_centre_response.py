@@ -49,12 +49,15 @@ class OffsetSigma:
         for axis, basis in enumerate(self.bases):
             values = basis.coefficients(values, axis)
         self._table = np.ascontiguousarray(values)
-        # The first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1.
-        self._strained = np.ascontiguousarray(values - values[:, :1])
         self._ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
         self._ends[3, 1] = self.end
         self._axes = [part for basis in self.bases for part in (basis.knots, basis.cubics)]
         self._turns = float(offsets[-1] + rho[-1] + a[-1])
+
+    @cached_property
+    def _strained(self) -> Floats:
+        """What finite strain adds: the first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1."""
+        return np.ascontiguousarray(self._table - self._table[:, :1])
 
     @cached_property
     def _wavenumbers(self) -> tuple[Floats, Floats]:
