@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline, NdBSpline, make_interp_spline
+from scipy.interpolate import NdBSpline, make_interp_spline
 
 from underskin.autodiff import contiguous
 from underskin.physics.charge_response import Sigma
@@ -39,6 +39,8 @@ class SigmaTable(Table):
         self.fem_linear_error = data["sigma/fem_linear_error"]
         self._profile_axes = (data["profile/a_over_h"], data["profile/r_over_h"], self.axes[2])
         self._profile = _spline(self._profile_axes, data["profile/profile"])
+        by_radius = np.moveaxis(data["profile/profile"], 1, 0)
+        self._over_radius = make_interp_spline(self._profile_axes[1], by_radius, k=3)
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
@@ -161,13 +163,14 @@ class SigmaTable(Table):
         points, inside, shape = _points(self._profile_axes, a_over_h, r_over_h, load_parameter)
         return np.where(inside, self._profile(points), np.nan).reshape(shape)
 
-    def profile_over(self, r_over_h: Floats, a_over_h: Floats, cbrt_load: Floats) -> Floats:
-        """The same over a grid of these axes inside the domain, (r, a, L^(1/3))."""
-        values = self._profile.c
-        for axis, (knots, nodes) in enumerate(zip(self._profile.t, (a_over_h, r_over_h, cbrt_load), strict=True)):
-            at_nodes = BSpline.design_matrix(nodes, knots, 3).toarray()
-            values = np.moveaxis(np.tensordot(at_nodes, values, (1, axis)), 0, axis)
-        return values.transpose(1, 0, 2)
+    def profile_over(self, r_over_h: Floats) -> Floats:
+        """The same at distances inside the domain (r,), for all contacts of `contact_axes`: (r, a, L^(1/3))."""
+        return np.asarray(self._over_radius(r_over_h))
+
+    @property
+    def contact_axes(self) -> tuple[Floats, Floats]:
+        """a/h and L^(1/3) of the contacts whose profiles the table holds."""
+        return self._profile_axes[0], self._profile_axes[2]
 
 
 def tables_folder() -> Path:

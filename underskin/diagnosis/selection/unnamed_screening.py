@@ -8,7 +8,7 @@ one that acts along frequency on what lines lie off their own recording's best r
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -46,23 +46,113 @@ class Score:
         return np.concatenate([self.amplitudes * _sds(self.law), self.bending[:count]])
 
 
+@dataclass(frozen=True, eq=False)
+class _Group(Generic[Law]):
+    """Laws with equally many amplitudes that enter at one place.
+
+    `log_shares` of each; `first` point of each on the grid of what bends it, and one more; `grid` of each point; `scale`,
+    the sds of the amplitudes' priors at each (points, amplitudes).
+    """
+
+    laws: list[Law]
+    log_shares: list[float]
+    first: Indices
+    grid: Floats
+    scale: Floats
+
+    @classmethod
+    def of(cls, laws: Sequence[tuple[Law, float]], alike: Callable[[Law], str]) -> list["_Group[Law]"]:
+        """Laws with their log shares, by what they are `alike` in."""
+        groups: dict[tuple[str, int], list[tuple[Law, float]]] = {}
+        for law, log_share in laws:
+            groups.setdefault((alike(law), len(law.amplitudes)), []).append((law, log_share))
+        each = []
+        for members in groups.values():
+            own = [law for law, _ in members]
+            counts = [len(law.grid) for law in own]
+            first = np.cumsum([0, *counts])
+            grid = np.zeros((first[-1], max(law.grid.shape[1] for law in own)))
+            for law, start, end in zip(own, first[:-1], first[1:], strict=True):
+                grid[start:end, : law.grid.shape[1]] = law.grid
+            scale = np.repeat([_sds(law) for law in own], counts, axis=0)
+            each.append(cls(own, [log_share for _, log_share in members], first, grid, scale))
+        return each
+
+    def scores(self, gains: Floats, amplitudes: Floats) -> Iterator[Score]:
+        """From the gain at each point, and the most probable amplitudes there."""
+        means = np.logaddexp.reduceat(gains, self.first[:-1]) - np.log(np.diff(self.first))
+        for number, (law, gain, log_share) in enumerate(zip(self.laws, means.tolist(), self.log_shares, strict=True)):
+            start, end = self.first[number], self.first[number + 1]
+            best = int(start + np.argmax(gains[start:end]))
+            yield Score(law, gain, log_share, amplitudes[best], self.grid[best])
+
+
 class Screening:
     """The laws of a campaign, and the change that each would make by a small amplitude; the same for every score."""
 
     def __init__(self, problem: FittingProblem, grammar: Grammar) -> None:
         """Of all laws of the grammar."""
-        self._problem, self._grammar = problem, grammar
+        self._problem = problem
         self._ids = tuple(entry.id for entry in problem.collapsed.campaign.recordings)
+        self._frequency, self._line = np.unique(problem.lines.frequency, return_inverse=True)
         self._features: dict[tuple[Axis, Shape], Floats] = {}
 
-    def _some(self, kind: type[Law]) -> list[tuple[int, Law]]:
-        return [(place, law) for place, law in enumerate(self._grammar.laws) if isinstance(law, kind)]
+        def some(kind: type[Law]) -> list[tuple[Law, float]]:
+            laws = zip(grammar.laws, grammar.log_shares.tolist(), strict=True)
+            return [(law, log_share) for law, log_share in laws if isinstance(law, kind)]
+
+        self._of_recordings = _Group.of(some(RecordingLaw), lambda law: law.spoken.acts_on)
+        self._over_frequency = _Group.of(some(FrequencyLaw), lambda _: "")
+        self._lags = _Group.of(some(LagLaw), lambda law: law.kind)
+
+    def scores(self, explanation: Explanation) -> list[Score]:
+        """Of every law, the grid of what bends it averaged."""
+        along_lines = self._along_lines(explanation) if len(self._frequency) > 1 else ()
+        return [*self._along_recordings(explanation), *along_lines]
+
+    def _along_recordings(self, explanation: Explanation) -> Iterator[Score]:
+        residual = GainResidual(self._problem, explanation)
+        for group in self._of_recordings:
+            features = np.concatenate([self._features_of(law) for law in group.laws])
+            columns = self._sensitivity[group.laws[0].spoken.acts_on].T
+            changes = np.concatenate([features * column[:, None] for column in columns], axis=2)
+            changes *= group.scale[:, None]
+            yield from group.scores(residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes))
+
+    def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
+        weights, moments, noise = self._moments(explanation)
+        total, moment, own = weights.sum(axis=0), moments.sum(axis=0), weights.sum(axis=1)
+        for group in self._over_frequency:
+            tangents = np.concatenate([law.tangents(self._frequency) for law in group.laws]) * group.scale[:, None]
+            changes = tangents.transpose(0, 2, 1)  # (points, features, frequencies)
+            gram = np.einsum("pif,f,pjf->pij", changes.conj(), total, changes, optimize=True).real
+            means = changes.real @ weights.T  # (points, features, recordings)
+            gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
+            yield from group.scores(*noise.gains(gram, (changes.conj() @ moment).real))
+        for lags in self._lags:
+            pattern = lags.laws[0].pattern(self._frequency)
+            spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own  # by recording
+            lag = np.concatenate([self._lag(law) for law in lags.laws]) * lags.scale[:, None]
+            turned = lag.transpose(0, 2, 1)
+            gram = (turned * spread) @ lag if lag.shape[2] > 1 else (turned**2 @ spread)[:, None]
+            yield from lags.scores(*noise.gains(gram, turned @ (moments @ pattern.conj()).real))
+
+    @cached_property
+    def _sensitivity(self) -> dict[str, Floats]:
+        """∂ ln level by the features of laws that act on this (recordings, 1 or 2)."""
+        laws = {law.spoken.acts_on: law for group in self._of_recordings for law in group.laws[:1]}
+        return {acts_on: law.sensitivity(self._ids) for acts_on, law in laws.items()}
+
+    def _lag(self, law: LagLaw) -> Floats:
+        """Features of the recordings; what they make of lines depends on the kind of lag."""
+        features = self._features_of(law)
+        return np.exp(law.grid[:, :, None] * features) if law.shape.logarithmic else features
 
     def _features_of(self, law: RecordingLaw | LagLaw) -> Floats:
         """Of its form over its axis (points, recordings, features)."""
         key = law.axis, law.shape
         if key not in self._features:
-            grid = np.array(law.shape.grid, dtype=float).reshape(len(law.shape.grid), -1)
+            grid = law.shape.points
             values = _at(law.shape.bending, grid)
             each = [
                 np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
@@ -71,140 +161,18 @@ class Screening:
             self._features[key] = np.stack(each, axis=2)
         return self._features[key]
 
-    def scores(self, explanation: Explanation) -> list[Score]:
-        """Of every law, the grid of what bends it averaged."""
-        return [*self._along_recordings(explanation), *self._along_lines(explanation)]
-
-    def _along_recordings(self, explanation: Explanation) -> Iterator[Score]:
-        residual = GainResidual(self._problem, explanation)
-        for acts_on in self._sensitivity:
-            laws = [(place, law) for place, law in self._some(RecordingLaw) if law.spoken.acts_on == acts_on]
-            for columns in _Columns.of(laws, self._changes):
-                changes = columns.changes.real
-                gains, amplitudes = residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes)
-                yield from self._collected(columns, gains, amplitudes)
-
-    @cached_property
-    def _sensitivity(self) -> dict[str, Floats]:
-        """∂ ln level by the features of laws that act on this (recordings, 1 or 2)."""
-        laws = {law.spoken.acts_on: law for _, law in self._some(RecordingLaw)}
-        return {acts_on: law.sensitivity(self._ids) for acts_on, law in laws.items()}
-
-    def _changes(self, laws: Sequence[RecordingLaw]) -> Floats:
-        features = np.concatenate([self._features_of(law) for law in laws])
-        columns = self._sensitivity[laws[0].spoken.acts_on].T
-        return np.concatenate([features * column[:, None] for column in columns], axis=2)
-
-    def _collected(self, columns: "_Columns", gains: Floats, amplitudes: Floats) -> list[Score]:
-        first, counts = columns.first[:-1], np.diff(columns.first)
-        means = np.logaddexp.reduceat(gains, first) - np.log(counts)
-        scores = []
-        for number, (place, gain) in enumerate(zip(columns.laws, means.tolist(), strict=True)):
-            law, start = self._grammar.laws[place], int(first[number])
-            best = start + int(np.argmax(gains[start : start + counts[number]]))
-            scores.append(
-                Score(law, gain, float(self._grammar.log_shares[place]), amplitudes[best], columns.grid[best])
-            )
-        return scores
-
-    def _tangents(self, laws: Sequence[FrequencyLaw]) -> Array:
-        return np.concatenate([law.tangents(self._distinct[0]) for law in laws])
-
-    def _lags(self, laws: Sequence[LagLaw]) -> Floats:
-        """Features of the recordings; what they make of lines depends on the kind of lag."""
-        each = []
-        for law in laws:
-            features = self._features_of(law)
-            each.append(np.exp(law.grid[:, :, None] * features) if law.shape.logarithmic else features)
-        return np.concatenate(each)
-
-    @cached_property
-    def _distinct(self) -> tuple[Floats, Indices]:
-        frequency, line = np.unique(self._problem.lines.frequency, return_inverse=True)
-        return frequency, line
-
-    def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
-        frequency = self._distinct[0]
-        if len(frequency) < 2:
-            return
-        weights, moments, noise = self._moments(explanation)
-        total, moment, own = weights.sum(axis=0), moments.sum(axis=0), weights.sum(axis=1)
-        for columns in _Columns.of(self._some(FrequencyLaw), self._tangents):
-            changes = columns.changes.transpose(0, 2, 1)  # (points, features, frequencies)
-            gram = np.einsum("pif,f,pjf->pij", changes.conj(), total, changes, optimize=True).real
-            means = changes.real @ weights.T  # (points, features, recordings)
-            gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
-            along = (changes.conj() @ moment).real
-            yield from self._collected(columns, *noise.gains(gram, along))
-        sums: dict[str, tuple[Floats, Floats]] = {}  # of each kind of lag, by recording
-        for _, law in self._some(LagLaw):
-            assert isinstance(law, LagLaw)
-            if law.kind not in sums:
-                pattern = law.pattern(frequency)
-                spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own
-                sums[law.kind] = spread, (moments @ pattern.conj()).real
-        for columns in _Columns.of(self._some(LagLaw), self._lags):
-            kinds = np.array(
-                [law.kind for law in (self._grammar.laws[place] for place in columns.owner) if isinstance(law, LagLaw)]
-            )
-            count = columns.changes.shape[2]
-            gram, along = np.empty((len(kinds), count, count)), np.empty((len(kinds), count))
-            for kind, (gram_of, along_of) in sums.items():
-                own = kinds == kind
-                changes = columns.changes[own].real
-                turned = changes.transpose(0, 2, 1)
-                along[own] = turned @ along_of
-                if count == 1:
-                    gram[own, :, 0] = turned**2 @ gram_of
-                else:
-                    gram[own] = (turned * gram_of) @ changes
-            yield from self._collected(columns, *noise.gains(gram, along))
-
     def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_Levels"]:
         """Of lines by recording and distinct frequency: the weights, the residuals times them, and their χ²."""
-        lines, (frequency, line) = self._problem.lines, self._distinct
+        lines = self._problem.lines
         relative, weight = line_residuals(self._problem, explanation)
-        size = lines.recordings, len(frequency)
-        place = lines.recording * len(frequency) + line
+        size = lines.recordings, len(self._frequency)
+        place = lines.recording * size[1] + self._line
         weights, real, imag = (
             np.asarray(np.bincount(place, values, size[0] * size[1]), dtype=float).reshape(size)
             for values in (weight, weight * relative.real, weight * relative.imag)
         )
         chi2 = float((weight * np.abs(relative) ** 2).sum())
         return weights, real + 1j * imag, _Levels(chi2, 2 * len(relative) - lines.recordings)
-
-
-@dataclass(frozen=True, eq=False)
-class _Columns:
-    """Changes by the amplitudes, times the sd of their priors, of laws with equally many (points, rows, amplitudes).
-
-    `laws`: their places in the grammar; `first` point of each, and one more; `owner` of each point; `grid` of each,
-    what bends it.
-    """
-
-    laws: list[int]
-    first: Indices
-    owner: Indices
-    changes: Array
-    grid: Floats
-
-    @classmethod
-    def of(cls, laws: Sequence[tuple[int, Law]], changes: Callable[[Sequence[Law]], Array]) -> Iterator["_Columns"]:
-        """Group by group, since all together take much memory; `changes` are by the amplitudes of some laws (points,
-        rows, amplitudes)."""
-        groups: dict[int, list[tuple[int, Law]]] = {}
-        for place, law in laws:
-            groups.setdefault(len(law.amplitudes), []).append((place, law))
-        for members in groups.values():
-            places = [place for place, _ in members]
-            counts = [len(law.grid) for _, law in members]
-            edges = np.cumsum([0, *counts])
-            grid = np.zeros((edges[-1], max(law.grid.shape[1] for _, law in members)))
-            for (_, law), start, end in zip(members, edges[:-1], edges[1:], strict=True):
-                grid[start:end, : law.grid.shape[1]] = law.grid
-            scale = np.repeat([_sds(law) for _, law in members], counts, axis=0)
-            each = changes([law for _, law in members]) * scale[:, None, :]
-            yield cls(places, edges, np.repeat(places, counts), each, grid)
 
 
 def _at(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:

@@ -40,8 +40,8 @@ class OffsetSigma:
         rho = rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
-        a, x = table.axes[0], table.axes[2]
-        profile = table.profile_over(radii, a, x)
+        a, x = table.contact_axes
+        profile = table.profile_over(radii)
         along = CubicBasis(radii)
         average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
         values: Floats = np.einsum("mer,rax->axme", average, profile, optimize=True)

@@ -7,6 +7,7 @@ own, since a fit does not move from one to the next.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import get_args
 
 import numpy as np
@@ -43,6 +44,11 @@ class Shape:
     grid: tuple[tuple[float, ...], ...] = ((),)  # their values that a screening tries
     logarithmic: bool = False  # the feature is that of the logarithm: a power
     needs_peak: bool = False
+
+    @cached_property
+    def points(self) -> Floats:
+        """The grid (points, parameters)."""
+        return np.array(self.grid, dtype=float).reshape(len(self.grid), -1)
 
 
 def shapes(axis: Axis) -> list[Shape]:

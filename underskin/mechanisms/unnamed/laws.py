@@ -34,6 +34,8 @@ _USUAL: dict[ActsOn, float] = {  # sd of the prior of a change, relative; of a p
 _REASON = "nothing is known of it; as large as what is usually left out"
 _LEAST = 0.1  # of a quantity, below which a change is continued so that it stays positive
 _MOST = 6.0  # standard deviations of the prior that bound an amplitude
+_EXPONENT = Parameter("law_exponent", "-", -4.0, 4.0, Normal(0.0, 1.5), "linear", None, _REASON)
+_EXPONENTS = np.array([[-2.0], [-1.0], [-0.5], [0.0], [0.5], [1.0], [2.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,18 +94,15 @@ class RecordingLaw(UnnamedLaw):
         self.share = shape.share
         self._acts_on, self.tables = acts_on, tables
         self._unit = _unit_of_change(acts_on)
-        scale = float(np.median(list(tables.force.values()))) if acts_on == "force" else 1.0
+        scale = tables.usual_force if acts_on == "force" else 1.0
         usual = _USUAL[acts_on] * scale
         count = shape.count * (2 if acts_on == "position" else 1)
         if shape.form == "free":
             usual = usual / 2
-        self.amplitudes = tuple(f"law_change_{number + 1}" if count > 1 else "law_change" for number in range(count))
-        changes = tuple(
-            Parameter(name, self._unit, -_MOST * usual, _MOST * usual, Normal(0.0, usual), "linear", 0.0, _REASON)
-            for name in self.amplitudes
-        )
+        changes = _amplitudes("law_change", self._unit, usual, count)
+        self.amplitudes = tuple(entry.name for entry in changes)
         self.parameters_bound = (*changes, *shape.bending)
-        self.grid = np.array(shape.grid, dtype=float).reshape(len(shape.grid), -1)
+        self.grid = shape.points
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
         """The same law on other recordings."""
@@ -182,6 +181,14 @@ def _summed(parts: Sequence[Differentiated]) -> Differentiated:
     return total
 
 
+@lru_cache(maxsize=64)
+def _amplitudes(name: str, unit: str, usual: float, count: int) -> tuple[Parameter, ...]:
+    """So many changes, each as large as usual."""
+    names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
+    prior = Normal(0.0, usual)
+    return tuple(Parameter(one, unit, -_MOST * usual, _MOST * usual, prior, "linear", 0.0, _REASON) for one in names)
+
+
 def _unit_of_change(acts_on: ActsOn) -> str:
     return {"force": "N", "position": "mm"}.get(acts_on, "-")
 
@@ -212,17 +219,10 @@ class LagLaw(UnnamedLaw):
         self.middle_hz = float(np.exp(np.log(lines).mean()))
         usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
         power = shape.logarithmic
-        self.amplitudes = tuple(
-            f"law_lag_{number + 1}" if shape.count > 1 else "law_lag" for number in range(shape.count)
-        )
-        lags = tuple(
-            Parameter(name, "-", -_MOST * usual, _MOST * usual, Normal(0.0, usual), "linear", 0.0, _REASON)
-            for name in self.amplitudes
-        )
-        exponent = Parameter("law_exponent", "-", -4.0, 4.0, Normal(0.0, 1.5), "linear", None, _REASON)
-        self.parameters_bound = (*lags, *([exponent] if power else []), *shape.bending)
-        grid = [(value,) for value in (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)] if power else shape.grid
-        self.grid = np.array(grid, dtype=float).reshape(len(grid), -1)
+        lags = _amplitudes("law_lag", "-", usual, shape.count)
+        self.amplitudes = tuple(entry.name for entry in lags)
+        self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.bending)
+        self.grid = _EXPONENTS if power else shape.points
 
     def on(self, axis: Axis) -> "LagLaw":
         """The same law on other recordings."""

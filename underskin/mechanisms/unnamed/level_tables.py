@@ -95,6 +95,11 @@ class LevelTables:
         return chain(value, (slope, radius))
 
     @cached_property
+    def usual_force(self) -> float:
+        """The median preload [N]."""
+        return float(np.median(list(self.force.values())))
+
+    @cached_property
     def _model(self) -> FrfModel:
         return FrfModel((), self._conditions, self._table, self._beside)
 
