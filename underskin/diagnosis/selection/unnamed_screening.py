@@ -50,8 +50,8 @@ class Score:
 class _Group(Generic[Law]):
     """Laws with equally many amplitudes that enter at one place.
 
-    `log_shares` of each; `first` point of each on the grid of what bends it, and one more; `grid` of each point; `scale`,
-    the sds of the amplitudes' priors at each (points, amplitudes).
+    `log_shares` of each; `first` point of each on the grid of what bends it, and one more; `grid` of each point;
+    `scale`, the sds of the amplitudes' priors at each (points, amplitudes).
     """
 
     laws: list[Law]
