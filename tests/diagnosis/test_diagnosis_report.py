@@ -1,5 +1,6 @@
 """The diagnosis as a user meets it: verdicts on campaigns whose answer is known, bad input by name, the commands."""
 
+import gc
 import json
 import os
 from collections.abc import Callable
@@ -46,6 +47,17 @@ def scaled(entry: FrfRecording, factor: float) -> FrfRecording:
     return replace(
         entry, frf_re_pc_per_n=factor * entry.frf_re_pc_per_n, frf_im_pc_per_n=factor * entry.frf_im_pc_per_n
     )
+
+
+@pytest.mark.parametrize("made", [SENSORS, Made(lines=12, repeats=2)], ids=["one line", "twelve lines"])
+def test_a_diagnosis_leaves_no_campaign_in_memory(table: SigmaTable, made: Made) -> None:
+    def kept() -> int:
+        gc.collect()
+        return sum(isinstance(entry, Campaign) for entry in gc.get_objects())
+
+    before = kept()
+    diagnosis_report(campaign(made, table), table)
+    assert kept() == before
 
 
 @pytest.mark.slow

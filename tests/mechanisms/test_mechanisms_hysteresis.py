@@ -91,3 +91,14 @@ def test_without_adhesion_the_edge_is_hertz_s() -> None:
     force, depth, _, _ = sphere.at(a)
     assert depth + 1e-5 * force == pytest.approx(travel, rel=1e-9)
     assert force == pytest.approx(4 / 3 * 2e6 * a**3 / 1e-3, rel=1e-12)
+
+
+def test_a_sphere_that_does_not_stick_has_no_contact_before_the_surface_and_hertzs_beyond() -> None:
+    sphere = Sphere(np.full((1, 1, 1), 2e6), np.full((1, 1), 1e-3), give=np.full((1, 1, 1), 1e-5))
+    travel = np.array([[[-1e-4, -1e-9, 0.0, 1e-6, 2e-5, 3e-5, -1e-5, 1e-4]]])
+    a = sphere.radius_at(travel, None)
+    away = travel <= 0
+    assert a[away].max() < 1e-12
+    force, depth, _, _ = sphere.at(a)
+    assert force[away].max() < 1e-24
+    assert (depth + 1e-5 * force)[~away] == pytest.approx(travel[~away], rel=1e-9)

@@ -17,6 +17,8 @@ _EXPONENTIAL = 1e-6  # |q| below which the stiffening is
 _LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
 _STEPS = 60
 _TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
+_NO_CONTACT = 1e-15  # m, which stands for no radius
+_BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
 _HALVINGS = 40
 _LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
 
@@ -149,9 +151,8 @@ def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> No
 def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
     """Solve travel(a) = travel by Newton's steps from radii `a` above, in place.
 
-    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). Where a law has not reached its
-    limit the travel is convex in a, and the tangent that led to the sample before leads above the radius of this one,
-    too; elsewhere halvings of the bracket take over.
+    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The parabola through the last
+    two samples' tangents leads so near the radius of the next that one step is mostly enough.
     """
     points, curves, samples = travel.shape
     alike = work.shape[2] == 1 and body.shape[2] == 1
@@ -159,16 +160,23 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
         layer = cubics[min(point, len(cubics) - 1)]
         for curve in range(curves):
             own, root_work = _of(body, point, curve, 0), math.sqrt(work[point, curve, 0])
-            touching, at_touching, slope = 0.0, 0.0, 0.0
+            touching, at_touching, slope, bend = 0.0, 0.0, 0.0, 0.0
             for sample in range(samples):
                 if not alike:
                     own = _of(body, point, curve, sample)
                     root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
                 lowest = least[point, curve, min(sample, least.shape[2] - 1)]
                 aim, radius = travel[point, curve, sample], a[point, curve, sample]
+                if root_work == 0 and aim <= 0:  # not in contact, where Newton's steps would shrink without end
+                    a[point, curve, sample], slope = max(lowest, _NO_CONTACT), 0.0
+                    continue
                 if alike and slope > 0:
-                    radius = min(radius, touching + (aim - at_touching) / slope)
+                    tangent = (aim - at_touching) / slope
+                    bent = 0.5 * bend * tangent / slope
+                    radius = min(radius, touching + tangent * (1.0 - min(max(bent, -_BENT), _BENT)))
+                before, former = touching, slope
                 radius, touching, at_touching, slope = _solved(aim, max(radius, lowest), lowest, root_work, own, layer)
+                bend = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
                 a[point, curve, sample] = radius
 
 
