@@ -2,6 +2,7 @@
 
 import errno
 import ipaddress
+import os
 import socket
 import tempfile
 from pathlib import Path
@@ -20,6 +21,7 @@ from service.middleware.http_protocol import LimitedHttpProtocol
 from service.settings import make_data_folder
 from service.store import open_store
 from underskin import ExtensionError, TableError
+from underskin.mechanisms.declared.document import FOLDER
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
@@ -41,6 +43,7 @@ def serve(
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
+        os.environ.setdefault(FOLDER, str(settings.data / "mechanisms"))  # of the lab's own
         CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
         formats_of_other_packages()
         store = open_store(settings.database_url, settings.data)

@@ -93,7 +93,8 @@ class Planner:
     def _run(self, row: AnyRow, limits: "RigLimits", planned: Planned) -> None:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
-        with self._processes.at_work(campaign, limits=asdict(limits)) as worker:
+        without = diagnoses.without(row)
+        with self._processes.at_work(campaign, limits=asdict(limits), without=without) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
                 planned.progress = worker.said["progress"]

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -136,11 +136,15 @@ class WorkerProcesses:
                 self._running()
 
     def at_work(
-        self, campaign: Campaign, excluded: tuple[tuple[str, str], ...] = (), limits: dict[str, Any] | None = None
+        self,
+        campaign: Campaign,
+        excluded: tuple[tuple[str, str], ...] = (),
+        limits: dict[str, Any] | None = None,
+        without: Sequence[str] = (),
     ) -> "Worker":
-        """A worker at its job, on a campaign."""
+        """A worker at its job, on a campaign; see `Job`."""
         content = json_file.write(campaign)
-        job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits)
+        job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits, tuple(without))
         with self._lock:
             try:
                 process = self._running().fork()

@@ -12,6 +12,7 @@ from service.jobs.process import Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
+from underskin.mechanisms.declared.document import digest
 
 logger = logging.getLogger("underskin")
 
@@ -19,6 +20,11 @@ _POLL_S = 2.0  # how often the queue is looked at: another server may have put s
 _BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
 _JOIN_S = 10.0
 _STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
+
+
+def basis(table_sha256: str) -> diagnoses.Basis:
+    """What this server diagnoses with, as it is now."""
+    return diagnoses.Basis(table_sha256, __version__, digest())
 
 
 class Runner:
@@ -74,7 +80,7 @@ class Runner:
                 self._processes.get_ready()  # now that nothing else is going on
 
     def _claim(self) -> AnyRow | None:
-        row = self._store.write(diagnoses.claim, self._server, self._processes.table_sha256, __version__)
+        row = self._store.write(diagnoses.claim, self._server, basis(self._processes.table_sha256))
         self._failure.is_over()
         return row
 
@@ -96,7 +102,7 @@ class Runner:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
         campaign, excluded = self._store.read(diagnoses.campaign_of, row)
         left_out = tuple((left.recording, left.reason) for left in excluded)
-        with self._processes.at_work(campaign, left_out) as worker:
+        with self._processes.at_work(campaign, left_out, without=diagnoses.without(row)) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
             while not worker.ended and not self._ending.is_set():

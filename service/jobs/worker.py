@@ -50,7 +50,8 @@ _FEW_NUMBERS: dict[str, Any] = {
 class Job:
     """What a worker needs beside the campaign: where its bytes end, the table's hash, what was left out and why.
 
-    With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report.
+    With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report. Mechanisms
+    `without` which it is to be explained are left out.
     """
 
     campaign_bytes: int
@@ -58,6 +59,7 @@ class Job:
     memory_bytes: int
     excluded: tuple[tuple[str, str], ...]
     limits: dict[str, Any] | None = None
+    without: tuple[str, ...] = ()
 
     def line(self) -> bytes:
         """As the worker reads it."""
@@ -113,14 +115,17 @@ def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[st
     from underskin.errors import TableError
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
+    from underskin.mechanisms.registry import CATALOGUE
     from underskin.parallel import limit_process
     from underskin.recordings.campaign import parse
 
     if table.sha256 != job.table_sha256:
         raise TableError(f"{sys.argv[1]} changed since the server started: restart it")
+    CATALOGUE.reload()  # the lab's own may have changed since the fork server loaded them
+    CATALOGUE.load()
     limit_process(job.memory_bytes)
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(parse(_read(campaign)), table, lambda share: say({"progress": share}), limits)
+    diagnosis = diagnose(parse(_read(campaign)), table, lambda share: say({"progress": share}), limits, job.without)
     if job.limits is not None:
         say({"plan": diagnosis.next_experiment})
         return

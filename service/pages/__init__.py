@@ -9,6 +9,7 @@ from service.pages.design import page as design
 from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
 from service.pages.measured import page as measured
+from service.pages.mechanisms import page as mechanisms
 from service.pages.shared import assets
 from service.pages.skin import page as skin
 from service.pages.start import example, login
@@ -17,7 +18,7 @@ from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
 _OF_SKINS = (start, example, skin, campaign, diagnosis, plan, upload)
-_PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, login, assets)
+_PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, assets)
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:

@@ -24,16 +24,22 @@ router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
     responses={202: {"model": models.Asked}},
 )
 def ask(
-    campaign_id: CampaignId, runner: RunnerInUse, idempotency: Idempotent, store: Store, table: Table
+    campaign_id: CampaignId,
+    runner: RunnerInUse,
+    idempotency: Idempotent,
+    store: Store,
+    table: Table,
+    asked: models.AskFor | None = None,
 ) -> JSONResponse:
     """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
-    table and version, is answered with that diagnosis.
+    table, version and catalogue of mechanisms, is answered with that diagnosis.
     """
+    without = [] if asked is None else asked.without
     answer = idempotency.answer(
         store,
-        None,
+        without or None,
         lambda connection: models.Asked.model_validate(
-            usecase.ask(connection, campaign_id, table, idempotency.sender), from_attributes=True
+            usecase.ask(connection, campaign_id, table, idempotency.sender, without), from_attributes=True
         ).model_dump(),
     )
     runner.stir()

@@ -15,6 +15,19 @@ class Asked(BaseModel):
     state: State = Field(description="`done` where the campaign was diagnosed before, as it is now.")
 
 
+class AskFor(BaseModel):
+    """How a campaign is to be diagnosed."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    without: list[str] = Field(
+        default_factory=list,
+        max_length=50,
+        description="Mechanisms to leave out of the catalogue: suppose that it is not these.",
+        examples=[["adhesion"]],
+    )
+
+
 class DiagnosisEntry(Asked):
     """A diagnosis without its report."""
 
@@ -25,6 +38,7 @@ class DiagnosisEntry(Asked):
     outdated: str | None = Field(description="Why it is not of the campaign as it is now; null where it is.")
     table_sha256: str = Field(description="SHA-256 of the table of σ.")
     version: str = Field(description="Version of underskin.")
+    without: list[str] = Field(description="Mechanisms that it leaves out of the catalogue.")
     asked_at: str = Field(description="When it was asked for, UTC.")
     asked_from: str | None = Field(description="Name of the API key that asked.")
     started_at: str | None = Field(description="When it was started, the last time where it was interrupted, UTC.")

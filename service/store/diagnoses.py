@@ -4,10 +4,11 @@ A server that runs a diagnosis says every few seconds that it is alive. One that
 is taken for dead, and the diagnosis is claimed again, by the same server after a restart or by another.
 """
 
+import json
 import secrets
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from sqlalchemy import Connection, Select, insert, select, text, update
@@ -51,8 +52,20 @@ def rows() -> Select[Any]:
     return select(*_LISTED).join(campaigns, campaigns.c.number == diagnoses.c.campaign)
 
 
-def ask(connection: Connection, campaign_id: str, table_sha256: str, version: str, asked_from: str | None) -> AnyRow:
-    """The diagnosis of a campaign as it is now: the one there is, or a new one in the queue.
+@dataclass(frozen=True)
+class Basis:
+    """What a server diagnoses with: hash of the table of σ, version of underskin, hash of the lab's own mechanisms."""
+
+    table_sha256: str
+    version: str
+    own_sha256: str = ""
+
+
+def ask(
+    connection: Connection, campaign_id: str, basis: Basis, asked_from: str | None, without: Sequence[str] = ()
+) -> AnyRow:
+    """The diagnosis of a campaign as it is now: the one there is, or a new one in the queue. It leaves out the
+    mechanisms `without` which it is to be explained.
 
     Raises Missing, and Conflict where the campaign is not current. One that failed or was cancelled is asked anew.
     """
@@ -60,20 +73,25 @@ def ask(connection: Connection, campaign_id: str, table_sha256: str, version: st
     why = kept_campaigns.unused(campaign)
     if why is not None:
         raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")
-    basis = {
+    wanted = {
         "campaign": campaign.number,
         "excluded": campaign.excluded,
-        "table_sha256": table_sha256,
-        "version": version,
+        "without": json.dumps(sorted(set(without))),
+        **asdict(basis),
     }
-    same = [diagnoses.c[name] == value for name, value in basis.items()]
+    same = [diagnoses.c[name] == value for name, value in wanted.items()]
     query = select(diagnoses.c.id).where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number).limit(1)
     diagnosis_id = connection.execute(query).scalar()
     if diagnosis_id is None:
         diagnosis_id = f"d-{secrets.token_hex(8)}"
         asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": now(), "asked_from": asked_from}
-        connection.execute(insert(diagnoses), {**basis, **asked})
+        connection.execute(insert(diagnoses), {**wanted, **asked})
     return find(connection, diagnosis_id)
+
+
+def without(row: AnyRow) -> list[str]:
+    """The mechanisms that a diagnosis leaves out."""
+    return list(json.loads(row.without))
 
 
 def find(connection: Connection, diagnosis_id: str) -> AnyRow:
@@ -135,11 +153,11 @@ def cancel(connection: Connection, diagnosis_id: str) -> None:
         connection.execute(update(diagnoses).where(this).values(**values))
 
 
-def claim(connection: Connection, server: str, table_sha256: str, version: str) -> AnyRow | None:
+def claim(connection: Connection, server: str, basis: Basis) -> AnyRow | None:
     """Take the next diagnosis to run: a queued one, or one whose server is taken for dead; None where there is none.
 
-    Servers that claim at once do not get the same one. It is run with the table and the version of the server that has
-    it now, whatever they were when it was asked for.
+    Servers that claim at once do not get the same one. It is run with what the server that has it now diagnoses with,
+    whatever that was when it was asked for.
     """
     clock = _clock(connection)
     abandoned = (diagnoses.c.alive_at < clock - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
@@ -149,8 +167,7 @@ def claim(connection: Connection, server: str, table_sha256: str, version: str) 
     if row is None:
         return None
     taken = {"state": "running", "claimed_by": server, "alive_at": clock, "progress": 0.0, "started_at": now()}
-    basis = {"table_sha256": table_sha256, "version": version}
-    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **basis))
+    connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **asdict(basis)))
     return find(connection, row.id)
 
 

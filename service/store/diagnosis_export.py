@@ -73,6 +73,10 @@ class DiagnosisRow(ImportedRow):
     excluded: int = Field(ge=0)
     table_sha256: Text
     version: Text
+    without: Annotated[str, StringConstraints(max_length=4000, pattern=r'^\[("[a-z0-9_]+"(, "[a-z0-9_]+")*)?\]$')] = (
+        "[]"
+    )
+    own_sha256: Text = ""  # older files have neither
     state: Literal["done", "failed", "cancelled"]
     progress: Share
     asked_at: Time

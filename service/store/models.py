@@ -69,6 +69,12 @@ def in_force(connection: Connection, root: str) -> AnyRow | None:
     return None if row is None or row.model_withdrawn_at is not None else row
 
 
+def all_in_force(connection: Connection) -> list[AnyRow]:
+    """As `in_force`, of every skin that has one."""
+    roots = connection.execute(select(skin_rows.c.root_id).distinct()).scalars().all()
+    return list(in_force_of(connection, roots).values())
+
+
 def in_force_of(connection: Connection, roots: Sequence[str]) -> dict[str, AnyRow]:
     """As `in_force`, of each of these skins that has one."""
     query = kept.rows().add_columns(*_OWN, skin_rows.c.root_id).join(models, models.c.diagnosis == diagnoses.c.number)

@@ -139,6 +139,8 @@ diagnoses = Table(
     Column("excluded", Integer, nullable=False),
     Column("table_sha256", String, nullable=False),
     Column("version", String, nullable=False),  # of underskin
+    Column("without", Text, nullable=False, server_default="[]"),  # JSON list of mechanisms that it leaves out
+    Column("own_sha256", String, nullable=False, server_default=""),  # of the lab's own mechanisms; empty for none
     Column("state", String, nullable=False),
     Column("progress", Float, nullable=False),  # 0 to 1
     Column("asked_at", String, nullable=False),

@@ -125,8 +125,9 @@ def diagnosed(server: Server, document: dict[str, Any], made: dict[str, Any], sk
     campaign_id = sent(server, document, skin)
     store = database(server.place.database_url, server.place.folder)
     with store.writing() as connection:
-        diagnosis_id = str(diagnoses.ask(connection, campaign_id, table().sha256, __version__, None).id)
-        claimed = diagnoses.claim(connection, "test", table().sha256, __version__)
+        basis = diagnoses.Basis(table().sha256, __version__)
+        diagnosis_id = str(diagnoses.ask(connection, campaign_id, basis, None).id)
+        claimed = diagnoses.claim(connection, "test", basis)
         assert claimed is not None
         assert claimed.id == diagnosis_id, "a server took it: start it with UNDERSKIN_DIAGNOSIS_WORKERS=0"
         assert diagnoses.finish(connection, claimed.number, "test", made)

@@ -76,8 +76,6 @@ def diagnose(
 
     one_blas_thread()
     files, campaign = files or [], campaign or []
-    if without and campaign:
-        raise typer.BadParameter("is for files; the service diagnoses with its whole catalogue", param_hint="--without")
     _refuse_overwriting(files, campaign, output_dir)
     description = None if rig is None else rig_description_in(rig)
     output_dir.mkdir(parents=True, exist_ok=True)
@@ -89,7 +87,7 @@ def diagnose(
         bar = progress.add_task("diagnosing", total=len(files) + len(campaign))
         for outcomes in (
             _of_files(files, one, workers or os.cpu_count() or 1, scheduler),
-            _of_store(campaign, output_dir, html, url, key),
+            _of_store(campaign, output_dir, html, without or [], url, key),
         ):
             for outcome in outcomes:
                 progress.advance(bar)
@@ -210,20 +208,22 @@ def _table() -> "SigmaTable":
     return load_table()
 
 
-def _of_store(campaigns: Sequence[str], output_dir: Path, html: bool, url: str, key: str | None) -> Iterator[_Outcome]:
+def _of_store(
+    campaigns: Sequence[str], output_dir: Path, html: bool, without: Sequence[str], url: str, key: str | None
+) -> Iterator[_Outcome]:
     """Have the service diagnose stored campaigns; all are started before the first is awaited."""
     if not campaigns:
         return
     with connect(url, key) as client:
-        diagnoses = [(campaign, _start(client, campaign)) for campaign in campaigns]
+        diagnoses = [(campaign, _start(client, campaign, without)) for campaign in campaigns]
         for campaign, started in diagnoses:
             yield started if isinstance(started, _Outcome) else _fetched(client, campaign, started, output_dir, html)
 
 
-def _start(client: "Client", campaign: str) -> str | _Outcome:
+def _start(client: "Client", campaign: str, without: Sequence[str]) -> str | _Outcome:
     """The id of the diagnosis."""
     try:
-        return str(client.diagnoses.start(campaign)["id"])
+        return str(client.diagnoses.start(campaign, without=without)["id"])
     except UnderskinError as error:
         return _Outcome(campaign, f"{campaign}: {error}")
 

@@ -7,7 +7,7 @@ Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), 
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 from underskin.client.campaigns import Document, pages
 from underskin.client.http_session import Session, path_of
@@ -23,9 +23,13 @@ class Diagnoses:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def start(self, campaign_id: str) -> Document:
-        """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once."""
-        return self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"))
+    def start(self, campaign_id: str, *, without: Sequence[str] = ()) -> Document:
+        """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once.
+
+        `without`: mechanisms to leave out of the catalogue, "suppose that it is not these".
+        """
+        body = {"json": {"without": list(without)}} if without else {}
+        return self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"), **body)
 
     def get(self, diagnosis_id: str) -> Document:
         """A diagnosis: its `state` and `progress` and, once it is done, its `report`."""

@@ -23,6 +23,7 @@ from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
 from underskin.client.http_session import Session
+from underskin.client.mechanisms import Mechanisms
 from underskin.units import Floats
 
 _Answer = TypeVar("_Answer", bound=answers.ServiceAnswer)
@@ -48,6 +49,7 @@ class Client:
         self.campaigns = Campaigns(self._session)
         self.skins = Skins(self._session)
         self.diagnoses = Diagnoses(self._session)
+        self.mechanisms = Mechanisms(self._session)
 
     def __enter__(self) -> Self:
         return self

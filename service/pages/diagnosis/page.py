@@ -1,6 +1,6 @@
 """A diagnosis: asked for, watched while it runs, read, saved, adopted."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import quote
 
@@ -14,12 +14,14 @@ from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
-from service.pages.shared.forms import OWN_FORM, see
+from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
+from service.usecases.mechanisms import catalogue
+from underskin.diagnosis.data.names import in_words
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -38,10 +40,13 @@ _ABOUT = {
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
-def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts it into the queue; one that was diagnosed as it is now is shown."""
-    row = store.write(usecase.ask, campaign_id, table, sender(request))
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=WRITE)
+def ask(
+    request: Request, campaign_id: CampaignId, sent: Form, runner: RunnerInUse, store: Store, table: Table
+) -> Response:
+    """Puts it into the queue, without the mechanisms that it is supposed not to be; one that was diagnosed so as it is
+    now is shown."""
+    row = store.write(usecase.ask, campaign_id, table, sender(request), sent.get("without", "").split())
     runner.stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -69,6 +74,9 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         may_be_adopted=report is not None and _not_adopted(report) is None,
         open=report is not None and left_open(report),
         limit_fields=FIELDS,
+        without=diagnoses.without(row),
+        supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
+        unnamed=report is not None and report.get("unnamed") is not None,
         not_adopted=None if report is None else _not_adopted(report),
         same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )
@@ -118,6 +126,14 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
     return see(f"/skins/{quote(model.model_skin_id, safe='')}?model=adopted")
+
+
+def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[str, str]]:
+    """Mechanisms of the catalogue that the campaign might be diagnosed without, in words, and what would be left out in
+    all."""
+    known = catalogue()
+    named = [name for name in verdicts.mechanisms_of(report) if name in known]
+    return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:

@@ -217,7 +217,7 @@ def test_servers_that_claim_at_once_get_different_ones(place: Place) -> None:
             mine: list[str] = []
             while len(mine) < len(ids) // 4:
                 with own.writing() as connection:
-                    row = diagnoses.claim(connection, name, table().sha256, __version__)
+                    row = diagnoses.claim(connection, name, diagnoses.Basis(table().sha256, __version__))
                 mine += [] if row is None else [row.id]
             claimed.extend(mine)
 
@@ -234,13 +234,13 @@ def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) ->
         asked(server, sent(server, campaign("array")))
     store = database(place.database_url, place.folder)
     with closing(store), store.writing() as connection:
-        row = diagnoses.claim(connection, "first", "table", "1")
+        row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
         assert row is not None
-        assert diagnoses.claim(connection, "second", "table", "1") is None
+        assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
         late = table_of_diagnoses.c.alive_at - diagnoses.HEARTBEAT_TIMEOUT_S - 1
         connection.execute(table_of_diagnoses.update().values(alive_at=late))
-        assert diagnoses.claim(connection, "first", "table", "1") is None
-        taken = diagnoses.claim(connection, "second", "other", "2")
+        assert diagnoses.claim(connection, "first", diagnoses.Basis("table", "1")) is None
+        taken = diagnoses.claim(connection, "second", diagnoses.Basis("other", "2"))
         assert taken is not None
         assert (taken.id, taken.table_sha256, taken.version) == (row.id, "other", "2")
         assert not diagnoses.keep_alive(connection, row.number, "first", 0.5)

@@ -46,8 +46,9 @@ def keep(server: Server, document: dict[str, Any], made: Made, skin: str) -> str
     campaign_id = sent(server, document, skin)
     store = database(server.place.database_url, server.place.folder)
     with store.writing() as connection:
-        row = diagnoses.ask(connection, campaign_id, table().sha256, __version__, None)
-        while (claimed := diagnoses.claim(connection, "test", table().sha256, __version__)) is not None:
+        basis = diagnoses.Basis(table().sha256, __version__)
+        row = diagnoses.ask(connection, campaign_id, basis, None)
+        while (claimed := diagnoses.claim(connection, "test", basis)) is not None:
             assert diagnoses.finish(connection, claimed.number, "test", made.report, made.figures)
     store.close()
     return str(row.id)

@@ -127,6 +127,16 @@ def in_folder(folder: Path | None = None) -> list[tuple[DeclaredMechanism, str]]
     return found
 
 
+def digest() -> str:
+    """SHA-256 of the files of the lab's folder, with their names; empty where there are none."""
+    where = Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None
+    files = [] if where is None else sorted(where.glob("*.yaml"))
+    whole = sha256()
+    for file in files:
+        whole.update(file.name.encode() + b"\0" + sha256(file.read_bytes()).digest())
+    return whole.hexdigest() if files else ""
+
+
 def _only(document: Mapping[Any, Any], known: tuple[str, ...], prefix: str) -> None:
     for name in document:
         if name not in known:

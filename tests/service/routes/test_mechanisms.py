@@ -1,0 +1,128 @@
+"""The lab's own mechanisms over HTTP: kept, known to diagnoses by name, refused, discarded; and what is left out."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+
+from tests.support.diagnosed import sent
+from tests.support.diagnosis_campaigns import Made
+from tests.support.diagnosis_campaigns import campaign as made_campaign
+from tests.support.store_server import Place, running
+from underskin import Client, ServiceError
+from underskin.recordings.campaign import FrfRecording, to_dict
+from underskin.surrogate.sigma_table import load_table
+
+ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+WARM = """\
+schema: mechanism/1
+name: warm_amplifier
+description: The amplifier's gain follows the temperature.
+acts_on: gain
+axes: [temperature_c]
+law: 1 + rise * (temperature_c - 23)
+parameters:
+  rise: {unit: 1/°C, low: -0.1, high: 0.1, prior: {mean: 0, sd: 0.03}, limit: 0}
+source: Our own measurements.
+"""
+
+
+@pytest.fixture
+def own_place(tmp_path: Path) -> Place:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    return Place(folder)
+
+
+def warmed() -> dict[str, object]:
+    """A campaign whose gain rises by 2 % a degree, the temperature in a column of its own."""
+    quiet = made_campaign(Made(sensors=2, repeats=3, gain=0.005, seed=3), load_table())
+    temperatures = np.random.default_rng(5).uniform(20, 30, len(quiet.recordings))
+    recordings = []
+    for entry, temperature in zip(quiet.recordings, temperatures.tolist(), strict=True):
+        assert isinstance(entry, FrfRecording)
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        factor = 1 + 0.02 * (temperature - 23)
+        recordings.append(
+            replace(
+                entry,
+                frf_re_pc_per_n=factor * entry.frf_re_pc_per_n,
+                frf_im_pc_per_n=factor * entry.frf_im_pc_per_n,
+                conditions={"temperature_c": round(temperature, 3)},
+            )
+        )
+    return to_dict(replace(quiet, recordings=tuple(recordings)))
+
+
+def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(own_place: Place) -> None:
+    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        campaign_id = sent(server, warmed())
+        first = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        assert (first["verdict"], first["report"]["unnamed"]["axis"]) == ("unexplained", "temperature_c")
+        kept = client.mechanisms.keep_found(first["id"], "warm_amplifier", "The gain follows the temperature.")
+        assert (kept["own"], kept["package"].split()[0]) == (True, "warm_amplifier.yaml")
+        assert "warm_amplifier" in {entry["name"] for entry in client.mechanisms.all()}
+
+        second = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        assert second["id"] != first["id"]
+        assert [entry["name"] for entry in second["report"]["mechanisms"]] == ["warm_amplifier"]
+        assert client.diagnoses.start(campaign_id) == {"id": second["id"], "state": "done"}
+
+        without = client.diagnoses.start(campaign_id, without=["warm_amplifier"])
+        third = client.diagnoses.wait(without["id"])
+        assert (third["without"], third["verdict"]) == (["warm_amplifier"], "unexplained")
+        assert third["report"]["provenance"]["without"] == ["warm_amplifier"]
+
+        client.mechanisms.discard("warm_amplifier")
+        assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
+        assert client.diagnoses.get(second["id"])["report"] == second["report"]
+        fourth = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        assert fourth["report"]["verdict"] == "unexplained"
+    assert [file.name.split()[0] for file in (own_place.folder / "mechanisms" / "discarded").iterdir()]
+
+
+def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(own_place: Place) -> None:
+    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        assert client.mechanisms.keep(WARM)["parameters"] == [
+            {"name": "rise", "unit": "1/°C", "low": -0.1, "high": 0.1}
+        ]
+        with pytest.raises(ServiceError, match="taken"):
+            client.mechanisms.keep(WARM)
+        with pytest.raises(ServiceError, match="cannot be discarded"):
+            client.mechanisms.discard("ageing")
+        with pytest.raises(ServiceError, match="There is no mechanism"):
+            client.mechanisms.discard("nothing")
+        with pytest.raises(ServiceError, match="must be one of"):
+            client.diagnoses.start(sent(server, warmed()), without=["nothing"])
+        with pytest.raises(ServiceError, match="no diagnosis"):
+            client.mechanisms.keep_found("d-0123456789abcdef", "other")
+    file = own_place.folder / "mechanisms" / "warm_amplifier.yaml"
+    assert file.read_text(encoding="utf-8") == WARM
+    file.unlink()
+    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "said"),
+    [
+        (WARM.replace("gain", "weather"), 422, "acts_on"),
+        (WARM.replace("rise *", "__import__('os').system('x') *"), 422, "line 6"),
+        (WARM.replace("name: warm_amplifier", "name: ../evil"), 422, "name"),
+        ("a: [", 422, "not YAML"),
+        ("", 422, "schema"),
+        ('{"diagnosis_id": "d-1"}', 422, "name"),
+        ('{"name": "a", "name": "b", "diagnosis_id": "d-1"}', 422, "given twice"),
+        ("x" * 100_001, 413, "100000 bytes"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused_with_its_reason(own_place: Place, body: str, status: int, said: str) -> None:
+    with running(own_place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        answer = httpx.post(f"{server.http.base_url}/v1/mechanisms", content=body.encode())
+    assert answer.status_code == status
+    assert said in answer.text
+    folder = own_place.folder / "mechanisms"
+    assert not folder.exists() or not list(folder.iterdir())

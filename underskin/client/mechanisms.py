@@ -1,0 +1,35 @@
+"""The catalogue of mechanisms through the client: `client.mechanisms`.
+
+    client.mechanisms.keep_found(diagnosis_id, "warm_skin")
+    [entry["name"] for entry in client.mechanisms.all() if entry["own"]]
+
+Answers are the documents of the HTTP interface (/openapi.json), as dictionaries.
+"""
+
+from underskin.client.campaigns import Document
+from underskin.client.http_session import Session, path_of
+
+
+class Mechanisms:
+    """What diagnoses know by name; the lab's own can be kept and discarded."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def all(self) -> list[Document]:
+        """Every mechanism, in the order in which a model composes them."""
+        return list(self._session.json("GET", "/v1/mechanisms")["mechanisms"])
+
+    def keep(self, document: str) -> Document:
+        """Keep a document (`mechanism/1`, YAML) as one of the lab's own; raises ServiceError (409) for a taken name."""
+        headers = {"Content-Type": "application/yaml"}
+        return self._session.json("POST", "/v1/mechanisms", content=document.encode(), headers=headers)
+
+    def keep_found(self, diagnosis_id: str, name: str, description: str | None = None) -> Document:
+        """Keep the law that a diagnosis found beside the catalogue; raises ServiceError (422) where it found none."""
+        asked = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
+        return self._session.json("POST", "/v1/mechanisms", json=asked)
+
+    def discard(self, name: str) -> None:
+        """Take one of the lab's own out of the catalogue; raises ServiceError (409) while a model in force needs it."""
+        self._session.empty("DELETE", path_of("mechanisms", name))
