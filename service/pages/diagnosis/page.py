@@ -74,7 +74,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         may_be_adopted=report is not None and _not_adopted(report) is None,
         open=report is not None and left_open(report),
         limit_fields=FIELDS,
-        without=diagnoses.without(row),
+        without=in_words(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
         unnamed=report is not None and report.get("unnamed") is not None,
         not_adopted=None if report is None else _not_adopted(report),
