@@ -197,6 +197,20 @@ def test_the_hints_are_those_of_the_page() -> None:
         assert f"| `{acts_on}` | {place} | {hint} |" in page
 
 
+def test_shares_are_those_among_laws_and_a_course_of_no_form_that_is_more_probable_is_said(table: SigmaTable) -> None:
+    made = campaign(Made(sensors=3, offsets_mm=(0.0, 0.8), lines=20, highest_hz=1000.0, repeats=2, gain=0.005), table)
+    apart = np.abs(np.subtract.outer(*[np.arange(len(made.recordings))] * 2)) * np.sqrt(3) / 10
+    matern = (1 + apart) * np.exp(-apart) + 1e-9 * np.eye(len(apart))
+    wandering = np.exp(0.08 * np.linalg.cholesky(matern) @ np.random.default_rng(1).normal(size=len(apart)))
+    found = diagnosis_report(changed(made, lambda _, number, __: complex(wandering[number])), table)
+    assert found["verdict"] == "unexplained"
+    law = found["unnamed"]
+    shares = [law["probability"], *(entry["probability"] for entry in law["rivals"])]
+    assert 0.9 < sum(shares) <= 1.01
+    assert law["probability"] == max(shares)
+    assert "More probable still is a course of no listed form" in found["statement"]
+
+
 @pytest.mark.slow
 def test_what_remembers_the_preload_before_is_found(table: SigmaTable) -> None:
     law = rig_report(table, {"hysteretic_d33": {"amplitude": 0.1}})["unnamed"]

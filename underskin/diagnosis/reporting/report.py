@@ -23,7 +23,7 @@ from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
-from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, unnamed
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.reporting.unnamed_law import statement as law_statement
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -134,7 +134,12 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
         statement = " ".join(
-            part for part in (law_statement(leader.probability, leading, law, floor), caveats(findings)) if part
+            part
+            for part in (
+                law_statement(leader.probability, leading, law, floor, outweighed=outweighed(search)),
+                caveats(findings),
+            )
+            if part
         )
     return {
         **document,
@@ -204,17 +209,17 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
 
 
 def _presence(search: Search, problem: FittingProblem) -> dict[str, float]:
-    """The posterior that each mechanism is there, also beside a law that nobody listed."""
+    """The posterior that each mechanism is there, also beside a law or a process that nobody listed."""
     present: dict[str, float] = {}
     for answer in search.answers:
         if answer.explanation is not None:
             for name in answer.names:
                 present[name] = present.get(name, 0.0) + answer.probability
             continue
-        laws = [entry for entry in search.laws if search.shows(entry)]
-        weights = [search.log_weight(entry) for entry in laws]
-        total = np.logaddexp.reduce([*weights, *search.processes_showing]) if laws else 0.0
-        for entry, weight in zip(laws, weights, strict=True):
+        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.shows(entry)]
+        beside = [*laws, *search.processes_showing]
+        total = np.logaddexp.reduce([weight for _, weight in beside]) if beside else 0.0
+        for entry, weight in beside:
             for name in entry.names:
                 if name in problem.lines.mechanisms.named:
                     share = answer.probability * float(np.exp(weight - total))

@@ -26,6 +26,7 @@ _QUANTILE = float(ndtri(0.975))
 _RIVALS, _LEAST_RIVAL = 5, 0.01
 _PLACES = 41  # along the axis, at which a course is looked at
 _STEP = 1e-4  # of fit coordinates, for a course's band
+_OUTWEIGHED = 3.0  # nats
 _SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
 
 
@@ -161,13 +162,13 @@ def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str
 
 
 def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
-    """Of each combination in what is undescribed, the largest first."""
+    """Of each combination in all of them, the largest first."""
     weights: dict[tuple[str, str, str], float] = {}
     for entry in search.laws:
         if search.shows(entry):
             key = _combination(problem, entry)
             weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(entry)))
-    total = np.logaddexp.reduce([*weights.values(), *search.processes_showing])
+    total = np.logaddexp.reduce(list(weights.values()))
     ranked = sorted(weights.items(), key=lambda item: -item[1])
     return {key: float(np.exp(weight - total)) for key, weight in ranked}
 
@@ -205,8 +206,20 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
     return {"name": "at", "unit": law.axis.unit, **ends}
 
 
-def statement(probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float) -> str:
-    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this."""
+def outweighed(search: Search) -> bool:
+    """Whether a smooth course of no form is much more probable than all laws together."""
+    laws = [search.log_weight(entry) for entry in search.laws if search.shows(entry)]
+    processes = [weight for _, weight in search.processes_showing]
+    if not laws or not processes:
+        return False
+    return bool(np.logaddexp.reduce(processes) > np.logaddexp.reduce(laws) + _OUTWEIGHED)
+
+
+def statement(
+    probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float, *, outweighed: bool
+) -> str:
+    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this;
+    `outweighed` by a course of no form."""
     law = leading.law
     acts_on, axis = law.spoken.acts_on, law.spoken.axis
     beside = tuple(name for name in leading.explanation.names if name != law.name)
@@ -223,6 +236,8 @@ def statement(probability: float, leading: LeadingLaw, document: Mapping[str, An
             for entry in document["rivals"][:2]
         )
         parts.append(f"In these recordings this may also be: {rivals}.")
+    if outweighed:
+        parts.append("More probable still is a course of no listed form: take this law as the nearest that has one.")
     told = hint(acts_on, axis)
     return " ".join([*parts, *([told] if told else [])])
 

@@ -140,10 +140,10 @@ class Search:
         return process.log_evidence + prior
 
     @cached_property
-    def processes_showing(self) -> list[float]:
-        """Prior times evidence of each process that shows."""
+    def processes_showing(self) -> list[tuple[Explanation, float]]:
+        """The set beneath each process that shows, and the logarithm of its prior times evidence."""
         return [
-            self._log_weight_beneath(entry, process)
+            (entry, self._log_weight_beneath(entry, process))
             for entry, process in self.discrepancies
             if process.log_evidence > entry.log_evidence + least_evidence(entry)
         ]
@@ -162,7 +162,8 @@ class Search:
         """
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
-        showing = [*self.processes_showing, *(self.log_weight(entry) for entry in self.laws if self.shows(entry))]
+        showing = [weight for _, weight in self.processes_showing]
+        showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
         probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
         probabilities[-1] += _UNTHOUGHT
