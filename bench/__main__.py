@@ -4,6 +4,7 @@ import argparse
 import os
 import platform
 import time
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from bench import (
     waits,
 )
 from bench import against as against_revision
-from bench.page import keep, markdown, write
+from bench.page import AGAINST, keep, markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -45,13 +46,11 @@ _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scik
 
 def main(names: list[str], against: str | None) -> None:
     """Measure the parts named, or all, and write the page with what is new in it; a diagnosis `against` a revision."""
-    if against is not None:
-        print(markdown(against_revision.measure(against)), flush=True)
-        return
-    for name in names or PARTS:
+    parts = PARTS if against is None else {AGAINST: partial(against_revision.measure, against)}
+    for name in parts if against is not None else names or parts:
         about = machine()
         print(f"{name}: {about}", flush=True)
-        figures = PARTS[name]()
+        figures = parts[name]()
         print(markdown(figures), flush=True)
         keep(name, about, figures)
     write()

@@ -64,7 +64,7 @@ def measure(revision: str) -> list[Figure]:
                 Figure(
                     f"{len(files)} {name}: {revision}, by named mechanisms alone", theirs / named, "× ours", _FASTER
                 ),
-                Figure(f"{len(files)} {name}: {revision}", theirs / ours, "× ours", _FASTER / _WITH_LAWS),
+                Figure(f"{len(files)} {name}: {revision}", theirs / ours, "× ours", round(_FASTER / _WITH_LAWS, 2)),
             ]
     return figures
 

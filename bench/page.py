@@ -19,6 +19,8 @@ ratios: `idle_percent` is how idle it was before the start. A target is what the
 one that was not met.
 """
 
+AGAINST = "against"  # what `python -m bench diagnosis --against REV` measures
+
 SECTIONS = {
     "accuracy": "Accuracy of the shipped table",
     "batch": "Batches over HTTP",
@@ -30,6 +32,7 @@ SECTIONS = {
     "pages": "Pages",
     "mechanisms": "Predictions of composed mechanisms",
     "diagnosis": "A whole diagnosis",
+    AGAINST: "A whole diagnosis beside an earlier revision",
     "waits": "What a reader waits for",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
@@ -50,6 +53,9 @@ server and Tesseract Core's runtime, each serving the same spline.""",
 server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
 main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
+    AGAINST: """Processor time on one core, in turns, medians over the rounds and the campaigns: those of the folder
+that `UNDERSKIN_CAMPAIGNS` names, and those of `bench diagnosis`. Laws that nobody listed may take half as long
+again.""",
     "waits": """The server and its workers have one core, and Chromium runs beside them; a worker is ready before each
 click. The files are campaigns of 64 recordings × 60 lines, whose reports are the same to the byte for one process and
 two.""",
@@ -82,7 +88,8 @@ def write() -> None:
         if part in results:
             figures = [Figure(**figure) for figure in results[part]["figures"]]
             machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
-            text += f"\n## {title}\n\n`python -m bench {part}`. {EXPLANATIONS[part]}\n\n"
+            command = "diagnosis --against 127b47b" if part == AGAINST else part
+            text += f"\n## {title}\n\n`python -m bench {command}`. {EXPLANATIONS[part]}\n\n"
             text += f"{markdown(figures)}\n\nMeasured on: {machine}.\n"
     PAGE.write_text(text)
 

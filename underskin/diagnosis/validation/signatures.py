@@ -10,6 +10,7 @@ with each further parameter at either end of its usual range.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import FittingProblem
@@ -21,6 +22,7 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.units import Array, Floats
 
+Split = tuple[Floats, NDArray[np.float32] | None]
 _ENDS = (0.1, 0.9)  # of a shape's usual range
 _AT_ONCE = 1 << 16  # numbers
 
@@ -71,7 +73,7 @@ class Signatures:
         base = self._base.value if len(value) == len(self._base.value) else self._base.value[lines.recording]
         return 100 * float(np.sqrt((np.abs(value - base) ** 2).sum() / (np.abs(base) ** 2).sum()))
 
-    def _of_nuisances(self, rows: "_Rows") -> list[tuple[Floats, Floats | None]]:
+    def _of_nuisances(self, rows: "_Rows") -> list[Split]:
         return [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
 
     def left(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
@@ -119,21 +121,25 @@ class _Rows:
         self._size = np.sqrt(self._sums(self._direction**2))
         self.base, _ = self.split(base, problem.collapsed)
 
-    def split(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
-        """Along it (recordings,), and across it (numbers,), None where that is 0, of a prediction of these lines."""
+    def split(self, value: Array, lines: Lines) -> Split:
+        """Along it (recordings,), and across it (numbers,), None where that is 0, of a prediction of these lines.
+
+        What is across is kept in single precision, since there is one of each signature on all lines.
+        """
         if lines is not self._lines:
             return value.real * self._size, None
         whitened = self._whitened(value.real)
         along = self._sums(self._direction * whitened) / self._size
         across = whitened - self._direction * (along / self._size)[lines.recording]
-        return along, across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
+        whole = across if lines.curves else np.concatenate([across, self._whitened(value.imag)])
+        return along, whole.astype(np.float32)
 
-    def split_change(self, value: Array, lines: Lines) -> tuple[Floats, Floats | None]:
+    def split_change(self, value: Array, lines: Lines) -> Split:
         """The same of what a prediction changes of the base model's."""
         along, across = self.split(value, lines)
         return along - self.base, across
 
-    def products(self, parts: Sequence[tuple[Floats, Floats | None]]) -> tuple[Floats, Floats]:
+    def products(self, parts: Sequence[Split]) -> tuple[Floats, Floats]:
         """Re u*J (1, recordings, P) and Re JᵀJ (1, P, P) of columns J split like that."""
         along = np.array([own for own, _ in parts])
         square = along @ along.T
@@ -141,7 +147,7 @@ class _Rows:
         if beside:
             across = [rest for _, rest in parts if rest is not None]
             for first in range(0, len(across[0]), _AT_ONCE):
-                some = np.array([rest[first : first + _AT_ONCE] for rest in across])
+                some = np.array([rest[first : first + _AT_ONCE] for rest in across], dtype=float)
                 square[np.ix_(beside, beside)] += some @ some.T
         return (along * self._size).T[None], square[None]
 
