@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnose, diagnosis_report
 from underskin.diagnosis.reporting.hints import HINTS
+from underskin.diagnosis.reporting.html_report import body_of
 from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
 from underskin.errors import InvalidInput
@@ -95,6 +97,39 @@ def test_the_statement_says_what_changes_with_what_and_what_it_is_worth(warming_
     assert statement.startswith("No known mechanism describes this")
     assert "changes the gain with temperature_c: +" in statement
     assert "recordings held out are predicted to" in statement
+
+
+def test_the_plan_is_to_compare_the_ends_between_which_the_law_changes_the_charge_most(
+    warming: Campaign, warming_report: dict[str, Any]
+) -> None:
+    planned = warming_report["next_experiment"]
+    cold, warm = planned["recordings"]
+    noted_c = [float(entry.conditions["temperature_c"]) for entry in frf_of(warming) if entry.conditions]
+    assert (cold["temperature_c"], warm["temperature_c"]) == pytest.approx((min(noted_c), max(noted_c)), abs=0.01)
+    assert {name: value for name, value in cold.items() if name != "temperature_c"} == {
+        name: value for name, value in warm.items() if name != "temperature_c"
+    }
+    assert planned["separates"] == [[], ["unnamed"]]
+    # 3 % a degree over some 9 degrees, and scatters of 2 %: one recording at each end is enough
+    assert (cold["repeats"], planned["minutes"]) == (1, 10.0)
+    assert planned["probability_of_deciding"] > 0.99
+    told = re.search(r"the charge differs by (\d+) %", planned["statement"])
+    assert told
+    assert 22 <= int(told[1]) <= 32
+    shown = body_of(warming_report, {})
+    assert "temperature_c" in shown
+    assert "Expected probability that they decide" in shown
+
+
+def test_what_followed_the_order_is_confirmed_by_repeating_recordings_of_both_ends(
+    quiet: Campaign, table: SigmaTable
+) -> None:
+    broken = changed(quiet, lambda _, number, __: 1.15 if number >= 30 else 1.0)
+    found = diagnosis_report(broken, table)
+    assert found["unnamed"]["axis"] in ("order", "recorded_at")
+    planned = found["next_experiment"]
+    assert re.match(r"Repeating \S+ and \S+ after one another", planned["statement"])
+    assert {"order", "recorded_at"}.isdisjoint(planned["recordings"][0])
 
 
 def test_the_same_recordings_give_the_same_report(

@@ -44,6 +44,8 @@ _SURVIVES = 0.02  # less probable ones are not weighed
 
 def left_open(report: Mapping[str, Any]) -> bool:
     """Whether a report leaves more than one explanation that recordings could tell apart."""
+    if report["verdict"] == "unexplained":
+        return False
     others = sum(entry["probability"] > _SURVIVES for entry in report["alternatives"])
     return bool(report["next_experiment"]) or (report["fit"] is not None and others > 0)
 

@@ -20,6 +20,7 @@ from underskin.diagnosis.localisation.residual_shape import Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
@@ -68,7 +69,11 @@ class DiagnosisResult:
     @property
     def next_experiment(self) -> dict[str, Any]:
         """The recordings to make next, as in the report; empty where all is decided."""
-        return next_experiment.next_experiment(self.plan)
+        planned = next_experiment.next_experiment(self.plan)
+        if planned or self.search is None or self.problem is None or verdict(self) != "unexplained":
+            return planned
+        leading = LeadingLaw.of(self.problem, self.search.shown_or_nothing(self.search.answers[0]))
+        return {} if leading is None else confirming(self.problem, leading)
 
 
 def verdict(diagnosis: DiagnosisResult) -> str:
