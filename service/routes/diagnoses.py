@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Body, Query
 from fastapi.responses import JSONResponse
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, number_of_cursor
@@ -29,12 +29,12 @@ def ask(
     idempotency: Idempotent,
     store: Store,
     table: Table,
-    asked: models.AskFor | None = None,
+    asked: Annotated[models.AskFor, Body(default_factory=models.AskFor)],
 ) -> JSONResponse:
     """Puts it into the queue; excluded recordings are left out. A campaign that was diagnosed as it is now, with this
     table, version and catalogue of mechanisms, is answered with that diagnosis.
     """
-    without = [] if asked is None else asked.without
+    without = asked.without
     answer = idempotency.answer(
         store,
         without or None,

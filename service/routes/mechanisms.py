@@ -3,7 +3,7 @@
 from typing import Annotated, Any
 
 import orjson
-from fastapi import APIRouter, Path, Request, Response
+from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, Store
@@ -27,15 +27,38 @@ parameters:
   softening: {unit: 1/°C, low: 0, high: 0.1, prior: {mean: 0.01, sd: 0.01}, limit: 0}
 source: Our own measurements.
 """
+_YAML = ("application/yaml", "application/x-yaml", "text/yaml", "text/plain")
+_TEXT = {"type": "string"}
 _BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
         "description": "A document `mechanism/1` as YAML or JSON; or, as JSON, the diagnosis whose law is to be kept.",
         "content": {
-            "application/yaml": {"schema": {"type": "string"}, "example": _EXAMPLE},
+            "application/yaml": {"schema": _TEXT, "example": _EXAMPLE},
             "application/json": {
-                "schema": KeepFound.model_json_schema(),
-                "example": {"diagnosis_id": "d-0123456789abcdef", "name": "warm_skin"},
+                "schema": {
+                    "type": "object",
+                    "description": "With `diagnosis_id` and `name` the law that a diagnosis found, else `mechanism/1`.",
+                    "properties": {
+                        "diagnosis_id": {**_TEXT, "description": "A diagnosis whose report has `unnamed`."},
+                        "name": {**_TEXT, "description": "Lower case letters, digits and _."},
+                        "description": {**_TEXT, "description": "One sentence on what it is."},
+                        "schema": {**_TEXT, "description": "`mechanism/1`."},
+                    },
+                },
+                "example": {
+                    "schema": "mechanism/1",
+                    "name": "loose_cable",
+                    "description": "A cable that comes loose takes its share of the charge from some recording on.",
+                    "acts_on": "gain",
+                    "axes": ["order"],
+                    "law": "1 - lost * step(order - onset)",
+                    "parameters": {
+                        "lost": {"unit": "-", "low": 0, "high": 0.5, "limit": 0},
+                        "onset": {"unit": "-", "low": 0, "high": 1000},
+                    },
+                    "source": "Our own rig.",
+                },
             },
         },
     }
@@ -60,7 +83,9 @@ async def keep(request: Request, store: Store) -> MechanismEntry:
     """Diagnoses that are asked for from now on know it by name; 409 where the name is taken. Its law is an expression,
     of which no code is ever executed."""
     body = await request.body()
-    found = _found(body)
+    if len(body) > LARGEST_BYTES:
+        raise Refusal(413, f"A mechanism may have up to {LARGEST_BYTES} bytes.")
+    found = _found(request.headers.get("content-type", _YAML[0]), body)
     try:
         if found is None:
             return await run_in_threadpool(usecase.keep, body)
@@ -75,25 +100,27 @@ async def keep(request: Request, store: Store) -> MechanismEntry:
     "/mechanisms/{name}",
     operation_id="discard_mechanism",
     summary="Discard one of the lab's own",
-    status_code=204,
     dependencies=WRITE,
 )
-def discard(name: Annotated[str, Path(description="Of one of the lab's own mechanisms.")], store: Store) -> Response:
+def discard(
+    name: Annotated[str, Path(description="Of one of the lab's own mechanisms.")], store: Store
+) -> MechanismEntry:
     """Diagnoses know it no more; its file is kept apart, and reports that name it stay as they are. 409 where it is
     not the lab's own, or a model in force needs it."""
-    store.read(usecase.discard, name)
-    return Response(status_code=204)
+    return store.read(usecase.discard, name)
 
 
-def _found(body: bytes) -> KeepFound | None:
+def _found(content_type: str, body: bytes) -> KeepFound | None:
     """The diagnosis whose law is to be kept; None where the body is a document of its own."""
-    if len(body) > LARGEST_BYTES:
-        raise Refusal(413, f"A mechanism may have up to {LARGEST_BYTES} bytes.")
+    kind = content_type.partition(";")[0].strip().lower()
+    if kind in _YAML:
+        return None
+    if kind != "application/json":
+        raise Refusal(415, f"{kind} is no mechanism: send application/yaml or application/json.")
     try:
         document = orjson.loads(body)
-    except orjson.JSONDecodeError:
-        return None
+    except orjson.JSONDecodeError as error:
+        raise Refusal(400, f"The body is not JSON: {error.msg}.") from None
     require_unique_keys(body)
-    if not isinstance(document, dict) or "schema" in document:
-        return None
-    return validated(KeepFound, document)
+    own = isinstance(document, dict) and "schema" not in document
+    return validated(KeepFound, document) if own else None

@@ -73,7 +73,7 @@ def keep_found(connection: Connection, diagnosis_id: str, name: str, description
         raise InvalidInput("name", name, error.reason) from None
 
 
-def discard(connection: Connection, name: str) -> None:
+def discard(connection: Connection, name: str) -> MechanismEntry:
     """Take one of the lab's own out of the catalogue; its file is kept in a folder of discarded ones.
 
     Raises Refusal: 404 for an unknown name, 409 where it is not the lab's own or a model in force needs it.
@@ -92,7 +92,9 @@ def discard(connection: Connection, name: str) -> None:
         if parse(file.read_bytes(), str(file)).name == name:
             (folder / _DISCARDED).mkdir(exist_ok=True)
             file.rename(folder / _DISCARDED / f"{file.stem} {now().replace(':', '')}.yaml")
+    discarded = _entry(mechanism)
     catalogue()
+    return discarded
 
 
 def _folder() -> Path:

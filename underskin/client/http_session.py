@@ -42,13 +42,6 @@ class Session:
         """The JSON object of the answer; `options` as httpx has them."""
         return self.answered(method, path, **options)[0]
 
-    def empty(self, method: str, path: str) -> None:
-        """A request that is answered without a body."""
-        with self._reaching():
-            response = self.http.request(method, path)
-        if not response.is_success:
-            raise ServiceError(response.status_code, _document(response) or _foreign(response))
-
     def answered(self, method: str, path: str, **options: Any) -> tuple[dict[str, Any], httpx.Headers]:
         """The JSON object of the answer, and its headers."""
         with self._reaching():

@@ -30,6 +30,6 @@ class Mechanisms:
         asked = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
         return self._session.json("POST", "/v1/mechanisms", json=asked)
 
-    def discard(self, name: str) -> None:
+    def discard(self, name: str) -> Document:
         """Take one of the lab's own out of the catalogue; raises ServiceError (409) while a model in force needs it."""
-        self._session.empty("DELETE", path_of("mechanisms", name))
+        return self._session.json("DELETE", path_of("mechanisms", name))

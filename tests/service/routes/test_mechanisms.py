@@ -121,7 +121,9 @@ def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(own_place: Pl
 )
 def test_what_cannot_be_kept_is_refused_with_its_reason(own_place: Place, body: str, status: int, said: str) -> None:
     with running(own_place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        answer = httpx.post(f"{server.http.base_url}/v1/mechanisms", content=body.encode())
+        kind = "application/json" if body.startswith("{") else "application/yaml"
+        address = f"{server.http.base_url}/v1/mechanisms"
+        answer = httpx.post(address, content=body.encode(), headers={"Content-Type": kind})
     assert answer.status_code == status
     assert said in answer.text
     folder = own_place.folder / "mechanisms"
