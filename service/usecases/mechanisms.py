@@ -27,11 +27,20 @@ _loaded = {"digest": digest()}
 
 
 def catalogue() -> Mapping[str, Mechanism]:
-    """The mechanisms by name, with the lab's own as they are now: another server may have changed them."""
+    """The mechanisms by name, with the lab's own as they are now: another server may have changed them.
+
+    Raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be another one.
+    """
     with _lock:
         found = digest()
         if found != _loaded["digest"]:
             CATALOGUE.reload()
+            try:
+                CATALOGUE.load()
+            except FileError as error:
+                raise Refusal(
+                    409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it."
+                ) from None
             _loaded["digest"] = found
     return CATALOGUE
 

@@ -128,3 +128,19 @@ def test_what_cannot_be_kept_is_refused_with_its_reason(own_place: Place, body: 
     assert said in answer.text
     folder = own_place.folder / "mechanisms"
     assert not folder.exists() or not list(folder.iterdir())
+
+
+def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(own_place: Place) -> None:
+    folder = own_place.folder / "mechanisms"
+    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        campaign_id = sent(server, warmed())
+        folder.mkdir()
+        (folder / "warm.yaml").write_text(WARM.replace("gain", "weather"), encoding="utf-8")
+        for _ in range(2):
+            with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
+                client.mechanisms.all()
+            with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
+                client.diagnoses.start(campaign_id)
+        (folder / "warm.yaml").write_text(WARM, encoding="utf-8")
+        found = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        assert [entry["name"] for entry in found["report"]["mechanisms"]] == ["warm_amplifier"]
