@@ -3,6 +3,7 @@
 from typing import Annotated, Any
 
 import orjson
+import yaml
 from fastapi import APIRouter, Path, Request
 from starlette.concurrency import run_in_threadpool
 
@@ -16,17 +17,19 @@ from underskin.mechanisms.declared.document import LARGEST_BYTES
 
 router = APIRouter(prefix="/v1", tags=["mechanisms"])
 
-_EXAMPLE = """\
-schema: mechanism/1
-name: warm_skin
-description: The skin softens as it warms up.
-acts_on: modulus
-axes: [temperature_c]
-law: 1 - softening * (temperature_c - 23)
-parameters:
-  softening: {unit: 1/°C, low: 0, high: 0.1, prior: {mean: 0.01, sd: 0.01}, limit: 0}
-source: Our own measurements.
-"""
+_EXAMPLE: dict[str, Any] = {
+    "schema": "mechanism/1",
+    "name": "loose_cable",
+    "description": "A cable that comes loose takes its share of the charge from some recording on.",
+    "acts_on": "gain",
+    "axes": ["order"],
+    "law": "1 - lost * step(order - onset)",
+    "parameters": {
+        "lost": {"unit": "-", "low": 0, "high": 0.5, "limit": 0},
+        "onset": {"unit": "-", "low": 0, "high": 1000},
+    },
+    "source": "Our own rig.",
+}
 _YAML = ("application/yaml", "application/x-yaml", "text/yaml", "text/plain")
 _TEXT = {"type": "string"}
 _BODY: dict[str, Any] = {
@@ -34,7 +37,10 @@ _BODY: dict[str, Any] = {
         "required": True,
         "description": "A document `mechanism/1` as YAML or JSON; or, as JSON, the diagnosis whose law is to be kept.",
         "content": {
-            "application/yaml": {"schema": _TEXT, "example": _EXAMPLE},
+            "application/yaml": {
+                "schema": _TEXT,
+                "example": yaml.safe_dump({**_EXAMPLE, "name": "loose_plug"}, sort_keys=False),
+            },
             "application/json": {
                 "schema": {
                     "type": "object",
@@ -46,19 +52,7 @@ _BODY: dict[str, Any] = {
                         "schema": {**_TEXT, "description": "`mechanism/1`."},
                     },
                 },
-                "example": {
-                    "schema": "mechanism/1",
-                    "name": "loose_cable",
-                    "description": "A cable that comes loose takes its share of the charge from some recording on.",
-                    "acts_on": "gain",
-                    "axes": ["order"],
-                    "law": "1 - lost * step(order - onset)",
-                    "parameters": {
-                        "lost": {"unit": "-", "low": 0, "high": 0.5, "limit": 0},
-                        "onset": {"unit": "-", "low": 0, "high": 1000},
-                    },
-                    "source": "Our own rig.",
-                },
+                "example": _EXAMPLE,
             },
         },
     }

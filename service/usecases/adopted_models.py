@@ -13,6 +13,7 @@ from service.problems import Refusal
 from service.schemas.diagnoses import ModelEntry, ModelVersion
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, PressedSkinColumns
 from service.store import AnyRow, Conflict, Database, diagnoses, models, skins
+from service.usecases.mechanisms import catalogue
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import pressed
@@ -65,6 +66,7 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
         campaign, _ = diagnoses.campaign_of(connection, row)
         if len(_known) >= _MOST_KNOWN:
             _known.clear()
+        catalogue()  # another server may have added a mechanism that it has
         _known[row.id] = adopted(report, campaign)
     return _known[row.id]
 

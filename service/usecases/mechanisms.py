@@ -5,7 +5,6 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy import Connection
 
@@ -17,7 +16,7 @@ from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.contract import check_numbers
 from underskin.mechanisms.declared import saving
-from underskin.mechanisms.declared.document import FOLDER, digest, parse
+from underskin.mechanisms.declared.document import FOLDER, digest, in_folder, parse
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.registry import CATALOGUE
 
@@ -34,8 +33,9 @@ def catalogue() -> Mapping[str, Mechanism]:
     with _lock:
         found = digest()
         if found != _loaded["digest"]:
-            CATALOGUE.reload()
             try:
+                in_folder()  # which refuses what cannot be used while the catalogue in use still stands
+                CATALOGUE.reload()
                 CATALOGUE.load()
             except FileError as error:
                 raise Refusal(
@@ -123,8 +123,7 @@ def _write(folder: Path, file: Path, content: bytes) -> None:
 
 
 def _entry(mechanism: Mechanism) -> MechanismEntry:
-    own = isinstance(mechanism, DeclaredMechanism)
-    parameters: tuple[Any, ...] = mechanism.parameters_stated if isinstance(mechanism, DeclaredMechanism) else ()
+    stated = mechanism.parameters_stated if isinstance(mechanism, DeclaredMechanism) else None
     return MechanismEntry(
         name=mechanism.name,
         description=mechanism.plain,
@@ -133,8 +132,9 @@ def _entry(mechanism: Mechanism) -> MechanismEntry:
         assumptions=mechanism.assumptions,
         source=mechanism.source,
         package=CATALOGUE.packages.get(mechanism.name),
-        own=own,
+        own=stated is not None,
         parameters=[
-            MechanismParameter(name=entry.name, unit=entry.unit, low=entry.low, high=entry.high) for entry in parameters
+            MechanismParameter(name=entry.name, unit=entry.unit, low=entry.low, high=entry.high)
+            for entry in stated or ()
         ],
     )

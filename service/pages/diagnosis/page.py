@@ -20,8 +20,8 @@ from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
-from service.usecases.mechanisms import catalogue
 from underskin.diagnosis.data.names import in_words
+from underskin.mechanisms.registry import CATALOGUE
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -131,8 +131,7 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
 def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[str, str]]:
     """Mechanisms of the catalogue that the campaign might be diagnosed without, in words, and what would be left out in
     all."""
-    known = catalogue()
-    named = [name for name in verdicts.mechanisms_of(report) if name in known]
+    named = [name for name in verdicts.mechanisms_of(report) if name in CATALOGUE]
     return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
 
 

@@ -76,7 +76,11 @@ def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(own_plac
         assert (third["without"], third["verdict"]) == (["warm_amplifier"], "unexplained")
         assert third["report"]["provenance"]["without"] == ["warm_amplifier"]
 
-        client.mechanisms.discard("warm_amplifier")
+        client.skins.adopt("palm", second["id"])
+        with pytest.raises(ServiceError, match="withdraw it first"):
+            client.mechanisms.discard("warm_amplifier")
+        client.skins.withdraw_model("palm", "tried")
+        assert client.mechanisms.discard("warm_amplifier")["name"] == "warm_amplifier"
         assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
         assert client.diagnoses.get(second["id"])["report"] == second["report"]
         fourth = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
@@ -134,6 +138,7 @@ def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(own_place: Place
     folder = own_place.folder / "mechanisms"
     with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
         campaign_id = sent(server, warmed())
+        before = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
         folder.mkdir()
         (folder / "warm.yaml").write_text(WARM.replace("gain", "weather"), encoding="utf-8")
         for _ in range(2):
@@ -141,6 +146,9 @@ def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(own_place: Place
                 client.mechanisms.all()
             with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
                 client.diagnoses.start(campaign_id)
+        page = httpx.get(f"{server.http.base_url}/diagnoses/{before['id']}", headers={"Accept": "text/html"})
+        assert page.status_code == 200
+        assert "follows" in page.text
         (folder / "warm.yaml").write_text(WARM, encoding="utf-8")
         found = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
         assert [entry["name"] for entry in found["report"]["mechanisms"]] == ["warm_amplifier"]

@@ -54,18 +54,18 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
         return {}
     base = _commonest(problem)
     ends = _ends(leading, law, base)
-    count, probability = _enough(abs(ends.difference) / _scatter(problem, leading, base))
     past = law.axis.name in _PAST
-    recordings = (
-        [_like(problem, _nearest(problem, law.axis, at)) for at in (ends.low, ends.high)]
-        if past
-        else [_like(problem, base) | {law.axis.name: float(f"{at:.4g}")} for at in (ends.low, ends.high)]
-    )
+    like = [_nearest(problem, law.axis, at) if past else base for at in ends.both]
+    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, number) for number in like))
+    recordings = [_like(problem, number) for number in like]
+    if not past:
+        for entry, at in zip(recordings, ends.both, strict=True):
+            entry[law.axis.name] = float(f"{at:.4g}")
     many = "one recording" if count == 1 else f"{count} recordings"
     differs = f"{100 * abs(np.expm1(ends.difference)):.2g} %"
     told = f"with a probability of {in_percent(probability)}"
     if past:
-        first, second = (problem.collapsed.campaign.recordings[_nearest(problem, law.axis, at)].id for at in ends.both)
+        first, second = (problem.collapsed.campaign.recordings[number].id for number in like)
         statement = (
             f"Repeating {first} and {second} after one another, {many} of each in turns, should tell whether it is the "
             f"time, {told}: if it is, the {differs} are gone by which they differ beyond what the known physics says."
@@ -75,7 +75,8 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
         low, high = (f"{at:.4g}{'' if law.axis.unit == '-' else f' {law.axis.unit}'}" for at in ends.both)
         statement = (
             f"{many.capitalize()} with {words} at {low} and as many at {high}, in turns and all else equal, should "
-            f"tell whether the law holds, {told}: if it does, the charge differs by {differs}."
+            f"tell whether the law holds, {told}: if it does, the charge differs by {differs} "
+            f"beyond what the known physics says."
             f"{_HOW.get(law.axis.name, '')}"
         )
     beside = [name for name in leading.explanation.names if name != law.name]
@@ -116,10 +117,11 @@ def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) ->
 
 
 def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
-    """Of one recording's charge, relative."""
-    levels, collapsed = leading.explanation.best.levels, problem.collapsed
-    line = levels.level * collapsed.deviation[base] / max(float(np.abs(collapsed.value[base])), 1e-300)
-    return float(np.hypot(levels.gain, line))
+    """Of one recording's charge, relative: from its gain, its place and its lines."""
+    best, collapsed = leading.explanation.best, problem.collapsed
+    line = best.levels.level * collapsed.deviation[base] / max(float(np.abs(collapsed.value[base])), 1e-300)
+    place = best.levels.position * float(np.hypot(*best.relative_place_slopes[:, base]))
+    return float(np.sqrt(best.levels.gain**2 + place**2 + line**2))
 
 
 def _enough(size: float) -> tuple[int, float]:
