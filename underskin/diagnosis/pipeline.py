@@ -12,10 +12,11 @@ import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
-from underskin.diagnosis.localisation.effect_size import effect
-from underskin.diagnosis.localisation.permutation_test import SEED, locate
+from underskin.diagnosis.localisation.effect_size import EffectSize, effect
+from underskin.diagnosis.localisation.permutation_test import SEED, AxisResult, locate
 from underskin.diagnosis.localisation.region import in_region, region
 from underskin.diagnosis.localisation.residual_shape import describe
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -121,14 +122,7 @@ def _work_out(
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)
     shown = result.shown_or_nothing(leader)
-    levels = shown.best.levels
-    gain = float(np.clip(levels.gain, 0.005, 0.05))
-    against_base = residuals(problem, nothing, gain, levels.position)
-    axes = locate(problem.lines, against_base)
-    ranges = region(problem.lines, against_base, axes)
-    size = effect(
-        problem.lines, whole_prediction(problem, nothing), in_region(problem.lines, ranges), gain, levels.level
-    )
+    axes, ranges, size = _located(problem, nothing, shown.best.levels)
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     groups = _held_out(problem, result, ranked, nothing)
@@ -168,6 +162,18 @@ def _work_out(
         shape=shape,
         plan=plan(problem, result, limits),
     )
+
+
+def _located(
+    problem: FittingProblem, nothing: Explanation, levels: NoiseLevels
+) -> tuple[list[AxisResult], dict[str, list[float | str]], EffectSize]:
+    """Where the recordings depart from the base model, and by how much there; `levels` are those of the answer."""
+    gain = float(np.clip(levels.gain, 0.005, 0.05))
+    against_base = residuals(problem, nothing, gain, levels.position)
+    axes = locate(problem.lines, against_base)
+    ranges = region(problem.lines, against_base, axes)
+    prediction = whole_prediction(problem, nothing)
+    return axes, ranges, effect(problem.lines, prediction, in_region(problem.lines, ranges), gain, levels.level)
 
 
 def _held_out(

@@ -26,7 +26,7 @@ SMOOTH = 2  # of curves, which have no place
 
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
-_PREDICTED_AT_ONCE = 2_000_000
+_PREDICTED_AT_ONCE = 1_000_000
 _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 
 

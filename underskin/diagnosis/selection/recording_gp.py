@@ -5,6 +5,7 @@ Matérn-3/2 process over one axis of the campaign, or over all of them. Scatters
 over their priors. The residual that it works on is also what laws that nobody listed are screened against.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,7 +28,7 @@ _USUAL_GAIN = 3  # of these
 _GONE = 60.0  # nats behind the best node, which a process of few features cannot lose there
 _USUAL_POSITION = np.geomspace(0.05e-3, 0.3e-3, 4)  # [m], beside a process; without one the scatter may be larger
 _ANY_POSITION = np.geomspace(0.03e-3, 0.6e-3, 12)
-_BLOCK = 64  # sets of features worked on at once
+_BLOCK = 16  # sets of features worked on at once
 _FEW = 3  # features, up to which products of their pairs are fewer than copies of them weighed for each scatter
 
 
@@ -43,10 +44,10 @@ class ScatterNodes:
 
 @dataclass(frozen=True, eq=False)
 class _WithoutProcess:
-    """Scatter nodes with what is fixed taken out: C = V + F Fᵀ, V the variances and F the `fixed` columns.
+    """At several scatters, with what is fixed taken out: C = V + F Fᵀ, V the variances and F the `fixed` columns.
 
-    `log_density` of the residual r (gains,); C⁻¹ = V⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ V⁻¹, L Lᵀ = 1 + Fᵀ V⁻¹ F (gains,
-    columns, recordings); `root` V^(−½) and `weighed` C⁻¹ r (gains, recordings).
+    `log_density` of the residual r (scatters,); C⁻¹ = V⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ V⁻¹, L Lᵀ = 1 + Fᵀ V⁻¹ F
+    (scatters, columns, recordings); `root` V^(−½) and `weighed` C⁻¹ r (scatters, recordings).
     """
 
     log_density: Floats
@@ -68,8 +69,14 @@ class _WithoutProcess:
         log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
         return cls(log_density, np.sqrt(precision), taken, weighed)
 
-    def of_gains(self, kept: Mask) -> "_WithoutProcess":
-        """At some of the scatters of gain."""
+    @classmethod
+    def joined(cls, each: Sequence["_WithoutProcess"]) -> "_WithoutProcess":
+        """The scatters of all of these."""
+        columns = zip(*((entry.log_density, entry.root, entry.taken, entry.weighed) for entry in each), strict=True)
+        return cls(*map(np.concatenate, columns))
+
+    def at(self, kept: Mask) -> "_WithoutProcess":
+        """At some of the scatters."""
         return _WithoutProcess(self.log_density[kept], self.root[kept], self.taken[kept], self.weighed[kept])
 
     def summed(self, alike: Indices) -> "_WithoutProcess":
@@ -148,21 +155,20 @@ class GainResidual:
         return float(logsumexp(each))
 
     @cached_property
-    def _usual(self) -> list[_WithoutProcess]:
-        """Of nodes that can matter: no process gains more in one than half of χ² there."""
+    def _usual(self) -> _WithoutProcess:
+        """At all scatters of place and gain that can matter: no process gains more in one than half of χ² there."""
         each = [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
         least = max(float(entry.log_density.max()) for entry in each) - _GONE
-        mattering = []
-        for entry, nodes in zip(each, self.usual, strict=True):
-            kept = entry.log_density + 0.5 * (entry.weighed @ nodes.residual) > least
-            if kept.any():
-                mattering.append(entry.of_gains(kept))
-        return mattering
+        highest = [
+            entry.log_density + 0.5 * (entry.weighed @ nodes.residual)
+            for entry, nodes in zip(each, self.usual, strict=True)
+        ]
+        return _WithoutProcess.joined(each).at(np.concatenate(highest) > least)
 
     @cached_property
     def _still(self) -> _WithoutProcess:
         """Without scatter of place, at one usual scatter of gain."""
-        return _WithoutProcess.of(self.usual[0], self.fixed).of_gains(np.arange(len(_GAINS)) == _USUAL_GAIN)
+        return _WithoutProcess.of(self.usual[0], self.fixed).at(np.arange(len(_GAINS)) == _USUAL_GAIN)
 
     def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
@@ -170,8 +176,8 @@ class GainResidual:
         Where recordings are `alike` (recordings,), features are those of the distinct ones (sets, distinct, features).
         Over the priors of the scatters, and of the amplitudes, each as probable as the others.
         """
-        without = self._usual if alike is None else [entry.summed(alike) for entry in self._usual]
-        each = [np.concatenate([_with(some, amplitudes, entry) for entry in without]) for some in _blocks(sets)]
+        without = self._usual if alike is None else self._usual.summed(alike)
+        each = [_with(some, amplitudes, without) for some in _blocks(sets)]
         return np.asarray(logsumexp(np.concatenate(each, axis=1), axis=0) - self._plain)
 
     def amplitudes(self, sets: Floats) -> Floats:
@@ -194,7 +200,7 @@ def _most_probable(sets: Floats, without: _WithoutProcess) -> Floats:
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
-    """log p(residual, features) at one scatter of place and each of gain (gains, sets)."""
+    """log p(residual, features) at each scatter (scatters, sets)."""
     from underskin.diagnosis.selection.process_kernel import gained
 
     count, rows, size = sets.shape
@@ -208,13 +214,14 @@ def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
 
 
 def _grams(columns: Floats, count: int) -> Floats:
-    """Products of each of `count` blocks of columns (gains, rows, columns) with itself (count, gains, size, size)."""
+    """Products of each of `count` blocks of columns (scatters, rows, columns) with itself, (count, scatters, size,
+    size)."""
     blocks = columns.reshape(*columns.shape[:2], count, -1).transpose(2, 0, 3, 1)
     return np.asarray(blocks @ blocks.swapaxes(-1, -2))
 
 
 def _weighed_grams(columns: Floats, count: int, root: Floats) -> Floats:
-    """The same of columns (rows, columns) whose rows weigh root² (gains, rows)."""
+    """The same of columns (rows, columns) whose rows weigh root² (scatters, rows)."""
     size = columns.shape[1] // count
     if size > _FEW:
         return _grams(columns * root[:, :, None], count)

@@ -80,11 +80,12 @@ class _Group(Generic[Law]):
 
     def scores(self, gains: Floats, amplitudes: Floats) -> Iterator[Score]:
         """From the gain at each point, and the most probable amplitudes there."""
-        means = np.logaddexp.reduceat(gains, self.first[:-1]) - np.log(np.diff(self.first))
-        for number, (law, gain, log_share) in enumerate(zip(self.laws, means.tolist(), self.log_shares, strict=True)):
-            start, end = self.first[number], self.first[number + 1]
-            best = int(start + np.argmax(gains[start:end]))
-            yield Score(law, gain, log_share, amplitudes[best], self.grid[best])
+        start = self.first[:-1]
+        counts = np.diff(self.first)
+        means = np.logaddexp.reduceat(gains, start) - np.log(counts)
+        highest = np.flatnonzero(gains == np.repeat(np.maximum.reduceat(gains, start), counts))
+        best = highest[np.searchsorted(highest, start)]  # the first of each law
+        return map(Score, self.laws, means.tolist(), self.log_shares, amplitudes[best], self.grid[best])
 
 
 class Screening:

@@ -41,14 +41,13 @@ class OffsetSigma:
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
         a, x = table.contact_axes
-        profile = table.profile_over(radii)
         along = CubicBasis(radii)
+        self.bases = of_a, of_x, of_rho, of_offset = [CubicBasis(np.asarray(at)) for at in (a, x, np.log(rho), offsets)]
+        # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
+        profile = of_x.coefficients(of_a.coefficients(table.profile_over(radii), 1), 2)
         average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
-        values: Floats = np.einsum("mer,rax->axme", average, profile, optimize=True)
-        self.bases = [CubicBasis(np.asarray(nodes)) for nodes in (a, x, np.log(rho), offsets)]
-        for axis, basis in enumerate(self.bases):
-            values = basis.coefficients(values, axis)
-        self._table = np.ascontiguousarray(values)
+        average = of_offset.coefficients(of_rho.coefficients(average, 0), 1)
+        self._table: Floats = np.ascontiguousarray(np.einsum("mer,rax->axme", average, profile, optimize=True))
         self._ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
         self._ends[3, 1] = self.end
         self._axes = [part for basis in self.bases for part in (basis.knots, basis.cubics)]
