@@ -129,8 +129,9 @@ def _work_out(
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
-    after = cross_validation.total(groups)[1]
-    if problem.kind == "indentation" and after.recordings and after.is_missed(_FAR_ABOVE):
+    before, after = cross_validation.total(groups)
+    misled = after.is_missed(_FAR_ABOVE) or after.misleads(before)
+    if problem.kind == "indentation" and after.recordings and misled:
         contradicted |= {entry.names for entry in ranked[:1] if entry.names}
     if contradicted:
         result = replace(result, contradicted=frozenset(contradicted))

@@ -39,6 +39,8 @@ class Parameter:
 
     A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
     the prior are of the multiple, while laws and reports have the product, in `unit`.
+
+    `starts` are values at which fits begin, where not at quantiles of the prior.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Parameter:
     shown: float | None = None
     proportional: bool = False
     relative_to: str | None = None
+    starts: tuple[float, ...] = ()
 
     @property
     def moves_covariance(self) -> bool:

@@ -72,7 +72,7 @@ class LeastSquares:
         if self._jumps:
             other, less = self._descended(*self._between_samples(x))
             x, cost = (other, less) if less < cost else (x, cost)
-        return x[: len(start)], cost
+        return np.clip(x[: len(start)], self._low, self._high), cost  # which rounding may pass
 
     def _between_samples(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Fit coordinates and gains with each contact point amid those two samples of the approach, near where it is,

@@ -63,10 +63,15 @@ class _Grid:
         # New too is what has other parameters beside the mechanism that was added.
         self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
         parameters = {name: hypothesis.model.parameters[places[name]] for name in self.new}
-        quantiles = _QUANTILES.get(sum(map(len, parameters.values())), (0.5,))
+        loose = sum(not entry.starts for own in parameters.values() for entry in own)
+        quantiles = _QUANTILES.get(loose, (0.5,))
         if any(hypothesis.lines.mechanisms[name].begins_at_guesses for name in self.new):
             quantiles = (0.5,)
-        axes = [[entry.quantile(q) for q in quantiles] for name in self.new for entry in parameters[name]]
+        axes = [
+            [entry.to_fit(value) for value in entry.starts] or [entry.quantile(q) for q in quantiles]
+            for name in self.new
+            for entry in parameters[name]
+        ]
         free = [place for name in self.new for place in range(places[name].start, places[name].stop)]
         points = [*itertools.product(*axes)]
         self.shape = [len(axis) for axis in axes] or [1]

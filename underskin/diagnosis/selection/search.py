@@ -4,7 +4,6 @@ Priors over sets are fixed: see PRIORS. Within a size, every set of mechanisms t
 probable. Singles are all fitted; pairs and triples grow greedily from the best, but of curves all pairs are.
 """
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +14,8 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
+from underskin.diagnosis.selection import curve_sets
+from underskin.diagnosis.selection.curve_sets import Explanations
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
@@ -31,12 +32,7 @@ _SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no 
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
-_LEADING = 8.0  # nats behind the best within which sets of curves are fitted again with one mechanism less
-_STUCK = 1.0  # nats that a fit begun elsewhere must gain
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
-
-
-Explanations = dict[frozenset[str], Explanation]  # by the names of their mechanisms
 
 
 @dataclass(frozen=True)
@@ -162,6 +158,9 @@ class Search:
         """
         kept = [entry for entry in self.explanations if self.shows(entry)]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
+        for entry, weight in self._possible_beside(kept, weights):
+            kept.append(entry)
+            weights.append(weight)
         showing = [weight for _, weight in self.processes_showing]
         showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
@@ -175,6 +174,28 @@ class Search:
             Answer(rivals[number], float(probabilities[number])) for number, share in enumerate([*left, 1.0]) if share
         ]
         return sorted(answers, key=lambda answer: -answer.probability)
+
+    def _possible_beside(
+        self, kept: Sequence[Explanation], weights: Sequence[float]
+    ) -> list[tuple[Explanation, float]]:
+        """Of indentations: the sets with one mechanism more than one of these that gain evidence, but less than shows.
+
+        So little is no evidence, as laws of contact idealise, but no reason against the mechanism either: beside the
+        smaller set each has the weight of its prior.
+        """
+        if self.explanations[0].best.hypothesis.lines.kind != "indentation":
+            return []
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        own = {frozenset(entry.names): weight for entry, weight in zip(kept, weights, strict=True)}
+        possible = []
+        for entry in self.explanations:
+            whole = frozenset(entry.names)
+            smaller = [whole - {name} for name in whole if whole - {name} in own]
+            if whole in own or not smaller or any(evidence[less] >= entry.log_evidence for less in smaller):
+                continue
+            more = self.log_prior(entry) - log_prior(len(whole) - 1, self.supported)
+            possible.append((entry, max(own[less] for less in smaller) + more))
+        return possible
 
     def _left_to(self, explanation: Explanation) -> float:
         """The share that stays of a probability: all, unless the residual contradicts the explanation; of curves a
@@ -236,7 +257,7 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
         integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
         explanations |= integrated
         if problem.lines.curves and size == 2:
-            requests = _all_pairs(names, explanations)
+            requests = curve_sets.all_pairs(names, explanations)
         else:
             requests = [
                 Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
@@ -246,8 +267,11 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
             ]
         tried |= {frozenset(request.names) for request in requests}
         _explain(problem, explanations, requests)
+        if problem.lines.curves and size == 2:
+            explanations |= curve_sets.afresh(problem, explanations, requests)
     if problem.lines.curves:
-        refitted = _from_larger(problem, explanations, unsupported)
+        weight = Search(tuple(explanations.values()), (), unsupported).log_weight
+        refitted = curve_sets.from_larger(problem, explanations, weight)
         explanations |= refitted
         integrated = {names: entry for names, entry in integrated.items() if names not in refitted}
     explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
@@ -255,35 +279,6 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
     best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
     processes = tuple((entry, discrepancy(problem, entry)) for entry in (explanations[frozenset()], *best))
     return replace(result, discrepancies=processes)
-
-
-def _all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
-    """Of curves, on which few mechanisms act and two may hide each other: every pair, from the better of its two."""
-    requests = []
-    for one, other in itertools.combinations(names, 2):
-        known = [explanations[key] for key in (frozenset([one]), frozenset([other])) if key in explanations]
-        parent = max(known, key=lambda entry: entry.log_evidence, default=None)
-        requests.append(Request((one, other), parent))
-    return requests
-
-
-def _from_larger(problem: FittingProblem, explanations: Explanations, unsupported: dict[str, str]) -> Explanations:
-    """Of curves: the sets with one mechanism less than the best ones, or than those among them that fit better for it,
-    fitted from there: what was stuck elsewhere would ask for a companion."""
-    better: Explanations = {}
-    weight = Search(tuple(explanations.values()), (), unsupported).log_weight
-    least = max(map(weight, explanations.values())) - _LEADING
-    waiting = [entry for entry in explanations.values() if weight(entry) > least]
-    while waiting:
-        larger = waiting.pop()
-        smaller = [tuple(one for one in larger.names if one != name) for name in larger.names if len(larger.names) > 1]
-        fitted = problem.explain([Request(names, larger=larger) for names in smaller])
-        for names, found in zip(smaller, fitted, strict=True):
-            before = (explanations | better).get(frozenset(names))
-            if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
-                better[frozenset(names)] = found
-                waiting.append(found)
-    return better
 
 
 def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:

@@ -25,6 +25,7 @@ _FURTHEST = 0.6  # of a curve's highest force
 _LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
 _LEAST_KEPT = 3  # recordings that must remain
+_WORSE = 1.5  # times the error before, or the noise
 _BEST = 10  # sets among which the choice is repeated
 _BEHIND = 15.0  # nats
 
@@ -52,6 +53,10 @@ class PredictionScore:
     def is_missed(self, times: float) -> bool:
         """Whether rows are missed by more than so many times what noise and the parameters' uncertainty give."""
         return self.square > times**2 * (self.noise + self.unsure)
+
+    def misleads(self, before: "PredictionScore") -> bool:
+        """Whether rows are missed by clearly more than before, and not by noise."""
+        return self.square > _WORSE**2 * max(before.square, self.noise)
 
     @property
     def floor_percent(self) -> float:
@@ -158,6 +163,8 @@ def _without(
         return None
     chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(entry))
     before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
+    if problem.lines.curves:  # whose zero of force is each explanation's own, while errors are said of one size
+        before, after = (replace(entry, size=max(before.size, after.size)) for entry in (before, after))
     return HeldOut(name, chosen.names, before, after)
 
 

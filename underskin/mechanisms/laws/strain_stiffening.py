@@ -45,6 +45,7 @@ _SPHERE = (
         scale="linear",
         limit=None,
         shown=1.0,
+        starts=(-1.0, 1.0),
         reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
     ),
     Parameter(
@@ -56,6 +57,7 @@ _SPHERE = (
         scale="linear",
         limit=None,
         shown=2.0,
+        starts=(1.0, 2.0),
         reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
     ),
 )

@@ -131,14 +131,16 @@ def relaxing_on_stage(
 
 def _elastic(sphere: Sphere, a: Floats, adhesion: Adhesion | None) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """F and K of the elastic contact that grows, at its modulus at rest; ℓ and ℓ_s; and how much stiffer it is."""
-    force, _, stiffness, _ = sphere.at(a)
-    stiffer = sphere.stiffer(a)
+    force, _, stiffness, unit = sphere.at(a)
+    stiffer = np.ones_like(a)
+    if sphere.stiffening is not None:
+        stiffer = stiffness / replace(sphere, stiffening=None).at(a)[2]
     force, stiffness = force / stiffer, stiffness / stiffer
     if adhesion is None:
         none = np.zeros_like(force)
         return force, stiffness, none, none, stiffer
-    stretch = sphere.stretch(a, adhesion.work)
-    return force - stiffness * stretch, stiffness, stretch, sphere.stretch(a, adhesion.separation), stiffer
+    stretch, parting = unit * np.sqrt(adhesion.work), unit * np.sqrt(adhesion.separation)
+    return force - stiffness * stretch, stiffness, stretch, parting, stiffer
 
 
 def _first_touch(

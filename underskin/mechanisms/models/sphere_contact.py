@@ -15,7 +15,7 @@ Arrays are (points, curves, samples), with 1 where nothing differs: points of th
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, cached_property, lru_cache
 
 import numpy as np
@@ -112,16 +112,6 @@ class Sphere:
         force, depth, stiffness, stretch = contact
         return force, depth, stiffness, stretch
 
-    def stretch(self, a: Floats, work: Floats) -> Floats:
-        """ℓ of an edge with the energy release rate `work` [J/m²]."""
-        return np.asarray(self.at(a)[3] * np.sqrt(work))
-
-    def stiffer(self, a: Floats) -> Floats:
-        """E' at the strain of a contact over that at rest."""
-        if self.stiffening is None:
-            return np.ones_like(a)
-        return np.asarray(self.at(a)[2] / replace(self, stiffening=None).at(a)[2])
-
     def travel(self, a: Floats, work: Floats) -> Floats:
         """δ + F/k in equilibrium."""
         force, depth, stiffness, unit = self.at(a)
@@ -192,7 +182,10 @@ class Sphere:
 
 def _wide(values: Floats | float, shape: tuple[int, ...], last: tuple[int, ...] = ()) -> Floats:
     """Broadcast to a shape, but along the last axis to what is `last`; contiguous."""
-    return contiguous(np.broadcast_to(values, (*shape[:-1], *last) if last else shape))
+    whole = (*shape[:-1], *last) if last else shape
+    if isinstance(values, np.ndarray) and values.shape == whole:
+        return contiguous(values)
+    return contiguous(np.broadcast_to(values, whole))
 
 
 def in_contact(travel: Floats, pull_off: Floats) -> Mask:

@@ -1,0 +1,76 @@
+"""Which sets of mechanisms are found on curves, and what a companion that hardly shows is given."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.draw_curves import drawn_curves
+from rig.effects import INDENTATION
+from rig.elastomer import campaign_of_curves
+from tests.support.pressed_curves import explained, pressed
+from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.least_squares import LeastSquares
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.selection.search import PRIORS, Search
+from underskin.recordings.campaign import Campaign, parse
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+SUPPORTED = 6
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+@pytest.fixture(scope="module")
+def stiffening_on_a_stage() -> Campaign:
+    """An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike."""
+    return parse(campaign_of_curves(*drawn_curves(777001, 109, INDENTATION, "pair")))
+
+
+@pytest.fixture(scope="module")
+def report(stiffening_on_a_stage: Campaign, table: SigmaTable) -> dict[str, Any]:
+    return diagnosis_report(stiffening_on_a_stage, table)
+
+
+def test_two_mechanisms_that_share_a_bend_are_found_from_starts_over_both(report: dict[str, Any]) -> None:
+    found = {entry["name"]: entry["parameters"] for entry in report["mechanisms"]}
+    assert set(found) == {"instrument_compliance", "strain_stiffening"}
+    (stage,) = found["instrument_compliance"]
+    assert stage["low"] < 57.8 < stage["high"] < 70  # alone it would have 124
+
+
+def test_least_squares_that_rounding_takes_past_a_bound_end_at_it(
+    table: SigmaTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond a bound there is no finite posterior, and the diagnosis failed."""
+    problem = FittingProblem(curve_lines(pressed(3.0, (5.0,)), "indentation"), table)
+    hypothesis = problem.hypothesis(("instrument_compliance", "strain_stiffening"), placed=False)
+    start = np.array([entry.start for entry in hypothesis.model.parameters])
+    low, high = np.array([entry.bounds for entry in hypothesis.model.parameters]).T
+    past = np.append(np.nextafter(high, np.inf), 0.0)
+    monkeypatch.setattr(LeastSquares, "_descended", lambda *_: (past, 1.0))
+    fit, _ = LeastSquares(hypothesis).fitted(start)
+    assert (fit >= low).all()
+    assert (fit <= high).all()
+
+
+@pytest.mark.parametrize(("gained", "stays"), [(-0.1, False), (0.1, True), (4.9, True)])
+def test_a_companion_that_gains_less_than_shows_stays_with_its_prior(
+    gained: float, stays: bool, table: SigmaTable
+) -> None:
+    """A gain of fewer than five nats is no evidence for it, whatever its size, and no reason against it."""
+    alone, nothing = explained(pressed(3.0, (5.0,)), ("instrument_compliance",), table)
+    both = replace(alone, names=("instrument_compliance", "adhesion"), log_evidence=alone.log_evidence + gained)
+    search = Search((nothing, alone, both), (), {})
+    share = {answer.names: answer.probability for answer in search.answers}
+    supported = search.supported
+    expected = PRIORS["two"] / (supported * (supported - 1) / 2) / (PRIORS["one"] / supported)
+    if stays:
+        assert share[both.names] / share[alone.names] == pytest.approx(expected, rel=1e-3)
+    else:
+        assert both.names not in share

@@ -1,0 +1,84 @@
+"""Which sets of mechanisms are fitted to curves beyond each mechanism alone, and from where.
+
+A fit that begins at one mechanism's best parameters may end where another one's cannot be told: two that bend a curve
+alike share the bend between them in many ways. So where the best set leaves more than noise, pairs are fitted again
+from starts over the parameters of both, and sets also from those with one mechanism more.
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.objective import LEVEL, SMOOTH
+from underskin.diagnosis.inference.optimizer import Fitter
+
+_LEADING = 8.0  # nats behind the best within which sets are fitted again with one mechanism less
+_STUCK = 1.0  # nats that a fit begun elsewhere must gain
+_LEFT = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
+_ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
+
+Explanations = dict[frozenset[str], Explanation]  # by the names of their mechanisms
+
+
+def all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
+    """Every pair, from the better of its two: few mechanisms act on curves, and two may hide each other."""
+    requests = []
+    for one, other in itertools.combinations(names, 2):
+        known = [explanations[key] for key in (frozenset([one]), frozenset([other])) if key in explanations]
+        parent = max(known, key=lambda entry: entry.log_evidence, default=None)
+        requests.append(Request((one, other), parent))
+    return requests
+
+
+def afresh(problem: FittingProblem, explanations: Explanations, pairs: Sequence[Request]) -> Explanations:
+    """The pairs that fit better from starts over the parameters of both than from one of the two alone, where the best
+    set leaves something for that to matter."""
+    best = min(explanations.values(), key=lambda entry: entry.best.cost)
+    if left_smooth(best) < _LEFT:
+        return {}
+    known = problem.lines.mechanisms
+    requests = [
+        Request(pair.names, begin=None if any(known[name].moves_contact_points for name in pair.names) else best.point)
+        for pair in pairs
+    ]
+    better: Explanations = {}
+    for request, found in zip(requests, problem.explain(requests, best.best.cost), strict=True):
+        before = explanations.get(frozenset(request.names))
+        if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
+            better[frozenset(request.names)] = found
+    return better
+
+
+def left_smooth(explanation: Explanation) -> float:
+    """Nats that a smooth error brings an explanation of curves over the least one and rougher noise: what it leaves."""
+    fitter = Fitter([explanation.best.hypothesis])
+    at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
+    points = at.points[np.zeros(len(_ROUGHER), dtype=np.intp)]
+    covariance = points.covariance.copy()
+    covariance[:, LEVEL] += np.log(_ROUGHER)
+    covariance[:, SMOOTH] = explanation.best.hypothesis.covariance[SMOOTH].low
+    without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
+    return float(without.cost.min() - at.cost[0])
+
+
+def from_larger(
+    problem: FittingProblem, explanations: Explanations, weight: Callable[[Explanation], float]
+) -> Explanations:
+    """The sets with one mechanism less than the best ones, or than those among them that fit better for it,
+    fitted from there: what was stuck elsewhere would ask for a companion."""
+    better: Explanations = {}
+    least = max(map(weight, explanations.values())) - _LEADING
+    waiting = [entry for entry in explanations.values() if weight(entry) > least]
+    while waiting:
+        larger = waiting.pop()
+        smaller = [tuple(one for one in larger.names if one != name) for name in larger.names if len(larger.names) > 1]
+        fitted = problem.explain([Request(names, larger=larger) for names in smaller])
+        for names, found in zip(smaller, fitted, strict=True):
+            before = (explanations | better).get(frozenset(names))
+            if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
+                better[frozenset(names)] = found
+                waiting.append(found)
+    return better
