@@ -18,7 +18,7 @@ def _named(report: Result) -> str:
     for entry in report["mechanisms"]:
         values = ", ".join(
             f"{p['name']} {_number(p['value'])} {p['unit'].strip('-')} [{_number(p['low'])} to {_number(p['high'])}]"
-            for p in entry["parameters"]
+            for p in entry.get("parameters", ())  # none where a diagnosis failed
         )
         parts.append(f"{entry['name']} ({values})" if values else entry["name"])
     return "; ".join(parts) or "–"

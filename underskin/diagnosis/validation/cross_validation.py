@@ -127,10 +127,17 @@ def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
 
 
 def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
-    """The rows of every third recording along an axis (recordings,), three times: what lies between is predicted."""
+    """The rows of every third recording along an axis (recordings,), three times: what lies between is predicted; of
+    few recordings every third line."""
+    names = ("from the first", "from the second", "from the third")
+    if lines.recordings < _LEAST_KEPT + len(names):
+        line = np.arange(len(lines.value)) - lines.first[lines.recording]
+        return {f"every third line {name}": line % len(names) == place for place, name in enumerate(names)}
     rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
-    names = ("every third recording from the first", "from the second", "from the third")
-    return {name: (rank % len(names) == place)[lines.recording] for place, name in enumerate(names)}
+    return {
+        f"every third recording {name}": (rank % len(names) == place)[lines.recording]
+        for place, name in enumerate(names)
+    }
 
 
 def hold_out(
