@@ -22,7 +22,8 @@ def prove(
     part: Annotated[
         list[str] | None,
         typer.Argument(
-            help="open, sealed, recordings, paper, mixture, ceiling, quiet, curves, quiet_curves; default: all."
+            help="open, sealed, recordings, paper, mixture, ceiling, quiet, curves, quiet_curves, unlisted, "
+            "quiet_unlisted, left_out; default: all."
         ),
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from proof import concealed, own_curves, own_rig, paper_array, real
+from proof import concealed, left_out, own_curves, own_rig, paper_array, real, unlisted
 from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
@@ -84,6 +84,9 @@ PARTS: dict[str, Part] = {
     "quiet": own_rig.judge_quiet,
     "curves": own_curves.judge_curves,
     "quiet_curves": own_curves.judge_quiet_curves,
+    "unlisted": unlisted.judge_unlisted,
+    "quiet_unlisted": unlisted.judge_quiet_unlisted,
+    "left_out": left_out.judge_left_out,
 }
 
 

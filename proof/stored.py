@@ -90,17 +90,19 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
     document = case.document()
-    return stored(folder, digest_of([document, version]), partial(_diagnosed, document))
+    return stored(folder, digest_of([document, version]), partial(diagnosed, document))
 
 
-def _diagnosed(document: dict[str, Any]) -> dict[str, Any]:
-    from underskin.diagnosis.pipeline import diagnosis_report
+def diagnosed(document: dict[str, Any], without: Sequence[str] = ()) -> dict[str, Any]:
+    """The report (`report/1`) of a campaign/1 document, these mechanisms left out of the catalogue."""
+    from underskin.diagnosis.pipeline import diagnose, with_refused
+    from underskin.diagnosis.reporting.report import report
     from underskin.recordings.campaign import from_dict
     from underskin.surrogate.sigma_table import load_table
 
     try:
         campaign, refused = from_dict(document)
-        return diagnosis_report(campaign, load_table(), refused=refused)
+        return report(with_refused(diagnose(campaign, load_table(), without=without), refused))
     except Exception as error:  # a failed diagnosis counts as a wrong answer; the others go on
         failed = {"verdict": FAILED, "probability": 0.0, "statement": repr(error), "mechanisms": [{"name": FAILED}]}
         return {**failed, "alternatives": [], "fit": None}

@@ -12,6 +12,7 @@ from proof.phrases import median_of, misses, percent, right
 from proof.statistics import Share, calibration, share
 from proof.text_curves import curves, quiet_curves
 from proof.text_real import paper_array, recordings
+from proof.text_unlisted import alarms, hidden, left_out
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -20,7 +21,7 @@ _HEAD = """\
 # Proof: the diagnosis judged on what it cannot know
 
 Everything on this page, figures and numbers, is written by `make proof` (`underskin prove`, `proof/`). The full run
-takes three quarters of an hour on two cores; it keeps what it has worked out and goes on from there. Shares have
+takes about an hour on two cores; it keeps what it has worked out and goes on from there. Shares have
 Wilson's 95 % interval in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets the campaign and
 nothing else.
 
@@ -42,6 +43,9 @@ def document(parts: Mapping[str, Result]) -> str:
         "quiet": _quiet,
         "curves": curves,
         "quiet_curves": quiet_curves,
+        "unlisted": lambda result: hidden(result, parts.get("quiet_unlisted")),
+        "quiet_unlisted": alarms,
+        "left_out": left_out,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -1,117 +1,93 @@
-"""Laws that nobody listed, from a rig of their own (`rig/unlisted`): `python -m proof.unlisted --seed N --count K`.
+"""Laws that nobody listed, from a rig of their own (`rig/unlisted`), and campaigns of it that hide nothing.
 
-Prints how many are recognised as not in the catalogue, of how many it is told where they enter and what they follow
-(right, or an equivalent that the rig itself cannot tell from it), and how far the errors on recordings held out lie
-above the noise floor. With `--quiet` nothing is hidden, and what is stated is a false alarm.
+How many are recognised as not in the catalogue, of how many it is told where they enter and what they follow (right,
+or an equivalent that the rig itself cannot tell from it), and how far the errors on recordings held out lie above the
+noise. `python -m proof.unlisted --seed N --count K` prints this for another seed; with `--quiet` nothing is hidden, and
+what is stated is a false alarm.
 """
 
 import argparse
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
-from proof.statistics import share
+from proof.cases import FileCase
+from proof.stored import Work, reports, sources
+from proof.text_unlisted import alarms, hidden
 from rig.unlisted.campaign import write
-from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.recordings.campaign import parse
-from underskin.surrogate.sigma_table import load_table
 
-_ALARMS = ("explained", "unexplained", "ambiguous")
+SEED, COUNT, QUIET = 51051, 120, 500
 
 
-@dataclass(frozen=True)
-class Judged:
+def judge_unlisted(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """Campaigns that hide one law."""
+    return _judge(work, SEED, min(work.count or COUNT, COUNT), progress, quiet=False)
+
+
+def judge_quiet_unlisted(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """Campaigns that hide nothing."""
+    return _judge(work, SEED + 1, min(work.count or QUIET, QUIET), progress, quiet=True)
+
+
+def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], None], *, quiet: bool) -> dict[str, Any]:
+    folder = work.folder / f"unlisted-{seed}-{count}-{sources('rig')}"
+    known = folder / "truth.json"
+    truths = json.loads(known.read_text()) if known.exists() else write(seed, count, folder, quiet)
+    cases = [FileCase(folder / f"{name}.json") for name in truths]
+    answers = reports(work, cases, progress)
+    return {
+        "seed": seed,
+        "judged": [judged(case.name, truths[case.name], report) for case, report in zip(cases, answers, strict=True)],
+    }
+
+
+def judged(name: str, truth: Mapping[str, Any], report: Mapping[str, Any]) -> dict[str, Any]:
     """One campaign: its truth, and what its report says."""
-
-    name: str
-    truth: Mapping[str, Any]
-    report: Mapping[str, Any]
-
-    @property
-    def recognised(self) -> bool:
-        """As something that is not in the catalogue."""
-        return bool(self.report["verdict"] == "unexplained")
-
-    @property
-    def placed(self) -> bool:
-        """Where it enters and what it follows are right, or equivalents."""
-        law, hidden = self.report["unnamed"], self.truth["law"]
-        if law is None:
-            return False
-        enters = {hidden["acts_on"], *self.truth["acts_on_also"]}
-        follows = {hidden["axis"], *self.truth["axis_also"]}
-        return law["acts_on"] in enters and law["axis"] in follows
-
-    @property
-    def shaped(self) -> bool:
-        """The form is right as well, or an equivalent."""
-        return self.placed and self.report["unnamed"]["form"] in {self.truth["law"]["form"], *self.truth["form_also"]}
+    law, told = truth.get("law"), report.get("unnamed")
+    placed = shaped = False
+    if law is not None and told is not None:
+        placed = told["acts_on"] in {law["acts_on"], *truth["acts_on_also"]}
+        placed = placed and told["axis"] in {law["axis"], *truth["axis_also"]}
+        shaped = placed and told["form"] in {law["form"], *truth["form_also"]}
+    answers = [{"mechanisms": ["leading"], "probability": report["probability"]}, *report["alternatives"]]
+    nothing = [entry["probability"] for entry in answers if entry["mechanisms"] == ["nothing_missing"]]
+    quiet = report["verdict"] in ("no_mismatch", "insufficient_data")
+    return {
+        "name": name,
+        "law": None if law is None else f"{law['acts_on']} over {law['axis']}, {law['form']}",
+        "identifiable": bool(truth.get("identifiable", False)),
+        "verdict": report["verdict"],
+        "missing": 1 - (report["probability"] if quiet else sum(nothing)),
+        "recognised": report["verdict"] == "unexplained",
+        "placed": placed,
+        "shaped": shaped,
+        "over_noise": _over_noise(report),
+        "statement": report["statement"][:150],
+        "probability": report["probability"],
+    }
 
 
-def judged(seed: int, count: int, *, quiet: bool) -> list[Judged]:
-    """So many campaigns of a seed, diagnosed from their files alone."""
-    table = load_table()
-    with tempfile.TemporaryDirectory() as folder:
-        truths = write(seed, count, Path(folder), quiet)
-        return [
-            Judged(name, truth, diagnosis_report(parse(json.loads(Path(folder, f"{name}.json").read_text())), table))
-            for name, truth in truths.items()
-        ]
+def _over_noise(report: Mapping[str, Any]) -> float | None:
+    """The error held out with the unnamed law, over what noise alone would give."""
+    law, fit = report.get("unnamed"), report["fit"]
+    if law is None or not fit or not fit["noise_floor_percent"]:
+        return None
+    return float(law["heldout_rmse_percent"]["after"] / fit["noise_floor_percent"])
 
 
-def lines(entries: Sequence[Judged]) -> list[str]:
-    """What came of campaigns that hide a law: those that are identifiable by the rig's own equations."""
-    known = [entry for entry in entries if entry.truth["identifiable"]]
-    modelled = [entry for entry in known if entry.report["unnamed"] is not None]
-    over = [entry.report["unnamed"]["heldout_rmse_percent"]["after"] / _floor(entry) for entry in modelled]
-    misses = [
-        f"{entry.name}: {entry.truth['law']['acts_on']} over {entry.truth['law']['axis']}, "
-        f"{entry.truth['law']['form']}; stated: {entry.report['statement'][:150]}"
-        for entry in known
-        if not entry.placed
-    ]
-    return [
-        f"recognised as not in the catalogue: {_share([entry.recognised for entry in known])}",
-        f"where and axis: {_share([entry.placed for entry in known])}",
-        f"where, axis and form: {_share([entry.shaped for entry in known])}",
-        f"held out, error after over noise floor: median {median(over):.2f}" if over else "none was modelled",
-        f"at most 1.5 times the floor: {_share([ratio <= 1.5 for ratio in over])}",
-        *misses,
-    ]
-
-
-def alarms(entries: Sequence[Judged]) -> list[str]:
-    """What came of campaigns that hide nothing."""
-    false = [entry for entry in entries if entry.report["verdict"] in _ALARMS]
-    stated = [f"{entry.name}: {entry.report['probability']:.2f} {entry.report['statement'][:150]}" for entry in false]
-    return [f"false alarms: {_share([entry in false for entry in entries])}", *stated]
-
-
-def _floor(entry: Judged) -> float:
-    return float(entry.report["fit"]["noise_floor_percent"])
-
-
-def _share(outcomes: Sequence[bool]) -> str:
-    found = share(outcomes)
-    if not found.count:
-        return "none"
-    low, high = found.interval
-    return f"{found.right} of {found.count}: {100 * found.value:.0f} % [{100 * low:.0f}–{100 * high:.0f}]"
-
-
-def main() -> None:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="proof.unlisted", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--count", type=int, required=True)
     parser.add_argument("--quiet", action="store_true", help="hide nothing")
-    given = parser.parse_args()
-    entries = judged(given.seed, given.count, quiet=given.quiet)
-    print("\n".join((alarms if given.quiet else lines)(entries)))
+    given = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        work = Work(Path(folder))
+        result = _judge(work, given.seed, given.count, lambda *_: None, quiet=given.quiet)
+    print((alarms if given.quiet else hidden)(result))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,19 @@
 """Judging laws that nobody listed: what counts as right, and whole campaigns of the rig that hides them."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from proof.unlisted import Judged, alarms, judged, lines
+from proof.left_out import compared
+from proof.stored import Work
+from proof.text_unlisted import alarms, hidden, left_out
+from proof.unlisted import judge_unlisted, judged
 
 
-def entry(law: dict[str, Any] | None, *, floor: float = 2.0, verdict: str = "unexplained") -> Judged:
+def entry(
+    law: dict[str, Any] | None, *, floor: float = 2.0, verdict: str = "unexplained", probability: float = 0.9
+) -> dict[str, Any]:
     truth = {
         "identifiable": True,
         "law": {"acts_on": "modulus", "axis": "order", "form": "linear"},
@@ -17,12 +23,13 @@ def entry(law: dict[str, Any] | None, *, floor: float = 2.0, verdict: str = "une
     }
     report = {
         "verdict": verdict,
-        "probability": 0.9,
+        "probability": probability,
         "statement": "Something.",
         "unnamed": law,
+        "alternatives": [{"mechanisms": ["nothing_missing"], "probability": 0.04}],
         "fit": {"noise_floor_percent": floor},
     }
-    return Judged("0001", truth, report)
+    return judged("0001", truth, report)
 
 
 def law(acts_on: str, axis: str, form: str, after: float = 2.2) -> dict[str, Any]:
@@ -30,13 +37,18 @@ def law(acts_on: str, axis: str, form: str, after: float = 2.2) -> dict[str, Any
 
 
 def test_an_equivalent_that_the_rig_cannot_tell_apart_is_right() -> None:
-    assert entry(law("modulus", "order", "linear")).shaped
-    assert entry(law("force", "recorded_at", "linear")).shaped
-    assert entry(law("force", "order", "power")).placed
-    assert not entry(law("force", "order", "power")).shaped
-    assert not entry(law("gain", "order", "linear")).placed
-    assert not entry(law("modulus", "preload_n", "linear")).placed
-    assert not entry(None).placed
+    assert entry(law("modulus", "order", "linear"))["shaped"]
+    assert entry(law("force", "recorded_at", "linear"))["shaped"]
+    assert entry(law("force", "order", "power"))["placed"]
+    assert not entry(law("force", "order", "power"))["shaped"]
+    assert not entry(law("gain", "order", "linear"))["placed"]
+    assert not entry(law("modulus", "preload_n", "linear"))["placed"]
+    assert not entry(None)["placed"]
+
+
+def test_the_probability_that_anything_is_missing_is_all_but_that_of_nothing() -> None:
+    assert entry(None)["missing"] == pytest.approx(0.96)
+    assert entry(None, verdict="no_mismatch")["missing"] == pytest.approx(0.1)
 
 
 def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
@@ -45,21 +57,37 @@ def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
         entry(law("gain", "order", "step", after=8.0)),
         entry(None, verdict="explained"),
     ]
-    recognised, placed, shaped, held_out, near, *misses = lines(entries)
-    assert recognised.startswith("recognised as not in the catalogue: 2 of 3: 67 % [")
-    assert placed.startswith("where and axis: 1 of 3: 33 % [")
-    assert shaped.startswith("where, axis and form: 1 of 3")
-    assert held_out.endswith("median 2.55")
-    assert near.startswith("at most 1.5 times the floor: 1 of 2")
-    assert len(misses) == 2
-    assert alarms([entry(None, verdict="no_mismatch"), entry(None, verdict="ambiguous")])[0].startswith(
-        "false alarms: 1 of 2"
-    )
+    quiet = {"seed": 2, "judged": [entry(None, verdict="no_mismatch"), entry(None, verdict="ambiguous")]}
+    text = hidden({"seed": 1, "judged": entries}, quiet)
+    assert "| recognised as not in the catalogue | 2 of 3: 67 % [" in text
+    assert "| where it enters and what it follows | 1 of 3: 33 % [" in text
+    assert "median | 2.55 [" in text
+    assert "| at most 1.5 times the noise, of those modelled | 1 of 2" in text
+    assert text.count("| 0001 |") == 2
+    assert "| 0.9 | 3 of 3: 100 % [44–100] | 1 of 2" in text
+    assert "stated in\n1 of 2" in alarms(quiet)
+    assert "with more than 80 % in 1." in alarms(quiet)
+
+
+def test_a_law_stands_for_a_mechanism_on_its_axis_where_it_enters_or_predicts_as_well() -> None:
+    fit = {"noise_floor_percent": 2.0, "before": {"heldout_rmse_percent": 9.0}, "after": {"heldout_rmse_percent": 2.2}}
+    named = {"verdict": "explained", "fit": fit}
+
+    def of(acts_on: str, axis: str, after: float) -> dict[str, Any]:
+        stated = law(acts_on, axis, "linear", after)
+        unnamed = {"verdict": "unexplained", "mechanisms": [], "fit": fit, "unnamed": stated}
+        return {"name": "0001", "hidden": "preload_dependent_d33", **compared("preload_dependent_d33", named, unnamed)}
+
+    entries = [of("gain", "preload_n", 9.0), of("modulus", "preload_n", 2.3), of("modulus", "preload_n", 9.0),
+               of("gain", "frequency_hz", 2.2)]  # fmt: skip
+    text = left_out({"drawn": 5, "judged": entries})
+    assert "Found: 2 of 4: 50 %" in text
+    assert "| preload_dependent_d33 | 4 | 2 | gain over frequency_hz; gain over preload_n;" in text
 
 
 @pytest.mark.slow
-def test_campaigns_of_the_rig_are_read_and_diagnosed() -> None:
-    entries = judged(3, 2, quiet=False)
-    assert [one.name for one in entries] == ["0001", "0002"]
-    assert all(one.report["schema"] == "report/1" for one in entries)
-    assert len(lines(entries)) >= 5
+def test_campaigns_of_the_rig_are_read_and_diagnosed(tmp_path: Path) -> None:
+    result = judge_unlisted(Work(tmp_path, count=2), lambda *_: None)
+    assert [one["name"] for one in result["judged"]] == ["0001", "0002"]
+    assert all(one["statement"] for one in result["judged"])
+    assert hidden(result)

@@ -1,0 +1,96 @@
+"""Every mechanism left out of the catalogue in turn: what the grammar of unnamed laws makes of campaigns that hide it.
+
+Campaigns of the virtual rig with one effect are diagnosed twice, with the whole catalogue and without the mechanism
+that is hidden in them. The axes are those on which the mechanism says that its effect shows, the entries those of its
+stage.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+from proof.cases import DrawnCase
+from proof.own_rig import truth
+from proof.stored import Work, diagnosed, digest_of, of_each, reports, sources, stored
+from underskin.mechanisms.base import Stage
+from underskin.mechanisms.registry import CATALOGUE
+
+SEED, COUNT = 88088, 150
+_ENTRIES: Mapping[Stage, tuple[str, ...]] = {
+    Stage.DECLARED: ("modulus", "thickness"),
+    Stage.MATERIAL: ("modulus",),
+    Stage.POSITION: ("position",),
+    Stage.CONTACT: ("contact_radius", "modulus"),
+    Stage.LOAD_INCREMENT: ("gain",),
+    Stage.SENSOR: ("gain",),
+    Stage.NEIGHBOURS: ("gain",),
+    Stage.RECORDING: ("gain",),
+    Stage.LINES: ("frequency_response",),
+}
+_AXES: Mapping[str, tuple[str, ...]] = {  # of the grammar, that say the same as an axis of a mechanism
+    "position_mm": ("x_mm", "y_mm", "sensor"),
+    "phase": ("frequency_hz",),
+    "load_cycles": ("load_cycles", "order", "recorded_at"),
+}
+
+
+def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """Of each campaign what was hidden, whether it shows, and both diagnoses."""
+    cases = [DrawnCase(SEED, number, "single") for number in range(min(work.count or COUNT, COUNT))]
+    truths = of_each(work, cases, partial(truth, work, sources("rig")), _silent)
+    shown = [
+        (case, next(iter(known["effects"])))
+        for case, known in zip(cases, truths, strict=True)
+        if known["identifiable"] and next(iter(known["effects"])) in CATALOGUE
+    ]
+    whole = reports(work, [case for case, _ in shown], _silent)
+    without = of_each(work, shown, partial(_without, work, sources("underskin")), progress)
+    return {
+        "drawn": len(cases),
+        "judged": [
+            {"name": case.name, "hidden": hidden, **compared(hidden, named, unnamed)}
+            for (case, hidden), named, unnamed in zip(shown, whole, without, strict=True)
+        ],
+    }
+
+
+def _silent(done: int, total: int) -> None:
+    """The bar is that of the diagnoses without a mechanism."""
+
+
+def _without(work: Work, version: str, case: tuple[DrawnCase, str]) -> dict[str, Any]:
+    drawn, hidden = case
+    document = drawn.document()
+    key = digest_of([document, version, "without", hidden])
+    return stored(work.folder / "reports", key, partial(diagnosed, document, (hidden,)))
+
+
+def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) -> dict[str, Any]:
+    """Where the law enters and what it follows; and errors held out, over the noise of what was held out.
+
+    Laws are held out in thirds along their axis, mechanisms by the largest groups, so only multiples of the noise can
+    be compared.
+    """
+    law = unnamed.get("unnamed")
+    over_noise = None
+    if law is not None and unnamed["fit"] and unnamed["fit"]["noise_floor_percent"]:
+        over_noise = law["heldout_rmse_percent"]["after"] / unnamed["fit"]["noise_floor_percent"]
+    mechanism = CATALOGUE[hidden]
+    follows = {axis for one in mechanism.axes for axis in _AXES.get(one, (one,))}
+    return {
+        "verdict": unnamed["verdict"],
+        "named_instead": [entry["name"] for entry in unnamed["mechanisms"]],
+        "named_verdict": named["verdict"],
+        "law": None if law is None else {key: law[key] for key in ("acts_on", "axis", "form")},
+        "axis_right": law is not None and law["axis"] in follows,
+        "entry_right": law is not None and law["acts_on"] in _ENTRIES.get(mechanism.stage, ()),
+        "unnamed_over_noise": over_noise,
+        "named_over_noise": _over_noise(named["fit"]),
+        "before_over_noise": _over_noise(unnamed["fit"], "before"),
+    }
+
+
+def _over_noise(fit: Mapping[str, Any] | None, when: str = "after") -> float | None:
+    if not fit or not fit["noise_floor_percent"] or fit[when]["heldout_rmse_percent"] is None:
+        return None
+    return float(fit[when]["heldout_rmse_percent"] / fit["noise_floor_percent"])

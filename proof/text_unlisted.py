@@ -1,0 +1,137 @@
+"""The page's sections on laws that nobody listed: of a rig of their own, and of the catalogue with one left out."""
+
+from collections.abc import Mapping, Sequence
+from statistics import median
+from typing import Any
+
+from proof.markdown import table
+from proof.phrases import median_of, percent
+from proof.statistics import share
+
+Result = Mapping[str, Any]
+_ALARMS = ("explained", "unexplained", "ambiguous")
+_THRESHOLDS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+_UNLISTED_LIMIT, _LEFT_OUT_LIMIT = 1.5, 1.3  # times the error with the law that is true
+
+
+def hidden(result: Result, quiet: Result | None = None) -> str:
+    """Of campaigns that hide a law."""
+    known = [entry for entry in result["judged"] if entry["identifiable"]]
+    over = [entry["over_noise"] for entry in known if entry["over_noise"] is not None]
+    rows = [
+        ["recognised as not in the catalogue", _share(known, "recognised")],
+        ["where it enters and what it follows", _share(known, "placed")],
+        ["and its form", _share(known, "shaped")],
+    ]
+    if over:
+        few = percent(share([ratio <= _UNLISTED_LIMIT for ratio in over]))
+        rows += [
+            ["error held out over the noise, median", median_of(over)],
+            [f"at most {_UNLISTED_LIMIT} times the noise, of those modelled", few],
+        ]
+    missed = [[entry["name"], entry["law"], entry["verdict"], f"{entry['probability']:.2f}", entry["statement"]]
+              for entry in known if not entry["placed"]]  # fmt: skip
+    misses = table(["campaign", "hidden", "verdict", "probability", "stated"], missed) if missed else "No misses.\n"
+    return f"""\
+## Physics that nobody listed
+
+{len(result["judged"])} campaigns of a rig that knows neither the catalogue nor the grammar's code (`rig/unlisted`, seed
+{result["seed"]}); {len(known)} hide what is identifiable by that rig's own equations. An equivalent counts as right
+that the rig itself cannot tell from what it hid.
+
+{table(["of the identifiable", "share"], rows)}
+{_trade_off(known, quiet["judged"]) if quiet is not None else ""}
+### Every miss
+
+{misses}"""
+
+
+def alarms(result: Result) -> str:
+    """Of campaigns that hide nothing."""
+    judged = result["judged"]
+    false = [entry for entry in judged if entry["verdict"] in _ALARMS]
+    rows = [[entry["name"], entry["verdict"], f"{entry['probability']:.2f}", entry["statement"]] for entry in false]
+    told = table(["campaign", "verdict", "probability", "stated"], rows) if rows else ""
+    sure = sum(entry["probability"] > 0.8 for entry in false)
+    return f"""\
+### Nothing there
+
+{len(judged)} campaigns of the same rig with nothing missing (seed {result["seed"]}): something is stated in
+{percent(share([entry in false for entry in judged]))}; with more than 80 % in {sure}.
+
+{told}"""
+
+
+def _trade_off(known: Sequence[Result], quiet: Sequence[Result]) -> str:
+    """What a threshold on the probability that something is missing would find, and what it would raise."""
+    rows = [
+        [
+            f"{limit:g}",
+            percent(share([entry["missing"] > limit for entry in known])),
+            percent(share([entry["missing"] > limit for entry in quiet])),
+        ]
+        for limit in _THRESHOLDS
+    ]
+    return f"""\
+The probability that anything is missing, by whatever set or law, against a threshold: what is found and what is raised.
+
+{table(["more probable than", "of what is hidden", "of nothing (next section)"], rows)}"""
+
+
+def left_out(result: Result) -> str:
+    """Of the catalogue with one mechanism left out."""
+    judged = result["judged"]
+    rows = []
+    for name in sorted({entry["hidden"] for entry in judged}):
+        own = [entry for entry in judged if entry["hidden"] == name]
+        laws = [entry["law"] for entry in own if entry["law"]]
+        found = sorted({f"{law['acts_on']} over {law['axis']}" for law in laws})
+        rows.append(
+            [
+                name,
+                str(len(own)),
+                str(sum(_placed(entry) for entry in own)),
+                "; ".join(found) or "none",
+                *(_middle(own, key) for key in ("before_over_noise", "unnamed_over_noise", "named_over_noise")),
+            ]
+        )
+    ratios = [ratio for entry in judged if (ratio := _ratio(entry)) is not None]
+    close = percent(share([ratio <= _LEFT_OUT_LIMIT for ratio in ratios]))
+    said = (
+        f"Error held out with the law over that with the named mechanism, both over their noise: median "
+        f"{median_of(ratios)}; at most {_LEFT_OUT_LIMIT} times in {close} of those that have a law."
+        if ratios
+        else ""
+    )
+    header = ["left out", "visible", "found", "laws stated", "before", "with the law", "with its own name"]
+    return f"""\
+## Every mechanism left out in turn
+
+{result["drawn"]} campaigns of our own rig with one effect (`proof/left_out.py`), diagnosed without that mechanism in
+the catalogue: {len(judged)} are visible. *Found*: a law is stated, over an axis on which the mechanism acts, and it
+enters where the mechanism does, or predicts recordings held out at most {_LEFT_OUT_LIMIT} times as badly. Errors are
+medians, in multiples of the noise of what was held out.
+
+{table(header, rows)}
+Found: {percent(share([_placed(entry) for entry in judged]))}. {said}
+"""
+
+
+def _share(entries: Sequence[Result], key: str) -> str:
+    return percent(share([entry[key] for entry in entries]))
+
+
+def _placed(entry: Result) -> bool:
+    """Whether a law stands for the mechanism that was left out."""
+    ratio = _ratio(entry)
+    return bool(entry["axis_right"] and (entry["entry_right"] or (ratio is not None and ratio <= _LEFT_OUT_LIMIT)))
+
+
+def _ratio(entry: Result) -> float | None:
+    unnamed, named = entry["unnamed_over_noise"], entry["named_over_noise"]
+    return None if unnamed is None or named is None else float(unnamed / named)
+
+
+def _middle(entries: Sequence[Result], key: str) -> str:
+    values = [entry[key] for entry in entries if entry[key] is not None]
+    return f"{median(values):.2f}" if values else "–"
