@@ -193,10 +193,9 @@ def _blocks(sets: Floats) -> list[Floats]:
 def _most_probable(sets: Floats, without: _WithoutProcess) -> Floats:
     """The most probable amplitudes of features at one scatter (sets, features)."""
     root, taken, weighed = (values[0] for values in (without.root, without.taken, without.weighed))
-    reduced = np.einsum("cr,srf->scf", taken, sets)
-    gram = np.einsum("srf,r,srg->sfg", sets, root**2, sets, optimize=True)
-    gram = gram - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
-    return np.asarray(np.linalg.solve(gram, np.einsum("srf,r->sf", sets, weighed)[..., None])[..., 0])
+    reduced, turned = taken @ sets, sets.transpose(0, 2, 1)
+    gram = (turned * root**2) @ sets - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
+    return np.asarray(np.linalg.solve(gram, (turned @ weighed)[..., None])[..., 0])
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:

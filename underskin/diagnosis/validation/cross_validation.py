@@ -169,15 +169,17 @@ def _without(
     if nothing.names not in fits:
         return None
     chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(entry))
-    before, after = (_predict(smaller, fits[names], problem, rows) for names in (nothing.names, chosen.names))
+    left = problem.lines.part(rows)
+    before, after = (_predict(smaller, fits[names], problem, rows, left) for names in (nothing.names, chosen.names))
     if problem.lines.curves:  # whose zero of force is each explanation's own, while errors are said of one size
         before, after = (replace(entry, size=max(before.size, after.size)) for entry in (before, after))
     return HeldOut(name, chosen.names, before, after)
 
 
-def _predict(smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask) -> PredictionScore:
-    """Some of the rows from a fit to others; sensors that were seen keep the gain that was found for them."""
-    left = problem.lines if rows.all() else problem.lines.part(rows)
+def _predict(
+    smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, left: Lines
+) -> PredictionScore:
+    """Some of the rows, `left` alone, from a fit to others; sensors that were seen keep the gain found for them."""
     model = problem.hypothesis(explanation.names, placed=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
@@ -236,4 +238,5 @@ def total(held_out: Sequence[HeldOut]) -> tuple[PredictionScore, PredictionScore
 
 def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionScore:
     """The recordings that the explanation was fitted to."""
-    return _predict(problem, explanation, problem, np.ones(len(problem.lines.value), dtype=bool))
+    every = np.ones(len(problem.lines.value), dtype=bool)
+    return _predict(problem, explanation, problem, every, problem.lines)

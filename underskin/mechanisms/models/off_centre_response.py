@@ -47,7 +47,7 @@ class OffsetSigma:
         profile = of_x.coefficients(of_a.coefficients(table.profile_over(radii), 1), 2)
         average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
         average = of_offset.coefficients(of_rho.coefficients(average, 0), 1)
-        self._table: Floats = np.ascontiguousarray(np.einsum("mer,rax->axme", average, profile, optimize=True))
+        self._table: Floats = np.ascontiguousarray(np.tensordot(profile, average, (0, 2)))
         self._ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
         self._ends[3, 1] = self.end
         self._axes = [part for basis in self.bases for part in (basis.knots, basis.cubics)]

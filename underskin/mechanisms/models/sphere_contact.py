@@ -158,7 +158,9 @@ class Sphere:
         law = self.stiffening
         stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
         columns = (self.modulus, self.radius, self.give, thickness, *stiffening)
-        whole = np.stack(np.broadcast_arrays(*columns), axis=-1)
+        whole = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
+        for number, column in enumerate(columns):
+            whole[..., number] = column
         return whole.reshape((1,) * (4 - whole.ndim) + whole.shape)
 
     def _wide_body(self, shape: tuple[int, ...]) -> Floats:

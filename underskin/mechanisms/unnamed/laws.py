@@ -194,8 +194,8 @@ def _unit_of_change(acts_on: ActsOn) -> str:
 
 
 def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
-    parts = (acts_on, axis.name, *(["relative"] if axis.relative else []), shape.form, variant, shape.variant)
-    return PREFIX + "__".join(part for part in parts if part)
+    relative = "relative" if axis.relative else ""
+    return PREFIX + "__".join(filter(None, (acts_on, axis.name, relative, shape.form, variant, shape.variant)))
 
 
 class LagLaw(UnnamedLaw):
