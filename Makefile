@@ -63,7 +63,7 @@ tour: $(VENV)/.dev ## regenerate docs/tour.md and its screenshots
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
 
-proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (about an hour on two cores; resumes)
+proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (three quarters of an hour; resumes)
 	$(VENV)/bin/underskin prove
 
 bench: $(VENV)/.dev $(PEERS:%=$(VENV)-%/.installed) ## measure speed, as ratios against peers in the same run

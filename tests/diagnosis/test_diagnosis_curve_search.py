@@ -13,9 +13,10 @@ from rig.elastomer import campaign_of_curves
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference import least_squares
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.search import PRIORS, Search
+from underskin.diagnosis.validation.cross_validation import PredictionScore, groups, hold_out
 from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -80,3 +81,22 @@ def test_a_companion_that_gains_less_than_shows_stays_with_its_prior(
         assert share[both.names] / share[alone.names] == pytest.approx(expected, rel=1e-3)
     else:
         assert both.names not in share
+
+
+def test_errors_held_out_of_curves_are_percent_of_one_size(table: SigmaTable) -> None:
+    """The zero of force is each explanation's own, so that each has another size of what it predicts."""
+    problem = FittingProblem(curve_lines(pressed(3.0, (5.0,)), "indentation"), table)
+    nothing, alone = problem.explain([Request(()), Request(("instrument_compliance",))])
+    assert nothing is not None
+    assert alone is not None
+    held_out = hold_out(problem, [alone], nothing, lambda _: 0.0, groups(problem.lines))
+    assert held_out
+    assert all(entry.chosen == alone.names and entry.before.size == entry.after.size for entry in held_out)
+
+
+@pytest.mark.parametrize(("square", "misled"), [(2.2, False), (2.3, True)])
+def test_an_error_half_as_large_again_as_before_misleads(square: float, misled: bool) -> None:
+    before = PredictionScore(square=1.0, size=1.0, noise=0.5, recordings=1)
+    after = replace(before, square=square)
+    assert after.misleads(before) is misled
+    assert not replace(after, noise=2.0).misleads(before)  # which noise gives as well
