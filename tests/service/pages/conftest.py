@@ -48,6 +48,9 @@ class Visit:
 
     def drawn(self, count: int) -> None:
         """Wait until so many figures are drawn, scrolling as a reader would."""
+        self.page.wait_for_function(  # a link just clicked may not have led there yet
+            "n => document.readyState === 'complete' && document.querySelectorAll('.plot').length >= n", arg=count
+        )
         for plot in self.page.locator(".plot").all():
             plot.scroll_into_view_if_needed()
         self.page.wait_for_function(
