@@ -26,7 +26,6 @@ class Curve:
     poisson_ratio: float
     depth: Floats  # (samples,)
     force: Floats  # (samples,)
-    count: Floats  # (samples,) raw samples of which each is the mean
 
     @property
     def way_in(self) -> int:
@@ -57,7 +56,7 @@ def jkr(curve: Curve, contact_point: float, modulus: float, work: float) -> Floa
 
 
 def hertz_left(curve: Curve) -> float:
-    """The weighted sum of squares [N²] that SciPy's least squares of Hertz' law leave."""
+    """The sum of squares [N²] that SciPy's least squares of Hertz' law leave."""
     modulus = 1 / _reference(curve)
     return _least(
         curve,
@@ -67,7 +66,7 @@ def hertz_left(curve: Curve) -> float:
 
 
 def jkr_left(curve: Curve) -> float:
-    """The weighted sum of squares [N²] that SciPy's least squares of JKR's law leave, on a way in."""
+    """The sum of squares [N²] that SciPy's least squares of JKR's law and a steady drift leave, on a way in."""
     modulus = 1 / _reference(curve)
     jump = int(curve.force.argmin())
     gaps = np.arange(max(jump - _GAPS, 0), min(jump + _GAPS, len(curve.depth) - 1))
@@ -77,8 +76,9 @@ def jkr_left(curve: Curve) -> float:
     for gap in gaps:
         contact_point = (curve.depth[gap] + curve.depth[gap + 1]) / 2
         stiffness = np.log((curve.force.max() - zero) / _per_modulus(curve, deepest - contact_point) / modulus)
-        starts += [[contact_point, stiffness, zero, np.log(share * work)] for share in _WORKS]
-    return _least(curve, lambda x: jkr(curve, x[0], modulus * np.exp(x[1]), np.exp(x[3])), starts)
+        starts += [[contact_point, stiffness, zero, np.log(share * work), 0.0] for share in _WORKS]
+    along = np.ptp(curve.force) * np.linspace(0, 1, len(curve.force))
+    return _least(curve, lambda x: jkr(curve, x[0], modulus * np.exp(x[1]), np.exp(x[3])) + x[4] * along, starts)
 
 
 def nanite_left(curves: Sequence[Curve]) -> list[float]:
@@ -90,7 +90,6 @@ def nanite_left(curves: Sequence[Curve]) -> list[float]:
             "poisson_ratio": curve.poisson_ratio,
             "tip_m": (-curve.depth).tolist(),  # a tip's position falls as it indents
             "force_n": curve.force.tolist(),
-            "root_weight": np.sqrt(curve.count).tolist(),
             "starts": [(modulus, -contact_point, zero) for modulus, contact_point, zero in _starts(curve)],
         }
         for curve in curves
@@ -118,22 +117,21 @@ def _per_modulus(curve: Curve, depth: float) -> float:
 def _starts(curve: Curve) -> list[tuple[float, float, float]]:
     """Moduli [Pa], contact points [m] and zeros [N]: at each contact point the linear least squares of the others."""
     starts = []
-    root = np.sqrt(curve.count)
     for contact_point in np.quantile(curve.depth[: curve.way_in], _QUANTILES):
         columns = np.stack([hertz(curve, contact_point, 1.0), np.ones(len(curve.depth))], axis=1)
         scale = np.abs(columns).max(axis=0)
-        modulus, zero = np.linalg.lstsq(columns / scale * root[:, None], curve.force * root, rcond=None)[0] / scale
+        modulus, zero = np.linalg.lstsq(columns / scale, curve.force, rcond=None)[0] / scale
         starts.append((max(float(modulus), 1.0), float(contact_point), float(zero)))
     return starts
 
 
 def _least(curve: Curve, law: Callable[[Floats], Floats], starts: Sequence[Sequence[float]]) -> float:
     """Of several starts (contact point [m], logarithm of a factor on the modulus, zero [N], …) the least."""
-    unit, travel, root = float(np.ptp(curve.force)), float(np.ptp(curve.depth)), np.sqrt(curve.count)
+    unit, travel = float(np.ptp(curve.force)), float(np.ptp(curve.depth))
     size = np.array([travel, 1.0, unit, *np.ones(len(starts[0]) - 3)])
 
     def residuals(y: Floats) -> Floats:
         x = y * size
-        return np.asarray((law(x) + x[2] - curve.force) * root / unit)
+        return np.asarray((law(x) + x[2] - curve.force) / unit)
 
     return 2 * unit**2 * min(float(least_squares(residuals, start / size).cost) for start in map(np.array, starts))

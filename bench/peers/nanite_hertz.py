@@ -13,11 +13,11 @@ from nanite.model import model_hertz_paraboloidal as hertz  # type: ignore[impor
 
 
 def fitted(curve: dict[str, Any]) -> dict[str, float]:
-    """E [Pa], contact point [m] and the weighted sum of squares [N²] of the best of the fits from several starts."""
-    tip, force, root = (np.array(curve[name]) for name in ("tip_m", "force_n", "root_weight"))  # (samples,)
+    """E [Pa], contact point [m] and the sum of squares [N²] of the best of the fits from several starts."""
+    tip, force = (np.array(curve[name]) for name in ("tip_m", "force_n"))  # (samples,)
 
     def residuals(parameters: lmfit.Parameters) -> Any:
-        return (hertz.hertz_paraboloidal(tip, **parameters.valuesdict()) - force) * root
+        return hertz.hertz_paraboloidal(tip, **parameters.valuesdict()) - force
 
     fits = []
     for modulus, contact_point, baseline in curve["starts"]:

@@ -197,11 +197,13 @@ def test_thinned_samples_lie_on_the_curve_to_within_their_deviation() -> None:
     assert np.sqrt((left**2).mean()) == pytest.approx(1.0, abs=0.25)
 
 
-def test_plain_least_squares_leaves_what_scipy_leaves(table: SigmaTable) -> None:
+@pytest.mark.parametrize(("samples", "ripple"), [(1500, 0.0), (360, 5e-3)])
+def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
     random = np.random.default_rng(4)
-    displacement = np.linspace(-0.1, 0.4, 1500)
+    displacement = np.linspace(-0.1, 0.4, samples)
     depth = np.maximum(displacement - 0.02, 0.0)
-    force = 0.3 + 2.0 * depth**1.5 * (1 + 0.6 * depth) + 2e-3 * random.normal(size=1500)  # not Hertz
+    force = 0.3 + 2.0 * depth**1.5 * (1 + 0.6 * depth) + 2e-3 * random.normal(size=samples)  # not Hertz
+    force += ripple * np.sin(np.arange(samples) / 3)  # as smooth within a block of samples as noise is not
     recording = IndentationRecording("i", 1.0, displacement, force)
     problem = FittingProblem(
         curve_lines(Campaign("c", SkinDescription(poisson_ratio=0.5), (recording,)), "indentation"), table
@@ -216,7 +218,7 @@ def test_plain_least_squares_leaves_what_scipy_leaves(table: SigmaTable) -> None
     fitted = least_squares(residual, [2.0, 0.0, 0.3])
     zero = course(displacement, force).zero
     plain = 100 * np.sqrt((fitted.fun**2).sum() / ((force - zero) ** 2).sum())
-    assert ours == pytest.approx(plain, rel=0.02)
+    assert ours == pytest.approx(plain, rel=0.01)
 
 
 def hertzian(table: SigmaTable, declared_mpa: float = 2.0, zero_mm: float = 0.0) -> FittingProblem:

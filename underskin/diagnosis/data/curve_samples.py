@@ -61,7 +61,8 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         forces.append(force)
         deviations.append(deviation)
         drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
-        errors.append(_error(kind, seen, displacement, force, time, way, counts, drift))
+        error = _error(kind, seen, displacement, force, time, way, drift, _straight_lines(columns[1], counts))
+        errors.append(error)
         span = float(np.ptp(displacement)) or 1.0
         places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
     value = _joined(forces)
@@ -219,6 +220,17 @@ def _around(seen: Course, count: int) -> Indices:
     return np.unique(near[(near >= 0) & (near < count)])
 
 
+def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floats]:
+    """The samples of each block, the slope [N per sample] of the straight line through them, and the sum of their
+    squares about it [N²]."""
+    starts = (np.cumsum(counts) - counts).astype(np.intp)
+    block = np.repeat(np.arange(len(counts)), counts.astype(np.intp))
+    place = np.arange(len(force)) - (starts + (counts - 1) / 2)[block]
+    about = force - (np.add.reduceat(force, starts) / counts)[block]
+    slope = np.add.reduceat(place * about, starts) / np.maximum(np.add.reduceat(place**2, starts), 0.5)
+    return counts, slope, np.add.reduceat((about - slope[block] * place) ** 2, starts)
+
+
 def _drift_in_air(seen: Course, force: Floats, time: Floats | None) -> float:
     """How far [N] the cell runs off over the whole curve if it goes on as in the air; 0 where no plain drift and no
     snap-in tells the air from the foot of a contact.
@@ -245,24 +257,24 @@ def _error(
     force: Floats,
     time: Floats | None,
     way: Floats,
-    counts: Floats,
     drift: float,
+    samples: tuple[Floats, Floats, Floats],
 ) -> CurveError:
-    """What the samples of one curve share; `drift` [N] is what the air shows."""
+    """What the samples of one curve share; `drift` [N] is what the air shows, `samples` as CurveError has them."""
     largest = float(np.abs(force).max()) or 1.0
-    noise = np.full(len(force), seen.noise)
     if kind == "compression":
-        return CurveError(np.full(len(force), largest), way, np.zeros((len(force), 0)), counts, noise)
+        return CurveError(np.full(len(force), largest), way, np.zeros((len(force), 0)), *samples)
     in_air = np.abs(force) < 4 * seen.noise + 1e-3 * largest
     if seen.pull_off is None and seen.snap_in is None:
         in_air &= displacement < displacement[np.argmax(displacement)]
     scale = np.maximum(np.abs(force), np.where(in_air, _IN_THE_AIR, _AT_CONTACT) * largest)
     zero = largest if seen.has_air else _FEW_FOR_ZERO * largest
     # Without times, samples are taken at a steady rate: an hour's drift follows their order, not the travel.
+    counts = samples[0]
     order = np.cumsum(counts) - counts / 2
     size = max(USUAL_DRIFT * largest, drift) if seen.has_air else 0.0
     columns = instrument_columns(displacement, order if time is None else time, zero, size)
-    return CurveError(scale, way, columns, counts, noise)
+    return CurveError(scale, way, columns, *samples)
 
 
 def _joined(columns: Sequence[Floats]) -> Floats:

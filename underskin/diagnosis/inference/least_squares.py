@@ -186,9 +186,8 @@ def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     margin = _INSIDE * (high - low)
     begin = np.clip(start, low + margin, high - margin)
     precision = np.sqrt([curvature_of_prior(entry)[0] for entry in model.parameters])
-    _, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
-    within = (count - 1) * lines.smooth.noise**2  # of raw samples about their blocks' means
-    left = 2 * cost * unit**2 + float(within.sum())
+    best, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
+    left = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
     return 100 * float(np.sqrt(left / (count * measured**2).sum()))
 
 

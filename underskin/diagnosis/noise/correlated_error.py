@@ -43,7 +43,8 @@ class CurveError:
     place: Floats  # (rows,) along the curve, 0 to 1
     columns: Floats  # (rows, columns) [N] of each curve's own coefficients
     count: Floats  # (rows,) raw samples that each row is the mean of
-    noise: Floats  # (rows,) [N] standard deviation of these
+    slope: Floats  # (rows,) [N per sample] of the straight line through these
+    about_line: Floats  # (rows,) [N²] the sum of their squares about it
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -53,12 +54,22 @@ class CurveError:
         def of(name: str) -> Floats:
             return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
 
-        return cls(of("scale"), of("place"), np.concatenate(columns), of("count"), of("noise"))
+        return cls(of("scale"), of("place"), np.concatenate(columns), of("count"), of("slope"), of("about_line"))
 
     def part(self, order: Indices) -> Self:
         """Of some of the rows."""
-        columns = self.columns[order]
-        return type(self)(self.scale[order], self.place[order], columns, self.count[order], self.noise[order])
+        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line)
+        return type(self)(*(entry[order] for entry in rows))
+
+    def within(self, force: Floats, curves: Sequence[slice]) -> float:
+        """The sum of squares [N²] of raw samples about a law beyond that of their means, of whole curves.
+
+        The law's force (rows,) is straight between rows, and so are the samples of a row but for their noise.
+        """
+        middle = np.cumsum(self.count) - self.count / 2
+        slope = np.concatenate([np.gradient(force[own], middle[own]) for own in curves])
+        square = self.count * (self.count**2 - 1) / 12
+        return float((self.about_line + square * (self.slope - slope) ** 2).sum())
 
     def covariance(self, size: float) -> Floats:
         """Of rows that are one curve's, with η = `size` (rows, rows)."""
