@@ -85,6 +85,7 @@ def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) 
         "axis_right": law is not None and law["axis"] in follows,
         "entry_right": law is not None and law["acts_on"] in _ENTRIES.get(mechanism.stage, ()),
         "unnamed_over_noise": over_noise,
+        "instead_over_noise": _over_noise(unnamed["fit"]) if law is None and unnamed["mechanisms"] else None,
         "named_over_noise": _over_noise(named["fit"]),
         "before_over_noise": _over_noise(unnamed["fit"], "before"),
     }

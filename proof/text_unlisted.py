@@ -1,5 +1,6 @@
 """The page's sections on laws that nobody listed: of a rig of their own, and of the catalogue with one left out."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
@@ -92,6 +93,7 @@ def left_out(result: Result) -> str:
                 str(len(own)),
                 str(sum(_placed(entry) for entry in own)),
                 "; ".join(found) or "none",
+                _instead(own),
                 *(_middle(own, key) for key in ("before_over_noise", "unnamed_over_noise", "named_over_noise")),
             ]
         )
@@ -103,17 +105,29 @@ def left_out(result: Result) -> str:
         if ratios
         else ""
     )
-    header = ["left out", "visible", "found", "laws stated", "before", "with the law", "with its own name"]
+    header = [
+        "left out",
+        "visible",
+        "found",
+        "laws stated",
+        "predicts as well",
+        "before",
+        "with the law",
+        "with its own name",
+    ]
     return f"""\
 ## Every mechanism left out in turn
 
 {result["drawn"]} campaigns of our own rig with one effect (`proof/left_out.py`), diagnosed without that mechanism in
 the catalogue: {len(judged)} are visible. *Found*: a law is stated, over an axis on which the mechanism acts, and it
 enters where the mechanism does, or predicts recordings held out at most {_LEFT_OUT_LIMIT} times as badly. Errors are
-medians, in multiples of the noise of what was held out.
+medians, in multiples of the noise of what was held out. *Predicts as well*: other mechanisms are named, by which
+recordings held out are predicted at most {_LEFT_OUT_LIMIT} times as badly: what was left out and these cannot be told
+apart in that design.
 
 {table(header, rows)}
-Found: {percent(share([_placed(entry) for entry in judged]))}. {said}
+Found: {percent(share([_placed(entry) for entry in judged]))}; found, or another name that predicts as well:
+{percent(share([_placed(entry) or _names_an_equivalent(entry) for entry in judged]))}. {said}
 """
 
 
@@ -127,9 +141,20 @@ def _placed(entry: Result) -> bool:
     return bool(entry["axis_right"] and (entry["entry_right"] or (ratio is not None and ratio <= _LEFT_OUT_LIMIT)))
 
 
-def _ratio(entry: Result) -> float | None:
-    unnamed, named = entry["unnamed_over_noise"], entry["named_over_noise"]
-    return None if unnamed is None or named is None else float(unnamed / named)
+def _ratio(entry: Result, of: str = "unnamed_over_noise") -> float | None:
+    stated, named = entry[of], entry["named_over_noise"]
+    return None if stated is None or named is None else float(stated / named)
+
+
+def _names_an_equivalent(entry: Result) -> bool:
+    ratio = _ratio(entry, "instead_over_noise")
+    return ratio is not None and ratio <= _LEFT_OUT_LIMIT
+
+
+def _instead(entries: Sequence[Result]) -> str:
+    """Which other mechanisms are named in its place that predict as well, and how often."""
+    counted = Counter(" and ".join(entry["named_instead"]) for entry in entries if _names_an_equivalent(entry))
+    return "; ".join(f"{name} ({count})" for name, count in counted.most_common()) or "none"
 
 
 def _middle(entries: Sequence[Result], key: str) -> str:

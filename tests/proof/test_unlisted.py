@@ -80,9 +80,13 @@ def test_a_law_stands_for_a_mechanism_on_its_axis_where_it_enters_or_predicts_as
 
     entries = [of("gain", "preload_n", 9.0), of("modulus", "preload_n", 2.3), of("modulus", "preload_n", 9.0),
                of("gain", "frequency_hz", 2.2)]  # fmt: skip
+    other = {"verdict": "explained", "mechanisms": [{"name": "ageing"}], "fit": fit, "unnamed": None}
+    entries.append({"name": "0002", "hidden": "spread", **compared("sensor_spread", named, other)})
     text = left_out({"drawn": 5, "judged": entries})
-    assert "Found: 2 of 4: 50 %" in text
+    assert "Found: 2 of 5: 40 %" in text
+    assert "predicts as well:\n3 of 5: 60 %" in text
     assert "| preload_dependent_d33 | 4 | 2 | gain over frequency_hz; gain over preload_n;" in text
+    assert "| spread | 1 | 0 | none | ageing (1) |" in text
 
 
 @pytest.mark.slow
