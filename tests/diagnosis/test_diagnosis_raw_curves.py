@@ -119,7 +119,7 @@ def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradic
     assert [entry["name"] for entry in report["mechanisms"]] == ["adhesion"]
 
 
-_RIG = {
+_RIG: dict[str, Any] = {
     "schema": "experiment/1", "name": "unlisted", "seed": 11, "kind": "indentation",
     "skin": {"thickness_mm": 0.6, "youngs_modulus_mpa": 1.8, "sensor_radius_mm": 1.0, "d33_pc_per_n": 10.0},
     "curves": {
@@ -136,13 +136,16 @@ _RIG = {
 @pytest.mark.parametrize(
     "effect", [{"plastic_set": {"ratio": 0.03}}, {"guide_friction": {"friction": 0.05, "slip_mm": 1e-4}}]
 )
+@pytest.mark.parametrize("noisy", [{}, {"repeats": 3, "force_noise_n": 4e-7}], ids=["clear", "below a sample's noise"])
 def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_of_it(
-    effect: dict[str, dict[str, float]], table: SigmaTable
+    effect: dict[str, dict[str, float]], noisy: dict[str, float], table: SigmaTable
 ) -> None:
-    experiment = rig_experiment({**_RIG, "effects": effect})
+    experiment = rig_experiment({**_RIG, "curves": {**_RIG["curves"], **noisy}, "effects": effect})
     report = diagnosis_report(parse(campaign_of_curves(experiment, record_curves(experiment))), table)
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
+    plain = report["fit"]["before"]
+    assert f"Young's modulus {plain['youngs_modulus']['value']:.3g} MPa, leaves" in report["statement"]
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])

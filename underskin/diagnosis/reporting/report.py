@@ -124,13 +124,12 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
-    modulus = fit["after"].get("youngs_modulus")
     statement = statements.answer_statement(
         search.answers,
         stated,
         diagnosis.shape,
         problem.kind,
-        modulus,
+        fit if problem.lines.curves else None,
         caveats=caveats(findings),
         power=diagnosis.power,
         idle=without_effect(named) if named is not None else (),

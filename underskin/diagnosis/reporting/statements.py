@@ -36,25 +36,25 @@ def answer_statement(
     verdict: str,
     shape: Shape | None = None,
     kind: Kind = "frf",
-    modulus: Mapping[str, Any] | None = None,
+    fit: Mapping[str, Any] | None = None,
     caveats: str = "",
     power: Sequence[Power] = (),
     idle: Sequence[str] = (),
     imitating: Sequence[str] = (),
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
-    also the modulus under the stated answer; where nothing is missing, what would have shown (`power`).
+    also the modulus under the stated answer, or what the base model leaves; where nothing is missing, what would have
+    shown (`power`).
 
-    `idle`: mechanisms of the leading answer that may as well have no effect; `imitating`: those that look like an
-    unlisted law.
+    `fit` is the report's; `idle`: mechanisms of the leading answer that may as well have no effect; `imitating`: those
+    that look like an unlisted law.
     """
     first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, imitating, all_used=not caveats)
     parts = [first, caveats, rest]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
-    if modulus is not None and verdict != "unexplained":
-        interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
-        parts.append(f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval}).")
+    if fit is not None and "youngs_modulus" in fit["before"]:
+        parts.append(_left_by(fit, SIMPLEST[kind]) if verdict == "unexplained" else _modulus(fit["after"]))
     return " ".join(part for part in parts if part)
 
 
@@ -110,6 +110,21 @@ def _answer(
     but += [f"these rivals remain: {listed}"] if listed else []
     certain = f"What is certain is that {model} does not describe the recordings. " if idle else ""
     return f"Best explained by {names} ({percent}), but {', and '.join(but)}.", certain + _laws(tuple(mentioned))
+
+
+def _modulus(after: Mapping[str, Any]) -> str:
+    modulus = after["youngs_modulus"]
+    interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
+    return f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
+
+
+def _left_by(fit: Mapping[str, Any], model: str) -> str:
+    """How far the base model goes, and the best set of mechanisms, where neither describes the curves."""
+    before, after, names = fit["before"], fit["after"], fit["mechanisms"]
+    modulus = before["youngs_modulus"]
+    said = f"{model[0].upper()}{model[1:]} alone, with Young's modulus {modulus['value']:.3g} {modulus['unit']}, leaves"
+    beside = f", with {in_words(names)} {in_digits(after['rmse_percent'], 2)} %" if names else ""
+    return f"{said} {in_digits(before['rmse_percent'], 2)} % of the force (root mean square){beside}."
 
 
 def power_statement(power: Sequence[Power], kind: Kind) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.least_squares import least_squares_percent
+from underskin.diagnosis.selection.curve_sets import left_smooth
 from underskin.diagnosis.validation.cross_validation import HeldOut, in_sample, total
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -16,6 +17,7 @@ _GRANTED = 4.0  # times as much remainder of a compression as the null hypothesi
 _GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
 _STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
 _LEAST_STRUCTURE = 5e-4  # of the largest force
+_PLAIN_STRUCTURE = 30.0  # nats of a smooth error; a law that is right leaves 5 to 20, seldom more
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
 
@@ -42,8 +44,9 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
-    Of indentations structure is a smooth part above the noise; a law is granted it where plain least squares leave less
-    than a twentieth of what they leave under the null hypothesis, since every law of contact idealises. Of a law of
+    Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
+    plainly; a law is granted it where plain least squares leave less than a twentieth of what they leave under the null
+    hypothesis, since every law of contact idealises. Of a law of
     compressions more is granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more
     than about their neighbours by as much as those do.
     """
@@ -52,7 +55,7 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     smooth, noise = _smooth_part(problem, explanation)
     if problem.kind != "indentation":
         return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
-    if smooth <= max(_STRUCTURED * noise, _LEAST_STRUCTURE):
+    if smooth <= _LEAST_STRUCTURE or (smooth <= _STRUCTURED * noise and left_smooth(explanation) < _PLAIN_STRUCTURE):
         return False
     left, at_first = (least_squares_percent(one.best.hypothesis, one.point.fit) for one in (explanation, null))
     return left >= _GRANTED_TO_LAWS * at_first
