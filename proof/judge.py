@@ -72,3 +72,11 @@ def answer(report: Mapping[str, Any]) -> tuple[str, ...]:
 def shown(names: tuple[str, ...]) -> str:
     """A set in words."""
     return " + ".join(names) or NOTHING
+
+
+def unnamed_over_noise(report: Mapping[str, Any]) -> float | None:
+    """The error held out with the unnamed law, over what noise alone would give."""
+    law, fit = report.get("unnamed"), report["fit"]
+    if law is None or not fit or not fit["noise_floor_percent"]:
+        return None
+    return float(law["heldout_rmse_percent"]["after"] / fit["noise_floor_percent"])

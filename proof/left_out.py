@@ -10,8 +10,9 @@ from functools import partial
 from typing import Any
 
 from proof.cases import DrawnCase
+from proof.judge import unnamed_over_noise
 from proof.own_rig import truth
-from proof.stored import Work, diagnosed, digest_of, of_each, reports, sources, stored
+from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, reports, sources, stored
 from underskin.mechanisms.base import Stage
 from underskin.mechanisms.registry import CATALOGUE
 
@@ -44,7 +45,7 @@ def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str
         if known["identifiable"] and next(iter(known["effects"])) in CATALOGUE
     ]
     whole = reports(work, [case for case, _ in shown], _silent)
-    without = of_each(work, shown, partial(_without, work, sources("underskin")), progress)
+    without = of_each(work, shown, partial(_without, work, diagnosing()), progress)
     return {
         "drawn": len(cases),
         "judged": [
@@ -72,19 +73,15 @@ def compared(hidden: str, named: Mapping[str, Any], unnamed: Mapping[str, Any]) 
     be compared.
     """
     law = unnamed.get("unnamed")
-    over_noise = None
-    if law is not None and unnamed["fit"] and unnamed["fit"]["noise_floor_percent"]:
-        over_noise = law["heldout_rmse_percent"]["after"] / unnamed["fit"]["noise_floor_percent"]
     mechanism = CATALOGUE[hidden]
     follows = {axis for one in mechanism.axes for axis in _AXES.get(one, (one,))}
     return {
         "verdict": unnamed["verdict"],
         "named_instead": [entry["name"] for entry in unnamed["mechanisms"]],
-        "named_verdict": named["verdict"],
         "law": None if law is None else {key: law[key] for key in ("acts_on", "axis", "form")},
         "axis_right": law is not None and law["axis"] in follows,
         "entry_right": law is not None and law["acts_on"] in _ENTRIES.get(mechanism.stage, ()),
-        "unnamed_over_noise": over_noise,
+        "unnamed_over_noise": unnamed_over_noise(unnamed),
         "instead_over_noise": _over_noise(unnamed["fit"]) if law is None and unnamed["mechanisms"] else None,
         "named_over_noise": _over_noise(named["fit"]),
         "before_over_noise": _over_noise(unnamed["fit"], "before"),

@@ -82,10 +82,14 @@ def of_each(
 
 def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], None]) -> list[dict[str, Any]]:
     """The report (`report/1`) of each case."""
+    return of_each(work, cases, partial(_report, work.folder / "reports", diagnosing()), progress)
+
+
+def diagnosing() -> str:
+    """Digests of all that a report depends on but its campaign: the library's sources and its table."""
     from underskin.surrogate.sigma_table import load_table
 
-    version = f"{sources('underskin')} {load_table().sha256}"
-    return of_each(work, cases, partial(_report, work.folder / "reports", version), progress)
+    return f"{sources('underskin')} {load_table().sha256}"
 
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:

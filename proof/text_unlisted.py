@@ -10,9 +10,9 @@ from proof.phrases import median_of, percent
 from proof.statistics import share
 
 Result = Mapping[str, Any]
-_ALARMS = ("explained", "unexplained", "ambiguous")
+_QUIET = ("no_mismatch", "insufficient_data")
 _THRESHOLDS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
-_UNLISTED_LIMIT, _LEFT_OUT_LIMIT = 1.5, 1.3  # times the error with the law that is true
+_UNLISTED_LIMIT, _LEFT_OUT_LIMIT = 1.5, 1.3  # times the noise, and the error with the mechanism's own name
 
 
 def hidden(result: Result, quiet: Result | None = None) -> str:
@@ -50,7 +50,7 @@ that the rig itself cannot tell from what it hid.
 def alarms(result: Result) -> str:
     """Of campaigns that hide nothing."""
     judged = result["judged"]
-    false = [entry for entry in judged if entry["verdict"] in _ALARMS]
+    false = [entry for entry in judged if entry["verdict"] not in _QUIET]
     rows = [[entry["name"], entry["verdict"], f"{entry['probability']:.2f}", entry["statement"]] for entry in false]
     told = table(["campaign", "verdict", "probability", "stated"], rows) if rows else ""
     sure = sum(entry["probability"] > 0.8 for entry in false)
@@ -120,10 +120,11 @@ def left_out(result: Result) -> str:
 
 {result["drawn"]} campaigns of our own rig with one effect (`proof/left_out.py`), diagnosed without that mechanism in
 the catalogue: {len(judged)} are visible. *Found*: a law is stated, over an axis on which the mechanism acts, and it
-enters where the mechanism does, or predicts recordings held out at most {_LEFT_OUT_LIMIT} times as badly. Errors are
+enters where the mechanism does, or predicts recordings held out at most {_LEFT_OUT_LIMIT} times as badly as with the
+mechanism's own name. Errors are
 medians, in multiples of the noise of what was held out. *Predicts as well*: other mechanisms are named, by which
-recordings held out are predicted at most {_LEFT_OUT_LIMIT} times as badly: what was left out and these cannot be told
-apart in that design.
+recordings held out are predicted at most {_LEFT_OUT_LIMIT} times as badly as with its own name: what was left out and
+these cannot be told apart in that design.
 
 {table(header, rows)}
 Found: {percent(share([_placed(entry) for entry in judged]))}; found, or another name that predicts as well:

@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from proof.cases import FileCase
-from proof.stored import Work, reports, sources
+from proof.judge import unnamed_over_noise
+from proof.stored import FAILED, Work, reports, sources
 from proof.text_unlisted import alarms, hidden
 from rig.unlisted.campaign import write
 
@@ -51,30 +52,23 @@ def judged(name: str, truth: Mapping[str, Any], report: Mapping[str, Any]) -> di
         placed = told["acts_on"] in {law["acts_on"], *truth["acts_on_also"]}
         placed = placed and told["axis"] in {law["axis"], *truth["axis_also"]}
         shaped = placed and told["form"] in {law["form"], *truth["form_also"]}
-    answers = [{"mechanisms": ["leading"], "probability": report["probability"]}, *report["alternatives"]]
-    nothing = [entry["probability"] for entry in answers if entry["mechanisms"] == ["nothing_missing"]]
-    quiet = report["verdict"] in ("no_mismatch", "insufficient_data")
+    nothing = sum(one["probability"] for one in report["alternatives"] if one["mechanisms"] == ["nothing_missing"])
+    nothing = report["probability"] if report["verdict"] in ("no_mismatch", "insufficient_data") else nothing
+    if report["verdict"] == FAILED:  # which counts as wrong
+        nothing = float(law is not None)
     return {
         "name": name,
         "law": None if law is None else f"{law['acts_on']} over {law['axis']}, {law['form']}",
         "identifiable": bool(truth.get("identifiable", False)),
         "verdict": report["verdict"],
-        "missing": 1 - (report["probability"] if quiet else sum(nothing)),
+        "missing": 1 - nothing,
         "recognised": report["verdict"] == "unexplained",
         "placed": placed,
         "shaped": shaped,
-        "over_noise": _over_noise(report),
+        "over_noise": unnamed_over_noise(report),
         "statement": report["statement"][:150],
         "probability": report["probability"],
     }
-
-
-def _over_noise(report: Mapping[str, Any]) -> float | None:
-    """The error held out with the unnamed law, over what noise alone would give."""
-    law, fit = report.get("unnamed"), report["fit"]
-    if law is None or not fit or not fit["noise_floor_percent"]:
-        return None
-    return float(law["heldout_rmse_percent"]["after"] / fit["noise_floor_percent"])
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

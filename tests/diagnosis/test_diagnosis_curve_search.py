@@ -100,3 +100,4 @@ def test_an_error_half_as_large_again_as_before_misleads(square: float, misled: 
     after = replace(before, square=square)
     assert after.misleads(before) is misled
     assert not replace(after, noise=2.0).misleads(before)  # which noise gives as well
+    assert not replace(after, unsure=2.0).misleads(before)  # as do parameters that the rest does not tell

@@ -19,3 +19,11 @@ def test_thirds_hold_out_every_row_once_and_leave_the_rest(recordings: int) -> N
     for rows in held_out:
         measured.part(~rows)
         measured.part(rows)
+
+
+@pytest.mark.parametrize(("count", "groups"), [(1, 0), (2, 2), (3, 3)])
+def test_of_few_recordings_with_few_lines_none_is_all_or_nothing(count: int, groups: int) -> None:
+    measured = lines(design(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 0.5, 1.0, 2.0, 3.0), lines=count)))
+    held_out = list(thirds(measured, np.arange(5.0)).values())
+    assert len(held_out) == groups
+    assert all(rows.any() and not rows.all() for rows in held_out)

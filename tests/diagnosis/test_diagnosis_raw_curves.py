@@ -145,7 +145,7 @@ def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
     plain = report["fit"]["before"]
-    assert f"Young's modulus {plain['youngs_modulus']['value']:.3g} MPa, leaves" in report["statement"]
+    assert f"Young's modulus under Hertz's law: {plain['youngs_modulus']['value']:.3g} MPa." in report["statement"]
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])

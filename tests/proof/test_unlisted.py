@@ -51,6 +51,14 @@ def test_the_probability_that_anything_is_missing_is_all_but_that_of_nothing() -
     assert entry(None, verdict="no_mismatch")["missing"] == pytest.approx(0.1)
 
 
+def test_a_diagnosis_that_failed_counts_as_wrong() -> None:
+    failed = {"verdict": "failed", "probability": 0.0, "statement": "", "alternatives": [], "fit": None}
+    hides = {"identifiable": True, "law": {"acts_on": "gain", "axis": "order", "form": "step"}}
+    assert judged("0001", {**hides, "law": None}, failed)["missing"] == 1.0
+    assert judged("0001", hides, failed)["missing"] == 0.0
+    assert "stated in\n1 of 1" in alarms({"seed": 1, "judged": [judged("0001", {"law": None}, failed)]})
+
+
 def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
     entries = [
         entry(law("modulus", "order", "linear")),

@@ -125,7 +125,8 @@ def _work_out(
     axes, ranges, size = _located(problem, nothing, shown.best.levels)
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    groups = _held_out(problem, result, ranked, nothing)
+    showing = [entry for entry in ranked if result.shows(entry)]
+    groups = _held_out(problem, result, showing, nothing)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
@@ -138,7 +139,7 @@ def _work_out(
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
     if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
-        groups = _held_out(problem, result, ranked, nothing)
+        groups = _held_out(problem, result, showing, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)

@@ -40,7 +40,8 @@ class Parameter:
     A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
     the prior are of the multiple, while laws and reports have the product, in `unit`.
 
-    `starts` are values at which fits begin, where not at quantiles of the prior.
+    `starts` are values, within the bounds, at which fits begin, where not at quantiles of the prior; of a parameter
+    `relative_to` another one, multiples.
     """
 
     name: str

@@ -122,9 +122,10 @@ def _left_by(fit: Mapping[str, Any], model: str) -> str:
     """How far the base model goes, and the best set of mechanisms, where neither describes the curves."""
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before["youngs_modulus"]
-    said = f"{model[0].upper()}{model[1:]} alone, with Young's modulus {modulus['value']:.3g} {modulus['unit']}, leaves"
+    said = f"{model[0].upper()}{model[1:]} alone leaves {in_digits(before['rmse_percent'], 2)} % of the force"
     beside = f", with {in_words(names)} {in_digits(after['rmse_percent'], 2)} %" if names else ""
-    return f"{said} {in_digits(before['rmse_percent'], 2)} % of the force (root mean square){beside}."
+    under = f"Young's modulus under {model}: {modulus['value']:.3g} {modulus['unit']}"
+    return f"{said} (root mean square){beside}. {under}."
 
 
 def power_statement(power: Sequence[Power], kind: Kind) -> str:

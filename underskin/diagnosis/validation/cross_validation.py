@@ -1,6 +1,7 @@
 """How well the recordings are predicted before and after, on groups that were left out whole: extrapolation.
 
-Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day. Without
+Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day; of a law
+that nobody listed, thirds along its axis. Without
 the group everything is fitted again: nothing missing, and the choice among the best sets is made again from evidence.
 rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together, of curves with the measured force in place of m below; the noise
 floor is its expectation from the noise alone, for a new recording: gain, positioning and line scatter, and the
@@ -55,8 +56,8 @@ class PredictionScore:
         return self.square > times**2 * (self.noise + self.unsure)
 
     def misleads(self, before: "PredictionScore") -> bool:
-        """Whether rows are missed by clearly more than before, and not by noise."""
-        return self.square > _WORSE**2 * max(before.square, self.noise)
+        """Whether rows are missed by clearly more than before, and than noise and the parameters' uncertainty give."""
+        return self.square > _WORSE**2 * max(before.square, self.noise + self.unsure)
 
     @property
     def floor_percent(self) -> float:
@@ -132,7 +133,8 @@ def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
     names = ("from the first", "from the second", "from the third")
     if lines.recordings < _LEAST_KEPT + len(names):
         line = np.arange(len(lines.value)) - lines.first[lines.recording]
-        return {f"every third line {name}": line % len(names) == place for place, name in enumerate(names)}
+        thirds = {f"every third line {name}": line % len(names) == place for place, name in enumerate(names)}
+        return {name: rows for name, rows in thirds.items() if rows.any() and not rows.all()}
     rank = np.argsort(np.argsort(column, kind="stable"), kind="stable")
     return {
         f"every third recording {name}": (rank % len(names) == place)[lines.recording]
@@ -171,8 +173,6 @@ def _without(
     chosen = max(fits.values(), key=lambda entry: entry.log_evidence + log_prior(entry))
     left = problem.lines.part(rows)
     before, after = (_predict(smaller, fits[names], problem, rows, left) for names in (nothing.names, chosen.names))
-    if problem.lines.curves:  # whose zero of force is each explanation's own, while errors are said of one size
-        before, after = (replace(entry, size=max(before.size, after.size)) for entry in (before, after))
     return HeldOut(name, chosen.names, before, after)
 
 
@@ -218,8 +218,9 @@ def _predict_curves(
     noise = cell.variance + (levels.level * lines.deviation) ** 2 + (levels.smooth * lines.smooth.scale) ** 2
     recording = lines.recording[rows]
     first = np.flatnonzero(np.diff(recording, prepend=-1))
-    measured = (lines.value.real - cell.offset)[rows]  # a law may predict no force where there is one
-    return _scored(first, (lines.value.real - value)[rows] ** 2, noise[rows], measured**2)
+    # A law may predict no force where there is one, and the zero of force is each explanation's own.
+    measured = lines.value.real[rows]
+    return _scored(first, (measured - value[rows]) ** 2, noise[rows], measured**2)
 
 
 def _scored(first: Indices, square: Floats, noise: Floats, size: Floats) -> PredictionScore:
