@@ -17,7 +17,7 @@ from bench.figures import Figure
 ROUNDS = 3
 _FASTER = 5.0
 _WITH_LAWS = 1.5  # times as long may it take to try laws that nobody listed as well, which no earlier revision did
-_NAMED_ALONE = """
+NAMED_ALONE = """
 from underskin.diagnosis import pipeline
 pipeline.with_laws = lambda *_: ()
 """
@@ -47,13 +47,13 @@ def measure(revision: str) -> list[Figure]:
     folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
     sets = {"open campaigns": sorted((Path(folder) / "open").glob("*.json")) if folder else []}
     figures = []
-    with tempfile.TemporaryDirectory() as temporary, _worktree(root, revision, Path(temporary) / "tree") as other:
+    with tempfile.TemporaryDirectory() as temporary, worktree(root, revision, Path(temporary) / "tree") as other:
         sets["campaigns of 100 recordings × 60 lines"] = _written(Path(temporary))
         for name, files in sets.items():
             if not files:
                 continue
             rounds = [
-                (_seconds(root, files), _seconds(root, files, _NAMED_ALONE), _seconds(other, files))
+                (_seconds(root, files), _seconds(root, files, NAMED_ALONE), _seconds(other, files))
                 for _ in range(ROUNDS)
             ]
             ours, named, theirs = (median(map(median, zip(*times, strict=True))) for times in zip(*rounds, strict=True))
@@ -70,7 +70,8 @@ def measure(revision: str) -> list[Figure]:
 
 
 @contextmanager
-def _worktree(root: Path, revision: str, folder: Path) -> Iterator[Path]:
+def worktree(root: Path, revision: str, folder: Path) -> Iterator[Path]:
+    """Another revision's files, for as long as it is used."""
     subprocess.run(["git", "-C", root, "worktree", "add", "--quiet", "--detach", folder, revision], check=True)
     try:
         yield folder

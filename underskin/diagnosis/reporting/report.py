@@ -97,16 +97,18 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
     if diagnosis.search is None or diagnosis.problem is None:
+        findings = [finding.in_report() for finding in diagnosis.findings]
+        said = (statements.insufficient_statement(diagnosis.lacking), caveats(findings))
         return {
             **document,
             "probability": 1.0,
-            "statement": statements.insufficient_statement(diagnosis.lacking),
+            "statement": " ".join(part for part in said if part),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "unnamed": None,
             "alternatives": [],
             "not_identifiable": [],
-            "findings": [finding.in_report() for finding in diagnosis.findings],
+            "findings": findings,
             "fit": None,
             "power": [],
             "d33": None,
