@@ -42,11 +42,11 @@ for file in map(Path, sys.argv[2:]):
 Report = Mapping[str, Any]
 
 
-def main(revision: str) -> None:
+def main(revision: str, mixture: int) -> None:
     """Diagnose all campaigns three ways and print what differs, as a table in Markdown."""
     root = Path(__file__).parents[1]
     with tempfile.TemporaryDirectory() as temporary, worktree(root, revision, Path(temporary) / "tree") as other:
-        files = _written(Path(temporary) / "campaigns")
+        files = _written(Path(temporary) / "campaigns", mixture)
         theirs = _reports(other, "", files, Path(temporary) / "theirs")
         named = _reports(root, NAMED_ALONE, files, Path(temporary) / "named")
         whole = _reports(root, "", files, Path(temporary) / "whole")
@@ -59,13 +59,13 @@ def main(revision: str) -> None:
         print(f"{name}: of {len(files)} the same {kept[0]}, verdict and leading set {kept[1]}")
 
 
-def _written(folder: Path) -> list[Path]:
+def _written(folder: Path, mixture: int) -> list[Path]:
     folder.mkdir()
     concealed = os.environ.get("UNDERSKIN_CAMPAIGNS")
     places = [Path(concealed) / name for name in ("open", "sealed")] if concealed else []
     documents = {
         **{file.stem: json.loads(file.read_text()) for place in places for file in sorted(place.glob("*.json"))},
-        **{f"mixture {number}": DrawnCase(SEED, number).document() for number in range(MIXTURE)},
+        **{f"mixture {number}": DrawnCase(SEED, number).document() for number in range(mixture)},
         **worlds(),
     }
     for name, document in documents.items():
@@ -132,4 +132,6 @@ def said(report: Report) -> str:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("revision")
-    main(parser.parse_args().revision)
+    parser.add_argument("--mixture", type=int, default=MIXTURE, help="campaigns of our own rig")
+    given = parser.parse_args()
+    main(given.revision, given.mixture)
