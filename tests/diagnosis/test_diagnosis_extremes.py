@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -127,3 +128,22 @@ def test_an_impossible_skin_is_named(field: str, value: float, table: SigmaTable
     assert report["verdict"] == "insufficient_data"
     assert [(found["code"], found["field"]) for found in report["findings"]] == [("impossible_number", f"skin.{field}")]
     assert f"skin.{field}" in report["statement"]
+
+
+def test_the_faint_forces_of_a_soft_cantilever_are_meant(table: SigmaTable) -> None:
+    random = np.random.default_rng(3)
+    depth_mm = np.linspace(-5e-4, 5e-4, 600)
+    force = 16 / 9 * 2e3 * np.sqrt(1e-5) * (1e-3 * np.maximum(depth_mm, 0.0)) ** 1.5  # N, of a gel of 2 kPa
+    assert force.max() < 1e-8
+    entry = {
+        "id": "r", "kind": "indentation", "indenter_radius_mm": 0.01, "displacement_mm": depth_mm.tolist(),
+        "force_n": (force + 1e-11 * random.normal(size=600)).tolist(),
+    }  # fmt: skip
+    document = {
+        "schema": "campaign/1", "name": "n", "units_checked": True, "skin": {"poisson_ratio": 0.5, "thickness_mm": 1.0},
+        "recordings": [entry],
+    }  # fmt: skip
+    report = diagnosis_report(from_dict(document)[0], table)
+    assert report["verdict"] == "no_mismatch"
+    assert report["fit"]["before"]["youngs_modulus"]["low"] < 2e-3 < report["fit"]["before"]["youngs_modulus"]["high"]
+    assert report["fit"]["before"]["least_squares_modulus_mpa"] == pytest.approx(2e-3, rel=0.02)

@@ -19,6 +19,7 @@ from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.goodness_of_fit import modulus
+from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
 from underskin.prediction.forward_model import predict
@@ -145,7 +146,7 @@ def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
     plain = report["fit"]["before"]
-    assert f"Young's modulus under Hertz's law: {plain['youngs_modulus']['value']:.3g} MPa." in report["statement"]
+    assert f"Young's modulus {plain['least_squares_modulus_mpa']:.3g} MPa, leaves" in report["statement"]
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])
@@ -243,6 +244,15 @@ def test_on_curves_a_mechanism_or_a_process_must_bring_five_nats(table: SigmaTab
         law = replace(layer, log_evidence=nothing.log_evidence + nats)
         search = Search((nothing, law), ((nothing, process),), {})
         assert search.answers[0].names == (leader,)
+
+
+def test_what_is_fitted_as_a_multiple_has_bounds_in_its_own_unit(table: SigmaTable) -> None:
+    problem = FittingProblem(curve_lines(parse(campaign(nanoindentation(1, 800))), "indentation"), table)
+    (explanation,) = problem.explain([Request(("adhesion",))])
+    assert explanation is not None
+    by_name = {entry.name: entry for entry in explanation.model.parameters}
+    assert multiple_of(explanation, by_name["work_of_adhesion"]) == 1.0
+    assert multiple_of(explanation, by_name["work_of_separation"]) == pytest.approx(ADHESION, rel=0.1)
 
 
 @pytest.mark.parametrize("declared", [1.98, 2.0, 2.02])

@@ -135,6 +135,17 @@ def test_agreement_names_what_it_does_not_rule_out(table: SigmaTable) -> None:
     assert "nothing needs to be added" in answer_statement([Answer(nothing, 0.97), adhesion], "no_mismatch")
 
 
+@pytest.mark.parametrize(("missed", "reserve"), [(0.3, False), (2.21, True), (None, False)])
+def test_an_answer_that_misses_what_was_held_out_says_so_in_its_first_sentence(
+    missed: float | None, reserve: bool, table: SigmaTable
+) -> None:
+    (only,) = answers_of(table, {("strain_stiffening",): 0.985})
+    after = {"heldout_rmse_percent": missed, "youngs_modulus": {"value": 1.0, "low": 0.9, "high": 1.1, "unit": "MPa"}}
+    fit = {"before": after, "after": after, "noise_floor_percent": 0.257}
+    first = answer_statement([only], "explained", kind="compression", fit=fit).split(". ")[0]
+    assert ("; but what was held out is missed by 2.2 %, where noise gives 0.26 %" in first) is reserve
+
+
 @pytest.mark.parametrize(
     ("kind", "named"), [("frf", "The paper's model"), ("indentation", "Hertz's law"), ("compression", "Hooke's law")]
 )

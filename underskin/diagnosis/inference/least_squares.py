@@ -157,7 +157,13 @@ def _seen_contact(curve: CurveConditions) -> Mask | None:
 
 
 def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
-    """The root mean square that a plain least-squares fit of the law leaves of all raw samples [% of the force's own].
+    """What `plain_least_squares` leave [% of the force's own root mean square]."""
+    return plain_least_squares(hypothesis, start)[1]
+
+
+def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:
+    """The fit (parameters,) of the law by plain least squares, and the root mean square that it leaves of all raw
+    samples [% of the force's own].
 
     Without priors and gains: the parameters and a zero of each curve are free, and its drift where that is plain in the
     air. From a start (parameters,).
@@ -188,7 +194,7 @@ def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
     precision = np.sqrt([curvature_of_prior(entry)[0] for entry in model.parameters])
     best, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
     left = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
-    return 100 * float(np.sqrt(left / (count * measured**2).sum()))
+    return best, 100 * float(np.sqrt(left / (count * measured**2).sum()))
 
 
 def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:

@@ -19,6 +19,7 @@ from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.curve_data import shown_curves
 from underskin.diagnosis.reporting.curve_figure import curve_figure
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
+from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign
@@ -187,14 +188,14 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
     """Each parameter's 95 % interval (blue) on that of its prior (grey), in its own unit."""
     places = own_places(shown.names, problem.lines)
     rows = [
-        (entry["name"], parameter, prior)
+        (entry["name"], parameter, prior, multiple_of(shown, prior))
         for entry in document["mechanisms"]
         for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
     ]
-    titles = [f"{name.replace('_', ' ')}: {_labelled(entry)}" for name, entry, _ in rows]
+    titles = [f"{name.replace('_', ' ')}: {_labelled(entry)}" for name, entry, *_ in rows]
     figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
-    for place, (_, entry, prior) in enumerate(rows, start=1):
-        widest = [prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975)]
+    for place, (_, entry, prior, scale) in enumerate(rows, start=1):
+        widest = [scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975)]
         for ends, colour, width, label in (
             (widest, _GREY, 14, "before the recordings (prior), 95 %"),
             ([entry["low"], entry["high"]], _BLUE, 8, "after them, 95 %"),

@@ -5,6 +5,7 @@ import numpy as np
 from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.validation.residual_noise import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -23,7 +24,8 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
             if lines.curves and entry.unit == "-" and entry.limit is None:  # a law's form: its ends are laws themselves
                 continue
             if min(abs(fit - bound) for bound in entry.bounds) < 1e-9:
-                bounds = {"low": entry.low, "high": entry.high, "unit": entry.unit}
+                scale = multiple_of(explanation, entry)
+                bounds = {"low": scale * entry.low, "high": scale * entry.high, "unit": entry.unit}
                 arguments = {"mechanism": name, "parameter": entry.name, **bounds}
                 findings.append(Finding(Reason.PARAMETER_AT_BOUND, "", entry.name, arguments))
     return findings

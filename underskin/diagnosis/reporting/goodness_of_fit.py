@@ -7,7 +7,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.least_squares import least_squares_percent
+from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -57,7 +57,8 @@ def fit_summary(
     outside = cross_validation.total(groups)
     parts = {
         name: {
-            "rmse_percent": rounded(_least_squares(problem, entry) or fitted.rmse_percent),
+            "rmse_percent": rounded(fitted.rmse_percent),
+            **_least_squares(problem, entry),
             **({"correlated_rmse_percent": rounded(fitted.rmse_percent)} if problem.lines.curves else {}),
             "heldout_rmse_percent": rounded(left.rmse_percent),
             "log_score": rounded(left.log_score / left.recordings) if left.recordings else None,
@@ -94,11 +95,15 @@ def _plainly(problem: FittingProblem, name: str) -> str:
     return f"unnamed: {law.spoken.acts_on} over {law.spoken.axis}, {law.spoken.form}"
 
 
-def _least_squares(problem: FittingProblem, explanation: Explanation) -> float | None:
-    """Of curves, what plain least squares of the same law leave [%]."""
+def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[str, float | None]:
+    """Of indentations, what plain least squares of the same law leave [%], and their modulus [MPa]."""
     if problem.kind != "indentation":
-        return None
-    return least_squares_percent(explanation.best.hypothesis, explanation.point.fit)
+        return {}
+    fit, left = plain_least_squares(explanation.best.hypothesis, explanation.point.fit)
+    place = place_of(explanation, "youngs_modulus")
+    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # of which the parameter is a factor
+    modulus_mpa = declared * float(explanation.model.parameters[place].from_fit(float(fit[place])))
+    return {"rmse_percent": rounded(left), "least_squares_modulus_mpa": rounded(modulus_mpa)}
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.laplace import levels_covariance
 from underskin.diagnosis.inference.profile import profile_end
+from underskin.mechanisms.parameter import Parameter
 
 _QUANTILE = float(ndtri(0.975))
 
@@ -51,6 +52,14 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
         values = _absolute(explanation, place, values)
     stated = zip(("value", "low", "high"), values, strict=True)
     return {"name": entry.name, "unit": entry.unit, **{key: rounded(float(value)) for key, value in stated}}
+
+
+def multiple_of(explanation: Explanation, entry: Parameter) -> float:
+    """The value that a parameter's bounds and prior are multiples of: 1, or that of the one it is relative to."""
+    if entry.relative_to is None:
+        return 1.0
+    other = place_of(explanation, entry.relative_to)
+    return explanation.model.parameters[other].from_fit(float(explanation.point.fit[other]))
 
 
 def without_effect(explanation: Explanation) -> list[str]:

@@ -131,7 +131,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         stated,
         diagnosis.shape,
         problem.kind,
-        fit if problem.lines.curves else None,
+        fit,
         caveats=caveats(findings),
         power=diagnosis.power,
         idle=without_effect(named) if named is not None else (),

@@ -25,6 +25,7 @@ from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
 _WORTH_NAMING = 0.02
+_FAR_ABOVE = 2.0  # times the noise: an error held out that a verdict's first sentence tells
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _SMALL = 5.0  # % of the response
@@ -50,12 +51,23 @@ def answer_statement(
     that look like an unlisted law.
     """
     first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, imitating, all_used=not caveats)
+    if fit is not None and verdict in ("explained", "no_mismatch"):
+        first = first.removesuffix(".") + _reserve(fit) + "."
     parts = [first, caveats, rest]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
     if fit is not None and "youngs_modulus" in fit["before"]:
         parts.append(_left_by(fit, SIMPLEST[kind]) if verdict == "unexplained" else _modulus(fit["after"]))
     return " ".join(part for part in parts if part)
+
+
+def _reserve(fit: Mapping[str, Any]) -> str:
+    """What keeps an answer from being one without reserve: recordings held out that are predicted far worse than noise
+    would have it."""
+    missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
+    if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
+        return ""
+    return f"; but what was held out is missed by {in_digits(missed, 2)} %, where noise gives {in_digits(floor, 2)} %"
 
 
 def insufficient_statement(what: Lacking | None) -> str:
@@ -121,11 +133,11 @@ def _modulus(after: Mapping[str, Any]) -> str:
 def _left_by(fit: Mapping[str, Any], model: str) -> str:
     """How far the base model goes, and the best set of mechanisms, where neither describes the curves."""
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
-    modulus = before["youngs_modulus"]
-    said = f"{model[0].upper()}{model[1:]} alone leaves {in_digits(before['rmse_percent'], 2)} % of the force"
+    modulus = before.get("least_squares_modulus_mpa")
+    alone = f"{model[0].upper()}{model[1:]} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
+    said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
     beside = f", with {in_words(names)} {in_digits(after['rmse_percent'], 2)} %" if names else ""
-    under = f"Young's modulus under {model}: {modulus['value']:.3g} {modulus['unit']}"
-    return f"{said} (root mean square){beside}. {under}."
+    return f"{said}{beside}."
 
 
 def power_statement(power: Sequence[Power], kind: Kind) -> str:

@@ -32,7 +32,7 @@ _BOUNDS = {
     "displacement_mm": _LENGTH,
     "preload_n": _FORCE,
     "dynamic_force_n": _FORCE,
-    "force_n": _FORCE,
+    "force_n": (1e-13, 1e8),  # the peak of a soft cantilever's curve may be tens of piconewtons
     "frf_re_pc_per_n": _CHARGE,
     "frf_im_pc_per_n": _CHARGE,
     "charge_pc": _CHARGE,
