@@ -95,7 +95,7 @@ def test_an_instruments_table(separator: str, decimal: str) -> None:
     channels["charge_pc"] = {**channels["charge_pc"], "channel": "amplifier [V]"}
     for text in ("\n".join(lines), "\ufeff" + "\r\n".join(lines)):
         the_time_series(text.encode(), "a.csv", rig(channels=channels))
-        assert contents(text.encode(), "a.csv").properties == {"Sample": "palm 3"}
+        assert contents(text.encode(), "a.csv").properties == {"Operator": "somebody", "Sample": "palm 3"}
 
 
 def test_a_table_with_a_row_that_does_not_fit_is_refused_by_line() -> None:

@@ -8,8 +8,10 @@ import pytest
 from tests.recordings.contents_of_files import contents
 from underskin.errors import FileError
 from underskin.recordings import read_contents
+from underskin.recordings.channel_mapping import Property
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.sandbox import parse_apart
+from underskin.recordings.stated_values import spring_constant
 
 DEPTH = np.concatenate([np.linspace(-0.5, 1.5, 9), np.linspace(1.25, -0.5, 8)])
 FORCE = np.where(DEPTH > 0, 0.25 * np.abs(DEPTH) ** 1.5, 0.0).round(6)
@@ -122,6 +124,32 @@ def test_comments_may_part_the_rows_and_state_properties() -> None:
     assert found.blocks[0].group_starts == (0, 9)
     assert found.properties["springConstant"] == "0.05"
     assert found.properties["k (N/m)"] == "3"
+
+
+@pytest.mark.parametrize(("separator", "decimal"), [("\t", "."), ("\t", ","), (";", ","), (" ", "."), (",", ".")])
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("Spring constant (N/m){separator}3{decimal}5", "Spring constant (N/m)"),
+        ("Spring constant (N/m): 3{decimal}5", "Spring constant (N/m)"),
+        ("# k=3{decimal}5 N/m", "k (N/m)"),
+        ("Spring constant: 3{decimal}5 N/m", "Spring constant (N/m)"),
+        ("Spring constant{separator}3{decimal}5{separator}N/m", "Spring constant (N/m)"),
+    ],
+)
+def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str, separator: str, decimal: str) -> None:
+    if separator == " " and "{separator}" in line:
+        line = line.replace("{separator}", ": ", 1).replace("{separator}", " ")
+    stated = line.format(separator=separator, decimal=decimal)
+    text = [f"Sample{separator}PDMS", stated, "", f"Depth (um){separator}Force (mN)", *rows(separator, decimal)]
+    found = contents("\n".join(text).encode(), "curve.txt")
+    assert found.properties[name] == f"3{decimal}5"
+    assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
+
+
+def test_decimal_commas_in_quotes_between_commas() -> None:
+    quoted = [",".join(f'"{cell}"' for cell in line.split(";")) for line in rows(";", ",")]
+    the_curve(contents("\n".join(["Depth (um),Force (mN)", *quoted]).encode(), "curve.csv"), LABELLED)
 
 
 def test_curves_under_headings_of_their_own_are_parts() -> None:

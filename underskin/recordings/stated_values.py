@@ -19,7 +19,7 @@ def common_value(name: str, value: Any | Property, stated: Stated, file: str) ->
     if not isinstance(value, Property):
         return value
     given = _said(value, stated, file)
-    number = text.number(given, ".") if isinstance(given, str) else given
+    number = _number(given)
     if number is None or name in _TEXTS:
         return given
     if name not in LAB:
@@ -33,7 +33,7 @@ def spring_constant(value: float | Property, stated: Stated, file: str) -> float
     if not isinstance(value, Property):
         return value
     place, given = f"property {value.property!r}", _said(value, stated, file)
-    number = text.number(given, text.decimal_mark([[given]], ";")) if isinstance(given, str) else given
+    number = _number(given)
     if number is None or not 0 < number < float("inf"):
         raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a spring constant")
     label = labelled_unit(value.property)
@@ -41,6 +41,11 @@ def spring_constant(value: float | Property, stated: Stated, file: str) -> float
     if known is None or known.dimension != _STIFFNESS:
         raise FileError(file, place, f"its unit {label!r} is not one of {_STIFFNESS}, such as N/m")
     return number * known.to_si
+
+
+def _number(given: str | float) -> float | None:
+    """As a file writes it, with a point or a comma."""
+    return text.number(given, text.decimal_mark([[given]], ";")) if isinstance(given, str) else given
 
 
 def _said(value: Property, stated: Stated, file: str) -> str | float:

@@ -18,9 +18,10 @@ from underskin.recordings.channels import Block, Channel, Contents, with_distinc
 from underskin.recordings.readers import table_headings, table_rows, text
 from underskin.recordings.readers.table_headings import Headings
 from underskin.recordings.readers.table_rows import BLANKS, Section, Table
+from underskin.recordings.readers.unit_labels import unit
 
-_SEPARATORS = re.compile(r"[\t;,]")
-_STATED = re.compile(r"(?P<name>[^:=]*[^:=\s])\s*[:=]\s*(?P<value>\S.*)")
+_STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
+_WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s\d].*)")
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
@@ -42,13 +43,13 @@ def read(stream: BinaryIO, file: str) -> Contents:
     _refuse_other_rows(lines, table, sections[-1].lines[-1] + 1, file)
     left_out = _left_out(lines, table, headings, sections, file)
     above, *between, under = _about(lines, sections, headings)
-    properties, warnings = _properties([*above, *under], table.separator)
+    properties, warnings = _properties([*above, *under], table)
     blocks = []
     for number, (section, own) in enumerate(zip(sections, [above, *between], strict=True), start=1):
         name = str(number) if len(sections) > 1 else ""
         blocks.append(Block(name, _channels(table, headings, section), group_starts=section.group_starts))
         if name:
-            told, _ = _properties(own, table.separator)
+            told, _ = _properties(own, table)
             properties |= {f"{name}.{of}": value for of, value in told.items()}
     return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, sections))
 
@@ -118,13 +119,13 @@ def _layout(table: Table, headings: Headings, sections: Sequence[Section]) -> st
     return f"{numbers}, {written}; names from line {names}" + "".join(f", units from line {line}" for line in units)
 
 
-def _properties(lines: Iterable[str], separator: str) -> tuple[dict[str, str | float], list[str]]:
+def _properties(lines: Iterable[str], table: Table) -> tuple[dict[str, str | float], list[str]]:
     """What lines that hold a name and a value say, a number as text, as written; and which have two values."""
     values: dict[str, list[str]] = {}
     for line in lines:
-        match _stated(line, separator):
-            case [name, value]:
-                values.setdefault(name, []).append(value)
+        stated = _stated(table_rows.uncommented(line).strip(), table)
+        if stated is not None:
+            values.setdefault(stated[0], []).append(stated[1])
     twice = {name: different for name, said in values.items() if len(different := list(dict.fromkeys(said))) > 1}
     doubts = [
         f"{name!r} is given as {one!r} and as {other!r}: neither is used" for name, (one, other, *_) in twice.items()
@@ -132,13 +133,24 @@ def _properties(lines: Iterable[str], separator: str) -> tuple[dict[str, str | f
     return {name: said[0] for name, said in values.items() if name not in twice}, doubts
 
 
-def _stated(line: str, separator: str) -> list[str]:
-    """The name and the value that a line holds, or else other cells; a comment may have a colon or = between them."""
-    bare = table_rows.uncommented(line)
-    stated = _STATED.fullmatch(bare.strip()) if bare is not line else None
-    if stated:
-        return [stated["name"], stated["value"].strip('"')]
-    quoted = table_rows.split(bare, separator) if '"' in bare and separator != BLANKS else []
-    cells = quoted or [cell.strip().strip('"') for cell in _SEPARATORS.split(bare)]
-    filled = [cell for cell in cells if cell]
-    return filled if filled and cells[0] == filled[0] else []
+def _stated(line: str, table: Table) -> tuple[str, str] | None:
+    """The name and the value that a line holds, as cells or with a colon or = between them; a unit behind the value
+    goes to the name."""
+    for separator in dict.fromkeys([table.separator, "\t", ";", *([","] if table.decimal == "." else [])]):
+        cells = table_rows.split(line, separator) if separator != BLANKS else []
+        match [cell for cell in cells if cell]:
+            case [name, value] if cells[0] == name:
+                return _with_its_unit(name.rstrip(":= "), value)
+            case [name, value, label] if cells[0] == name and unit(label) is not None:
+                return _with_its_unit(name.rstrip(":= "), f"{value} {label}")
+            case [_, _, *_]:
+                return None
+    told = _STATED.fullmatch(line)
+    return None if told is None else _with_its_unit(told["name"], told["value"].strip('"'))
+
+
+def _with_its_unit(name: str, value: str) -> tuple[str, str]:
+    told = _WITH_UNIT.fullmatch(value)
+    if told is None or unit(told["unit"]) is None:
+        return name, value
+    return f"{name} ({told['unit']})", told["value"]

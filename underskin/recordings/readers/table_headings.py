@@ -46,7 +46,8 @@ class _Candidate:
         units = [cell.strip(_BRACKETS) for cell in self.cells]
         known = sum(unit(cell) is not None for cell in units)
         others = sum(cell not in _NO_UNITS for cell in units) - known
-        return self.label == "units" or (self.label == "" and known > 0 and others <= known)
+        states_values = any("=" in cell or ":" in cell for cell in units)  # k=3 N/m
+        return self.label == "units" or (self.label == "" and known > 0 and others <= known and not states_values)
 
 
 def find(lines: Sequence[str], table: Table, file: str) -> Headings:
