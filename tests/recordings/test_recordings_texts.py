@@ -147,11 +147,6 @@ def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str,
     assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
 
 
-def test_decimal_commas_in_quotes_between_commas() -> None:
-    quoted = [",".join(f'"{cell}"' for cell in line.split(";")) for line in rows(";", ",")]
-    the_curve(contents("\n".join(["Depth (um),Force (mN)", *quoted]).encode(), "curve.csv"), LABELLED)
-
-
 def test_curves_under_headings_of_their_own_are_parts() -> None:
     text = [line for name in ("a", "b") for line in (f"Curve;{name}", "Depth (um);Force (mN)", *rows(";"), "")]
     found = contents("\n".join(text).encode(), "curves.txt")

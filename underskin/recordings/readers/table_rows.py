@@ -13,7 +13,7 @@ from underskin.errors import FileError
 from underskin.recordings.readers import text
 
 BLANKS = " "
-_STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","), (",", ","))
+_STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","))
 _TOKEN = re.compile(r'"[^"]*"|\S+')
 _COMMENT = re.compile(r"\s*(#|%|//|!)+\s*")
 _LEAST = 2  # columns of numbers, rows of a table, rows of a group
