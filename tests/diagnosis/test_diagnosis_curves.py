@@ -61,7 +61,7 @@ def test_a_percent_that_no_law_describes_is_told_and_is_no_mechanism() -> None:
 def test_a_large_bump_is_unexplained_and_described_along_the_curve() -> None:
     report = diagnosis_report(parse(pressed_pad(4, 0.15)), load_table())
     assert report["verdict"] == "unexplained"
-    assert "of the largest force over displacement_mm" in report["statement"]
+    assert "of the largest force over the displacement" in report["statement"]
     assert "Hz" not in report["statement"]
 
 

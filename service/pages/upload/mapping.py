@@ -119,11 +119,13 @@ def guessed(
     }
 
 
-def passed_over(channels: Sequence[ChannelSummary]) -> list[str]:
-    """In words, which channels `guessed` left unused although they may be what another one was taken for."""
+def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any]) -> list[str]:
+    """In words, which channels a guessed rig description leaves unused although they may be what another one was
+    taken for."""
     by_field: dict[str, list[str]] = {}
     for one, field in zip(channels, _likely(channels)[1], strict=True):
-        by_field.setdefault(field, []).append(one.name)
+        if spring_mapping.shown_as(document, one.name)[0] in ("", field):
+            by_field.setdefault(field, []).append(one.name)
     return [
         f"{', '.join(names[1:])} may be {CHANNELS[field]} as well as {names[0]}, which was taken for it: "
         "choose the one that is meant"

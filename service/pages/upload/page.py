@@ -132,7 +132,7 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         known=known,
         skin=pending.skin or pending.seen[file].skin or "",
         channels=channels,
-        passed_over=[] if stated else mappings.passed_over(channels),
+        passed_over=[] if stated else mappings.passed_over(channels, document),
         twice=_twice(pending, channels),
         document=document,
         layout=mappings.sensors_text(document),

@@ -7,7 +7,16 @@ import pytest
 import yaml
 
 from service.pages.upload.file_summary import ChannelSummary
-from service.pages.upload.mapping import CHANNELS, KINDS, document_of, field_words, guessed, sensors_text, what_to_do
+from service.pages.upload.mapping import (
+    CHANNELS,
+    KINDS,
+    document_of,
+    field_words,
+    guessed,
+    passed_over,
+    sensors_text,
+    what_to_do,
+)
 from tests.support.repository import ROOT
 from underskin import InvalidInput
 from underskin.errors import Mention, Requirement
@@ -61,6 +70,13 @@ def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     curve = guessed([channel("z", "um"), channel("F", "uN"), channel("t", "s")], {}, {})
     assert curve["kind"] == "indentation"
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
+
+
+def test_a_deflection_that_is_used_is_not_said_to_be_passed_over() -> None:
+    sprung = [channel("Piezo", "nm"), channel("Deflection", "nm"), channel("Height", "nm")]
+    assert passed_over(sprung[:2], guessed(sprung[:2], {}, {})) == []
+    (told,) = passed_over(sprung, guessed(sprung, {}, {}))
+    assert told.startswith("Height may be displacement as well as Piezo")
 
 
 def test_a_testing_machine_s_table_is_guessed_to_be_a_compression() -> None:

@@ -167,18 +167,25 @@ def shape_statement(shape: Shape | None) -> str:
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:
-    words = _FORMS[form.kind].format(at=form.at, unit=ALONG_CURVES.get(form.axis, ""))
+    called, unit = _ALONG[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
+    words = _FORMS[form.kind].format(at=form.at, unit=f" {unit}" if unit else "")
     size = f"{words}, up to {in_digits(form.size, 2)} %"
-    return f"{size} of the largest force over {form.axis}" if shape.of_curves else f"{size} over {_form_axis(form)}"
+    return f"{size} of the largest force over {called}" if shape.of_curves else f"{size} over {called}"
+
+
+_ALONG = {
+    "displacement_mm": ("the displacement", ALONG_CURVES["displacement_mm"]),
+    "time_s": ("time", ALONG_CURVES["time_s"]),
+}
 
 
 _FORMS: Mapping[FormKind, str] = {
     FormKind.POWER_LAW: "a power law",
     FormKind.DRIFT: "a drift",
-    FormKind.STEP: "a step at {at:.4g}",
-    FormKind.PERIODIC: "a periodic change of period {at:.3g}",
-    FormKind.PEAK: "a peak or notch at {at:.3g} Hz",
-    FormKind.BUMP: "a bump at {at:.3g} {unit}",
+    FormKind.STEP: "a step at {at:.4g}{unit}",
+    FormKind.PERIODIC: "a periodic change of period {at:.3g}{unit}",
+    FormKind.PEAK: "a peak or notch at {at:.3g}{unit}",
+    FormKind.BUMP: "a bump at {at:.3g}{unit}",
 }
 
 
