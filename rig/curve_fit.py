@@ -41,7 +41,7 @@ class Priors:
 def least_chi2(
     law: Law, curves: Sequence[Curve], priors: Priors, zero: float, zero_step: float
 ) -> tuple[float, list[Floats]]:
-    """The least χ², priors included, and the prediction of each curve there.
+    """The least χ², priors included, and the prediction of each curve there; infinite from where the law has none.
 
     Parameters
     ----------
@@ -59,6 +59,8 @@ def least_chi2(
     point[0] = priors.log_modulus
     point[1 :: fit.each] = zero
     chi2, damping = fit.chi2(point), _DAMPING
+    if not np.isfinite(chi2):
+        return np.inf, fit.predictions(point)
     matrix, right = fit.normal_equations(point)
     for _ in range(_ROUNDS):
         scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))

@@ -10,7 +10,7 @@ A factor on E shows as a departure from the declared modulus alone: under modulu
 compression, a declared modulus is known within 2 %.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,7 +26,8 @@ from rig.layer import Floats
 THRESHOLD = 30.0
 _DECLARED = 0.02
 _FACTORS_ON_E = {"modulus_error", "compressible_layer"}
-_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first alone
+_SHIFTS = (0.0, -0.2, 0.2)  # starts of z, of the largest displacement; beside known effects the first that has a fit
+_OUT_OF_REACH: tuple[float, list[Floats]] = (np.inf, [])  # of a body that stiffens to infinity before its depth
 _STEP = 1e-4  # of the largest displacement
 _POINTS = 200  # of a course along the recorded displacement
 _JUMP = 0.02  # of the largest force, between neighbouring samples
@@ -54,13 +55,14 @@ def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tup
     exact, base = [curve.exact_force_n for curve in recorded], _Base(experiment, recorded, on)
     curves = [_Base(experiment, recorded, {}).measured(number) for number in range(len(recorded))]
     priors = base.priors()
-    chi2, fitted = min(
-        (
-            least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth)
-            for shift in (_SHIFTS[:1] if known else _SHIFTS)
-        ),
-        key=lambda result: result[0],
+    fits: Iterator[tuple[float, list[Floats]]] = (
+        least_chi2(base.law(), curves, priors, shift * depth, _STEP * depth) for shift in _SHIFTS
     )
+    if known:
+        fits = iter([next((fit for fit in fits if np.isfinite(fit[0])), _OUT_OF_REACH)])
+    chi2, fitted = min(fits, key=lambda result: result[0])
+    if not np.isfinite(chi2):
+        return Visibility(np.inf, np.inf)
     true, _ = least_chi2(
         lambda number, log_modulus, _: exact[number] * np.exp(log_modulus),
         curves,

@@ -110,3 +110,10 @@ def test_what_shows_is_told_although_a_fit_goes_astray() -> None:
     truth = truth_of_curves(*drawn_curves(31001, 5, INDENTATION, "pair"))
     assert truth["identifiable"]
     assert np.isfinite(truth["chi2_gain_of_truth"])
+
+
+def test_an_effect_is_visible_without_which_the_others_have_no_fit() -> None:
+    """Without the stage that gives, a body that stiffens to infinity has no force at the recorded depth."""
+    truth = truth_of_curves(*drawn_curves(36036, 45, INDENTATION, "pair"))
+    assert set(truth["effects"]) == {"instrument_compliance", "strain_stiffening"}
+    assert truth["every_effect_identifiable"]

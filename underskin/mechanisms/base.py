@@ -131,6 +131,10 @@ class Mechanism:
         """Values of its parameters, in their order and units, that measured recordings suggest: where fits begin."""
         return ()
 
+    def told(self, values: Mapping[str, float]) -> str:
+        """What values of its parameters mean together, as a sentence; empty where they speak for themselves."""
+        return ""
+
     def values_on(self, values: Mapping[str, float], conditions: Conditions) -> Mapping[str, float]:
         """Values of its parameters found on one campaign, as those that it has on another.
 

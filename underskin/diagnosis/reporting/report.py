@@ -122,6 +122,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     named = leader.explanation if stated in ("explained", "ambiguous") else None
     leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
     stated_set = named if leading is None else leading.explanation
+    mechanisms = [] if stated_set is None else _mechanisms(search, problem, stated_set)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
@@ -136,6 +137,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         power=diagnosis.power,
         idle=without_effect(named) if named is not None else (),
         imitating=shown.names if shown.names in search.imitating else (),
+        told=_told(problem, mechanisms) if named is not None else (),
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
@@ -152,7 +154,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "probability": round(leader.probability, 3),
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
-        "mechanisms": [] if stated_set is None else _mechanisms(search, problem, stated_set),
+        "mechanisms": mechanisms,
         "unnamed": law,
         "alternatives": _alternatives(search),
         "not_identifiable": [
@@ -212,6 +214,12 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
         for name in explanation.names
         if name in problem.lines.mechanisms.named
     ]
+
+
+def _told(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the parameters of each mean together, where they do not speak for themselves."""
+    values = {one["name"]: {entry["name"]: entry["value"] for entry in one["parameters"]} for one in mechanisms}
+    return [said for name, own in values.items() if (said := problem.lines.mechanisms[name].told(own))]
 
 
 def _presence(search: Search, problem: FittingProblem) -> dict[str, float]:

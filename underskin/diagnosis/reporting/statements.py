@@ -42,18 +42,19 @@ def answer_statement(
     power: Sequence[Power] = (),
     idle: Sequence[str] = (),
     imitating: Sequence[str] = (),
+    told: Sequence[str] = (),
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
     also the modulus under the stated answer, or what the base model leaves; where nothing is missing, what would have
     shown (`power`).
 
     `fit` is the report's; `idle`: mechanisms of the leading answer that may as well have no effect; `imitating`: those
-    that look like an unlisted law.
+    that look like an unlisted law; `told`: what the values of the leading answer mean.
     """
     first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, imitating, all_used=not caveats)
     if fit is not None and verdict in ("explained", "no_mismatch"):
         first = first.removesuffix(".") + _reserve(fit) + "."
-    parts = [first, caveats, rest]
+    parts = [first, caveats, rest, *told]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
     if fit is not None and "youngs_modulus" in fit["before"]:

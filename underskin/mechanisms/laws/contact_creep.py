@@ -1,6 +1,7 @@
 """The mechanism `contact_creep`."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -86,6 +87,17 @@ class ContactCreep(Mechanism):
         if not longest > 0:
             return ()
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
+
+    def told(self, values: Mapping[str, float]) -> str:
+        """Of two pairs, what each relaxes and in which time."""
+        if "time_spread" not in values:
+            return ""
+        fraction, share = values["relaxed_fraction"], values["first_share"]
+        time, spread = values["relaxation_time"], values["time_spread"]
+        fast, slow = time * math.exp(-spread * (1.0 - share)), time * math.exp(spread * share)
+        shares = (fraction * share, fast), (fraction * (1.0 - share), slow)
+        first, second = (f"{100 * part:.2g} % with {time:.2g} s" for part, time in shares)
+        return f"The force relaxes by {first} and by {second}."
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """Times are needed that say more than the loads: dwell_s that differ, or time_s apart from displacement."""
