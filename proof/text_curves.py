@@ -14,6 +14,7 @@ from proof.statistics import Share, calibration, share
 
 Result = Mapping[str, Any]
 _SURE = 0.9
+_FAR = 3.0  # times the noise: an error held out
 _KINDS = ("single", "pair", "unknown")
 
 
@@ -43,6 +44,7 @@ pair of which each member does.
 {_calibration(visible)}
 
 {_values(result, judged)}
+{_over_the_floor(judged)}
 
 ### Every miss on raw curves
 
@@ -83,6 +85,16 @@ def _calibration(judged: Sequence[Judged]) -> str:
         f"Expected calibration error of the identifiable: {told.error:.3f}; a perfectly calibrated tool would have "
         f"{low:.3f} to {high:.3f}."
     )
+
+
+def _over_the_floor(judged: Sequence[Judged]) -> str:
+    """How errors held out compare with noise where a law is named rightly."""
+    named = [entry.held_out for entry in judged if entry.right and entry.kind in ("single", "pair") and entry.held_out]
+    ratios = [error / floor for error, floor in named if floor > 0]
+    if not ratios:
+        return ""
+    far = percent(share([ratio > _FAR for ratio in ratios]))
+    return f"Error held out over the noise, of laws named rightly: median {median_of(ratios)}; above {_FAR:g} in {far}."
 
 
 def _values(result: Result, judged: Sequence[Judged]) -> str:
