@@ -44,8 +44,8 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
-    Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
-    plainly; a law is granted it where plain least squares leave less than a twentieth of what they leave under the null
+    Of indentations structure is a smooth part above the noise of a sample, or, of a set of mechanisms, one that all
+    samples together show plainly; a law is granted it where plain least squares leave less than a twentieth of what they leave under the null
     hypothesis, since every law of contact idealises. Of a law of
     compressions more is granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more
     than about their neighbours by as much as those do.
@@ -55,7 +55,9 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     smooth, noise = _smooth_part(problem, explanation)
     if problem.kind != "indentation":
         return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
-    if smooth <= _LEAST_STRUCTURE or (smooth <= _STRUCTURED * noise and left_smooth(explanation) < _PLAIN_STRUCTURE):
+    if smooth <= _LEAST_STRUCTURE:
+        return False
+    if smooth <= _STRUCTURED * noise and not (explanation.names and left_smooth(explanation) > _PLAIN_STRUCTURE):
         return False
     left, at_first = (least_squares_percent(one.best.hypothesis, one.point.fit) for one in (explanation, null))
     return left >= _GRANTED_TO_LAWS * at_first
