@@ -45,10 +45,10 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
     Of indentations structure is a smooth part above the noise of a sample, or, of a set of mechanisms, one that all
-    samples together show plainly; a law is granted it where plain least squares leave less than a twentieth of what they leave under the null
-    hypothesis, since every law of contact idealises. Of a law of
-    compressions more is granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more
-    than about their neighbours by as much as those do.
+    samples together show plainly; a law is granted it where plain least squares leave less than a twentieth of what
+    they leave under the null hypothesis, since every law of contact idealises. Of a law of compressions more is
+    granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more than about their
+    neighbours by as much as those do.
     """
     if problem.lines.smooth is None:
         return not explanation.names and explanation.best.levels.level > _STRUCTURED
