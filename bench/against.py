@@ -21,8 +21,9 @@ NAMED_ALONE = """
 from underskin.diagnosis import pipeline
 pipeline.with_laws = lambda *_: ()
 """
-_OTHERS = """
+OF_ANY_REVISION = """
 import json, sys, time
+from pathlib import Path
 try:
     from underskin.diagnosis.pipeline import diagnosis_report
     from underskin.surrogate.sigma_table import load_table
@@ -32,6 +33,8 @@ except ImportError:  # the layout before the library had wings
 from underskin.recordings.campaign import parse
 
 table = load_table()
+"""
+_TIMES = """
 for file in sys.argv[1:]:
     with open(file) as text:
         campaign = parse(json.load(text))
@@ -93,7 +96,7 @@ def _seconds(tree: Path, files: Sequence[Path], before: str = "") -> list[float]
     """Processor time of each campaign's diagnosis, all in one process, `before` which this is run."""
     one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "UNDERSKIN_TABLES": str(tree / "tables")}
     run = subprocess.run(
-        [sys.executable, "-c", before + _OTHERS, *map(str, files)],
+        [sys.executable, "-c", before + OF_ANY_REVISION + _TIMES, *map(str, files)],
         cwd=tree,
         env={**os.environ, **one_thread, "PYTHONPATH": str(tree)},
         check=True,

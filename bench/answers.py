@@ -16,24 +16,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from bench.against import NAMED_ALONE, worktree
+from bench.against import NAMED_ALONE, OF_ANY_REVISION, worktree
 from proof.cases import DrawnCase
 from proof.own_rig import MIXTURE, SEED
 from proof.paper_array import worlds
 
 _PROBABILITY, _OF_INTERVAL = 0.02, 0.1
 _REPORTS = """
-import json, sys
-from pathlib import Path
-try:
-    from underskin.diagnosis.pipeline import diagnosis_report
-    from underskin.surrogate.sigma_table import load_table
-except ImportError:  # the layout before the library had wings
-    from underskin.diagnosis.diagnose import diagnosis_report
-    from underskin.surrogate import load_table
-from underskin.recordings.campaign import parse
-
-table = load_table()
 out = Path(sys.argv[1])
 for file in map(Path, sys.argv[2:]):
     (out / file.name).write_text(json.dumps(diagnosis_report(parse(json.loads(file.read_text())), table)))
@@ -81,7 +70,7 @@ def _reports(tree: Path, before: str, files: Sequence[Path], out: Path) -> dict[
     environment = {**os.environ, **settings, "UNDERSKIN_TABLES": str(tree / "tables")}
 
     def diagnose(share: Sequence[Path]) -> None:
-        command = [sys.executable, "-c", before + _REPORTS, str(out), *map(str, share)]
+        command = [sys.executable, "-c", before + OF_ANY_REVISION + _REPORTS, str(out), *map(str, share)]
         subprocess.run(command, cwd=tree, env=environment, check=True)
 
     with ThreadPoolExecutor(cores) as pool:

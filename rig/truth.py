@@ -1,5 +1,6 @@
 """The truth about a campaign (`truth/1`), in a file of its own: effects, parameters, gains, and whether they show."""
 
+import math
 from typing import Any
 
 from rig import visible_curves
@@ -58,7 +59,9 @@ def truth_of_curves(experiment: Experiment, curves: list[RecordedCurve]) -> dict
         "identifiable": overall.identifiable if on else True,
         "every_effect_identifiable": all(one.identifiable for one in each.values()),
         "chi2_gain_of_truth": round(overall.chi2_gain, 2),
-        "chi2_gain_of_each": {name: round(one.chi2_gain, 2) for name, one in each.items()},
+        "chi2_gain_of_each": {  # None without bound: JSON has no infinity
+            name: round(one.chi2_gain, 2) if math.isfinite(one.chi2_gain) else None for name, one in each.items()
+        },
         "base_rms_misfit_percent": round(overall.base_misfit_percent, 3),
     }
 

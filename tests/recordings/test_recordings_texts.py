@@ -11,7 +11,7 @@ from underskin.recordings import read_contents
 from underskin.recordings.channel_mapping import Property
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.sandbox import parse_apart
-from underskin.recordings.stated_values import spring_constant
+from underskin.recordings.stated_values import common_value, spring_constant
 
 DEPTH = np.concatenate([np.linspace(-0.5, 1.5, 9), np.linspace(1.25, -0.5, 8)])
 FORCE = np.where(DEPTH > 0, 0.25 * np.abs(DEPTH) ** 1.5, 0.0).round(6)
@@ -145,6 +145,13 @@ def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str,
     found = contents("\n".join(text).encode(), "curve.txt")
     assert found.properties[name] == f"3{decimal}5"
     assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
+
+
+def test_a_comma_that_may_part_thousands_makes_no_number() -> None:
+    assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,5"}, "curve.txt") == 1.5
+    assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,500"}, "curve.txt") == "1,500"
+    with pytest.raises(FileError, match=r"is '1,500': must be a number"):
+        spring_constant(Property("k (N/m)"), {"k (N/m)": "1,500"}, "curve.txt")
 
 
 def test_curves_under_headings_of_their_own_are_parts() -> None:

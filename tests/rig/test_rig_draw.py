@@ -1,5 +1,6 @@
 """Random experiments: like a lab's, the same for the same seed, and what they hide is as asked."""
 
+import json
 from collections import Counter
 
 import numpy as np
@@ -117,3 +118,5 @@ def test_an_effect_is_visible_without_which_the_others_have_no_fit() -> None:
     truth = truth_of_curves(*drawn_curves(36036, 45, INDENTATION, "pair"))
     assert set(truth["effects"]) == {"instrument_compliance", "strain_stiffening"}
     assert truth["every_effect_identifiable"]
+    assert truth["chi2_gain_of_each"]["instrument_compliance"] is None
+    json.dumps(truth["chi2_gain_of_each"], allow_nan=False)

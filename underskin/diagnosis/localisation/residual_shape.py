@@ -18,7 +18,7 @@ from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.units import Floats
 
 _GRID = 40
-ALONG_CURVES = {"displacement_mm": "mm", "time_s": "s"}
+ALONG_CURVES = {"displacement_mm": ("the displacement", "mm"), "time_s": ("time", "s")}  # in words, and the unit
 _LOGARITHMIC = (
     "preload_n",
     "indenter_radius_mm",

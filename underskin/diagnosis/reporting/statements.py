@@ -168,16 +168,10 @@ def shape_statement(shape: Shape | None) -> str:
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:
-    called, unit = _ALONG[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
+    called, unit = ALONG_CURVES[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
     words = _FORMS[form.kind].format(at=form.at, unit=f" {unit}" if unit else "")
-    size = f"{words}, up to {in_digits(form.size, 2)} %"
-    return f"{size} of the largest force over {called}" if shape.of_curves else f"{size} over {called}"
-
-
-_ALONG = {
-    "displacement_mm": ("the displacement", ALONG_CURVES["displacement_mm"]),
-    "time_s": ("time", ALONG_CURVES["time_s"]),
-}
+    of = " of the largest force" if shape.of_curves else ""
+    return f"{words}, up to {in_digits(form.size, 2)} %{of} over {called}"
 
 
 _FORMS: Mapping[FormKind, str] = {
