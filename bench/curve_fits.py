@@ -14,7 +14,6 @@ from bench.figures import Figure
 from proof.real import recorded
 from underskin.diagnosis.data.curve_samples import curve_lines, finite_samples
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.recordings.campaign import IndentationRecording, parse
 from underskin.recordings.curve_course import course
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -84,11 +83,10 @@ def fitted(document: Mapping[str, Any], names: tuple[str, ...], table: SigmaTabl
     assert isinstance(entry, IndentationRecording)
     (explanation,) = FittingProblem(lines, table).explain([Request(names)])
     assert explanation is not None
-    percent = least_squares_percent(explanation.best.hypothesis, explanation.point.fit)
     displacement, force = finite_samples(entry)[:2]
     about_zero = force - course(displacement, force).zero
     raw = Curve(1e-3 * entry.indenter_radius_mm, campaign.skin.poisson_ratio, 1e-3 * displacement, about_zero)
-    return Fitted(percent, raw, float((about_zero**2).sum()))
+    return Fitted(explanation.least_squares[1], raw, float((about_zero**2).sum()))
 
 
 def _indents(document: Mapping[str, Any]) -> bool:

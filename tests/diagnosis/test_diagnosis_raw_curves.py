@@ -16,7 +16,6 @@ from tests.support.adhesive_curves import MODULUS_MPA, WORK_J_PER_M2, adhesive_c
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.goodness_of_fit import modulus
 from underskin.diagnosis.reporting.numbers import multiple_of
@@ -214,7 +213,7 @@ def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: floa
     )
     explanation = problem.explain([Request(())])[0]
     assert explanation is not None
-    ours = least_squares_percent(explanation.best.hypothesis, explanation.point.fit)
+    ours = explanation.least_squares[1]
 
     def residual(x: Floats) -> Floats:
         return np.asarray(x[0] * np.maximum(displacement - x[1], 0.0) ** 1.5 + x[2] - force)
@@ -270,7 +269,7 @@ def test_a_fit_does_not_depend_on_where_the_displacement_has_its_zero(table: Sig
     assert here is not None
     assert there is not None
     assert there.log_evidence == pytest.approx(here.log_evidence, abs=0.02)
-    left = [least_squares_percent(one.best.hypothesis, one.point.fit) for one in (here, there)]
+    left = [one.least_squares[1] for one in (here, there)]
     assert left[1] == pytest.approx(left[0], rel=1e-4)
 
 

@@ -6,6 +6,7 @@ two under their prior.
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -14,6 +15,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
+from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.points import Points
@@ -62,6 +64,11 @@ class Explanation:
     def point(self) -> FitPoint:
         """The most probable parameters."""
         return self.best.point
+
+    @cached_property
+    def least_squares(self) -> tuple[Floats, float]:
+        """Of curves, `plain_least_squares` from the most probable parameters: their fit, and what it leaves [%]."""
+        return plain_least_squares(self.best.hypothesis, self.point.fit)
 
     def own(self, name: str) -> list[float]:
         """The fit coordinates of one of its mechanisms."""

@@ -156,11 +156,6 @@ def _seen_contact(curve: CurveConditions) -> Mask | None:
     return (number >= seen.snap_in) & (number < (len(number) if seen.pull_off is None else seen.pull_off))
 
 
-def least_squares_percent(hypothesis: Hypothesis, start: Floats) -> float:
-    """What `plain_least_squares` leave [% of the force's own root mean square]."""
-    return plain_least_squares(hypothesis, start)[1]
-
-
 def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, float]:
     """The fit (parameters,) of the law by plain least squares, and the root mean square that it leaves of all raw
     samples [% of the force's own].

@@ -7,7 +7,6 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
@@ -99,7 +98,7 @@ def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[st
     """Of indentations, what plain least squares of the same law leave [%], and their modulus [MPa]."""
     if problem.kind != "indentation":
         return {}
-    fit, left = plain_least_squares(explanation.best.hypothesis, explanation.point.fit)
+    fit, left = explanation.least_squares
     place = place_of(explanation, "youngs_modulus")
     declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # of which the parameter is a factor
     modulus_mpa = declared * float(explanation.model.parameters[place].from_fit(float(fit[place])))

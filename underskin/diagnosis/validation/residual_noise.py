@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.least_squares import least_squares_percent
 from underskin.diagnosis.selection.curve_sets import left_smooth
 from underskin.diagnosis.validation.cross_validation import HeldOut, in_sample, total
 from underskin.findings.codes import Reason
@@ -59,8 +58,7 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
         return False
     if smooth <= _STRUCTURED * noise and not (explanation.names and left_smooth(explanation) > _PLAIN_STRUCTURE):
         return False
-    left, at_first = (least_squares_percent(one.best.hypothesis, one.point.fit) for one in (explanation, null))
-    return left >= _GRANTED_TO_LAWS * at_first
+    return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:

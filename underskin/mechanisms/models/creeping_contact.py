@@ -66,7 +66,8 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
 
     The sphere's own stage is not looked at.
     """
-    sphere = replace(sphere, give=0.0)
+    if np.any(sphere.give):
+        sphere = replace(sphere, give=0.0)
     begins, started = np.minimum(path.begins, path.travel.shape[-1] - 1)[..., None], path.touched
     number = np.arange(path.travel.shape[-1])
     depth = np.where(started, path.travel, 0.0)
@@ -88,10 +89,13 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     stuck = np.zeros(depth.shape, dtype=bool)
     reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
     edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
-    a = sphere.radius_at(edge, work, np.maximum(least, 1e-12))
+    answer, first = stiffer * growing, int(back.any(axis=(0, 1)).argmax())
+    late = np.s_[..., first:]
+    a = sphere.radius_at(edge[late], work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept + stiffness * carried)
-    answer, held = np.where(back, receding, stiffer * growing), np.where(back, stuck, held)
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept[late] + stiffness * carried[late])
+    answer[late] = np.where(back[late], receding, answer[late])
+    held = np.where(back, stuck, held)
     touch = back & ~held
     if touch.any() and adhesion is not None:
         of_touch, holds = _first_touch(sphere, relaxation, adhesion, depth, depth_memory, time)

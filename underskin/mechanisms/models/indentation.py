@@ -104,11 +104,14 @@ class IndentationModel(CurveModel):
         """The same through the history, which begins where a recording touches, between two samples."""
         path = _with_touch(self.displacement - contact, self.time)
         force, own = force_on(path)
-        least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
-        a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
         own = own & (self.displacement - contact >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
         held = own if held is None else held
-        return np.where(held, force, 0.0), held, sphere.inside(a) | ~held
+        force = np.where(held, force, 0.0)
+        if sphere.layers is None:  # a half space, which has no tables to leave
+            return force, held, np.ones_like(held)
+        least = sphere.pull_off(None if adhesion is None else adhesion.work)[0]
+        a = sphere.radius_at(np.maximum(path.travel, 0.0), None, least)
+        return force, held, sphere.inside(a) | ~held
 
     def _sphere(self, curve: Curve) -> Sphere:
         poisson_ratio = numbers(curve.poisson_ratio)
