@@ -93,6 +93,14 @@ def calibration(probabilities: Sequence[float], right: Sequence[bool], draws: in
     )
 
 
+def chance_of_so_few(probabilities: Sequence[float], hits: int) -> float:
+    """P(X ≤ hits) of the number X of right answers where each is right with its stated probability."""
+    count = np.ones(1)  # the distribution of X
+    for probability in probabilities:
+        count = np.convolve(count, [1 - probability, probability])
+    return float(count[: hits + 1].sum())
+
+
 def _error(members: Sequence[np.ndarray], stated: Floats, hit: Floats) -> float:
     return float(sum(abs((hit[member] - stated[member]).sum()) for member in members) / len(stated))
 

@@ -10,7 +10,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged
 from proof.markdown import table
 from proof.phrases import median_of, misses, percent, right
-from proof.statistics import Share, calibration, share
+from proof.statistics import Share, calibration, chance_of_so_few, share
 
 Result = Mapping[str, Any]
 _SURE = 0.9
@@ -39,7 +39,7 @@ under the rig's noise, with the modulus free and a contact point, a force zero a
 pair of which each member does.
 
 {table(header, rows)}
-{_sure(judged)}
+{_sure({"identifiable": visible, "all": judged})}
 
 {_calibration(visible)}
 
@@ -61,6 +61,8 @@ def quiet_curves(result: Result) -> str:
 {len(judged)} of {own_curves.QUIET} campaigns of raw curves with nothing missing (seed {own_curves.SEED + 1}): a
 verdict other than `no_mismatch` or `insufficient_data` in {percent(Share(len(alarms), len(judged)))}.
 
+{_sure({"nothing missing": judged})}
+
 {misses(alarms) if alarms else ""}"""
 
 
@@ -68,12 +70,17 @@ def _right(judged: Sequence[Judged], kind: str) -> str:
     return right([entry for entry in judged if entry.kind == kind])
 
 
-def _sure(judged: Sequence[Judged]) -> str:
-    sure = [entry for entry in judged if entry.probability > _SURE]
-    if not sure:
-        return ""
-    stated = float(np.mean([entry.probability for entry in sure]))
-    return f"Of the answers stated with more than {_SURE:g} (mean {stated:.3f}), right: {right(sure)}."
+def _sure(parts: Mapping[str, Sequence[Judged]]) -> str:
+    """How often answers stated with more than 0.9 are right, and how probable it is that so few are."""
+    rows = []
+    for words, judged in parts.items():
+        sure = [entry for entry in judged if entry.probability > _SURE]
+        if sure:
+            stated = [entry.probability for entry in sure]
+            chance = chance_of_so_few(stated, sum(entry.right for entry in sure))
+            rows.append([words, f"{np.mean(stated):.3f}", right(sure), f"{chance:.3f}"])
+    header = [f"stated with more than {_SURE:g}", "mean stated", "right", "so few or fewer by chance"]
+    return table(header, rows) if rows else ""
 
 
 def _calibration(judged: Sequence[Judged]) -> str:

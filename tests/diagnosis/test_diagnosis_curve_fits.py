@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
-from rig.elastomer import campaign_of_curves
+from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.curve_starts import between_samples
@@ -16,8 +17,9 @@ from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.cross_validation import PredictionScore
 from underskin.diagnosis.validation.imitation import unseen
+from underskin.diagnosis.validation.residual_noise import keeps_structure
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.recordings.campaign import parse
+from underskin.recordings.campaign import IndentationRecording, parse
 from underskin.recordings.curve_course import course, touch
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
@@ -159,3 +161,63 @@ def test_adhesion_under_a_soft_stage_is_fitted_to_its_noise_from_far_off(table: 
     assert np.exp(work) == pytest.approx(true["work_j_per_m2"], rel=0.03)
     assert np.exp(work + separation) == pytest.approx(true["work_of_separation_j_per_m2"], rel=0.03)
     assert found.best.cost < null.best.cost - 1000
+
+
+@pytest.mark.slow
+def test_jumps_that_noise_hides_do_not_take_from_the_work_of_adhesion(table: SigmaTable) -> None:
+    """Pull-off lies some ten times the noise below the air, too little for a jump; no mean is taken over it."""
+    work = 0.3
+    pressing = experiment(
+        {
+            "schema": "experiment/1", "name": "hidden", "seed": 5, "kind": "indentation",
+            "skin": {"thickness_mm": 80.0, "youngs_modulus_mpa": 3.0, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0},
+            "curves": {
+                "indenters_mm": [1.2, 1.5], "largest_displacement_mm": 0.25, "samples": 400, "repeats": 2,
+                "retract": True, "approach_mm": 0.04, "retreat_mm": 0.04, "force_noise_n": 4e-4,
+                "modulus_declared": False, "stage_stiffness_n_per_mm": 1e5, "stage_declared": True,
+            },
+            "effects": {"adhesion": {"work_j_per_m2": work}},
+        }
+    )  # fmt: skip
+    campaign = parse(campaign_of_curves(pressing, record_curves(pressing)))
+    hidden = 0
+    smooth = curve_lines(campaign, "indentation").smooth
+    assert smooth is not None
+    first = 0
+    for entry in campaign.recordings:
+        assert isinstance(entry, IndentationRecording)
+        seen = course(entry.displacement_mm, entry.force_n)
+        if seen.pull_off is None:
+            hidden += 1
+            least = first + seen.turn + int(np.argmin(entry.force_n[seen.turn :]))
+            assert smooth.count[np.searchsorted(np.cumsum(smooth.count), least, side="right")] == 1
+        first += len(entry.force_n)
+    assert hidden >= 2
+    found, _ = explained(campaign, ("adhesion",), table)
+    place = found.best.hypothesis.mean_places.index(0)
+    assert found.model.parameters[0].name == "work_of_adhesion"
+    deviation = float(np.sqrt(found.best.covariance[place, place]))
+    assert abs(found.point.fit[0] - np.log(work)) < 2.5 * deviation < 0.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("samples", "noise", "bend", "contradicted"),
+    [(1500, 0.01, 0.0, False), (1500, 0.01, 0.012, True), (40, 1e-5, 3e-3, False)],
+)
+def test_a_bend_below_the_noise_that_all_samples_show_contradicts_hertz(
+    samples: int, noise: float, bend: float, contradicted: bool, table: SigmaTable
+) -> None:
+    """Noise and bend in shares of the largest force; of few samples the noise is told from how they bend, too large."""
+    random = np.random.default_rng(8)
+    travel = np.concatenate([np.linspace(-0.1, 0.3, samples), np.linspace(0.3, -0.1, samples)])
+    force = np.maximum(travel / 0.3, 0.0) ** 1.5 * (1 + bend * np.sin(40 * travel))
+    force += noise * random.normal(size=len(travel))
+    time = np.arange(float(len(travel))).tolist()
+    curve = {"displacement_mm": travel.tolist(), "force_n": force.tolist(), "time_s": time}
+    named = {"id": "c", "kind": "indentation", "indenter_radius_mm": 5.0}
+    whole = {"schema": "campaign/1", "name": "bent", "units_checked": True, "skin": {"poisson_ratio": 0.5}}
+    problem = FittingProblem(curve_lines(parse({**whole, "recordings": [{**named, **curve}]}), "indentation"), table)
+    (null,) = problem.explain([Request(())])
+    assert null is not None
+    assert keeps_structure(problem, null, null) is contradicted

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from scipy.stats import binom
 from typer.testing import CliRunner
 
 from proof import figures, own_rig, paper_array
@@ -19,7 +20,7 @@ from proof.ideal_laws import suppositions
 from proof.judge import QUIET, Judged, judge
 from proof.real import recorded
 from proof.results import PARTS
-from proof.statistics import calibration, share
+from proof.statistics import calibration, chance_of_so_few, share
 from proof.stored import Work, of_each, reports, sources, stored
 from proof.text import document
 from rig.description import parse as parse_experiment
@@ -102,6 +103,12 @@ def test_a_calibrated_tool_lies_inside_the_range_of_chance_and_a_boaster_outside
     assert honest.error <= honest.chance_range[1] < boasting.error
     assert boasting.error == pytest.approx(0.25, abs=0.06)
     assert sum(honest.count) == 400
+
+
+def test_the_chance_of_so_few_right_answers_is_the_binomial_s_where_all_are_stated_alike() -> None:
+    for hits in (0, 3, 17, 20):
+        assert chance_of_so_few([0.9] * 20, hits) == pytest.approx(binom.cdf(hits, 20, 0.9))
+    assert chance_of_so_few([0.5, 1.0], 1) == pytest.approx(0.5)
 
 
 def test_a_tool_that_states_one_probability_has_the_plain_difference_as_its_error() -> None:

@@ -135,7 +135,7 @@ def _thinned(columns: Sequence[Floats], seen: Course, unsteady: float) -> tuple[
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
-    starts = _split(np.union1d(even, _around(seen, len(force))), straight)
+    starts = _split(np.union1d(even, _around(seen, force)), straight)
     counts = np.diff(np.append(starts, len(way)))
     *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
     unsure = np.zeros(len(starts))
@@ -213,11 +213,20 @@ def _bend(force: Floats, noise: float) -> float:
     return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, count: int) -> Indices:
+def _around(seen: Course, force: Floats) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
     far a contact has grown is told by single samples."""
-    near = (_corners(seen)[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
-    return np.unique(near[(near >= 0) & (near < count)])
+    places = np.append(_corners(seen), _hidden_jumps(seen, force))
+    near = (places[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
+    return np.unique(near[(near >= 0) & (near < len(force))])
+
+
+def _hidden_jumps(seen: Course, force: Floats) -> Indices:
+    """The least force of each way on which no jump is seen, where it lies below the air: there contact may begin or
+    end by a jump that noise hides, and means over it would take from the adhesion."""
+    ways = (seen.snap_in, 0, seen.turn), (seen.pull_off, seen.turn, len(force))
+    least = [first + int(np.argmin(force[first:end])) for jump, first, end in ways if jump is None and first < end]
+    return np.array([place for place in least if force[place] < -_SURE * seen.noise], dtype=np.intp)
 
 
 def _straight_lines(force: Floats, counts: Floats) -> tuple[Floats, Floats, Floats]:

@@ -16,7 +16,8 @@ _GRANTED = 4.0  # times as much remainder of a compression as the null hypothesi
 _GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
 _STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
 _LEAST_STRUCTURE = 5e-4  # of the largest force
-_PLAIN_STRUCTURE = 30.0  # nats of a smooth error; a law that is right leaves 5 to 20, seldom more
+_PLAIN_STRUCTURE = 40.0  # nats of a smooth error; a law that is right leaves 5 to 20, very seldom more than 30
+_LEAST_LEVEL = 0.6  # of the noise that samples show: below, how few of them bend, or steps of a converter, made that
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
 
@@ -43,8 +44,8 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
 def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
-    Of indentations structure is a smooth part above the noise of a sample, or, of a set of mechanisms, one that all
-    samples together show plainly; a law is granted it where plain least squares leave less than a twentieth of what
+    Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
+    plainly; a law is granted it where plain least squares leave less than a twentieth of what
     they leave under the null hypothesis, since every law of contact idealises. Of a law of compressions more is
     granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more than about their
     neighbours by as much as those do.
@@ -56,7 +57,8 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
         return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
     if smooth <= _LEAST_STRUCTURE:
         return False
-    if smooth <= _STRUCTURED * noise and not (explanation.names and left_smooth(explanation) > _PLAIN_STRUCTURE):
+    known = explanation.best.levels.level > _LEAST_LEVEL
+    if smooth <= _STRUCTURED * noise and not (known and left_smooth(explanation) > _PLAIN_STRUCTURE):
         return False
     return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
 
