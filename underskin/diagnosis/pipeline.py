@@ -99,6 +99,7 @@ def _diagnosed(
             if seated is not None:
                 problem, seating = seated
                 begun, result = begun.with_findings(seating), search(problem)
+            result = replace(result, laws=tuple(with_laws(problem, result)))
             return _work_out(replace(begun, curves=curves.campaign), problem, result, progress, limits)
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
@@ -132,7 +133,7 @@ def _work_out(
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
     before, after = cross_validation.total(groups)
     misled = after.is_missed(_FAR_ABOVE) or after.misleads(before)
-    if problem.kind == "indentation" and after.recordings and misled:
+    if problem.kind == "indentation" and after.recordings and misled and leader.explanation is not None:
         contradicted |= {entry.names for entry in ranked[:1] if entry.names}
     if contradicted:
         result = replace(result, contradicted=frozenset(contradicted))
@@ -181,7 +182,8 @@ def _located(
 def _held_out(
     problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
 ) -> list[cross_validation.HeldOut]:
-    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
+    """What groups held out say; of a law over recordings that nobody listed, which predicts within its range only,
+    thirds along it."""
     law = result.law
     if result.answers[0].explanation is not None or law is None:
         return cross_validation.hold_out(
@@ -189,6 +191,9 @@ def _held_out(
         )
     laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
     both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
+    if problem.lines.curves:
+        parts = cross_validation.groups(problem.lines)
+        return cross_validation.hold_out(problem, both, nothing, result.log_prior, parts)
     leading = law_of(problem, law)
     ids = [entry.id for entry in problem.lines.campaign.recordings]
     column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)

@@ -93,7 +93,8 @@ def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[st
     sticks = alone and any(fitter.lines.mechanisms[name].moves_contact_points for name in new)
     if fitter.lines.kind == "indentation" and (sticks or beginning.begin is None):
         several = with_contact_points(fitter, softer(fitter, several) if sticks else several)
-    kept = _KEPT_OF_PARENT if beginning.parent is not None else _KEPT_STARTS
+    guesses = any(fitter.lines.mechanisms[name].begins_at_guesses for name in new)
+    kept = _KEPT_OF_PARENT if beginning.parent is not None and not guesses else _KEPT_STARTS
     chosen = several.points[np.sort(_cheapest(several)[:kept])]
     if not (sticks and guessed):
         return chosen

@@ -22,6 +22,7 @@ from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
@@ -220,7 +221,9 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
 
 
 def _named(shown: Explanation) -> str:
-    return " + ".join(shown.names).replace("_", " ") or "nothing added"
+    known = [shown.best.hypothesis.lines.mechanisms[name] for name in shown.names]
+    said = [one.spoken.words if isinstance(one, UnnamedLaw) else one.name.replace("_", " ") for one in known]
+    return " + ".join(said) or "nothing added"
 
 
 def _labelled(entry: Mapping[str, Any]) -> str:
@@ -231,6 +234,8 @@ def _labelled(entry: Mapping[str, Any]) -> str:
 
 def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
     """The real part, or the imaginary where the misfit lies in the phase alone, and what it is called."""
+    if diagnosis.problem is not None and diagnosis.problem.lines.curves:
+        return column.real, "force"
     telling = [entry for entry in diagnosis.axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
     largest = max(telling, key=lambda entry: entry.share, default=None)
     if largest is not None and largest.axis == "phase":

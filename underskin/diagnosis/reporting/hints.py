@@ -47,6 +47,18 @@ HINTS: Mapping[tuple[str, str], str] = {
     ("position", "recorded_at"): "A frame that creeps or warms up would do this.",
     ("position", "time_of_day"): "A frame that follows the temperature would do this.",
     ("position", "previous_preload_n"): "Play of the stage would do this; come to each place from the same side.",
+    ("modulus", "displacement_mm"): "A body that is not the same at all depths, or another law of stress and strain "
+    "than the known one, would do this; press with a sphere of another radius.",
+    ("modulus", "time_s"): "Relaxation that the known creep does not follow would do this, or a body that dries; hold "
+    "longer, and at two speeds.",
+    ("gain", "force_n"): "A cell or a cantilever that is not linear would do this; calibrate it at several forces.",
+    ("force", "time_s"): "A cell whose zero drifts otherwise than straight would do this; record longer in the air, "
+    "before and after.",
+    ("force", "displacement_mm"): "A screw or an encoder with a periodic error would do this; record in the air.",
+    ("position", "displacement_mm"): "A surface that is rough or dirty, a tip that is no sphere, or an encoder with a "
+    "periodic error would do this; look at the tip, and press elsewhere.",
+    ("position", "time_s"): "A frame that warms up or creeps, or a surface that does not come back, would do this; "
+    "press a stiff block in its place.",
     ("frequency_response", "frequency_hz"): "A resonance of the frame, an electronic filter or a cable would do this; "
     "record a stiff steel block in place of the skin.",
     ("frequency_response", "dynamic_force_n"): "Friction that grows with the amplitude would do this; record at "

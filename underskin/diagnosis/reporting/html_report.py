@@ -19,6 +19,7 @@ from underskin.diagnosis.reporting.figures import explanations
 from underskin.diagnosis.reporting.statements import first_and_rest, lacking_part
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
 
 _LIST = """
 const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updatemenus[0];
@@ -32,7 +33,7 @@ plot.before(label);
 
 _FILTERS = (
     *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
-    *(wording.readable, wording.unit, wording.words, wording.acted_on, wording.followed, wording.law_range),
+    *(wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
     *(caveats, first_and_rest, in_percent, lacking_part),
 )
 

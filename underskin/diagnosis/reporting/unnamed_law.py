@@ -16,10 +16,11 @@ from underskin.diagnosis.selection.unnamed_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.mechanisms.unnamed.axes import Axis, time_zone
+from underskin.mechanisms.unnamed.curve_laws import TURN, CurveLaw
 from underskin.mechanisms.unnamed.expressions import course, expression, wave
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
-from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
 from underskin.units import Floats
 
 _QUANTILE = float(ndtri(0.975))
@@ -64,8 +65,8 @@ class LeadingLaw:
 
     @property
     def axis(self) -> Axis | None:
-        """That of recordings; None of frequency."""
-        return self.law.axis if isinstance(self.law, RecordingLaw | LagLaw) else None
+        """That of recordings, or of samples; None of frequency."""
+        return self.law.axis if isinstance(self.law, RecordingLaw | LagLaw | CurveLaw) else None
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -178,15 +179,15 @@ def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
     law, explanation = leading.law, leading.explanation
     first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
     stated = [parameter(explanation, first + place) for place in range(len(law.parameters_bound))]
-    if isinstance(law, RecordingLaw | LagLaw):
-        if law.shape.form == "periodic" and law.spoken.acts_on != "position":
+    if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
+        if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:
             stated = [*_wave(leading, law), *stated[2:]]
-        if law.shape.form == "step" and not law.axis.words:
+        if law.shape.form == "step" and not (law.axis.words or isinstance(law, CurveLaw)):
             stated.append(_edge(law))
     return [{**entry, "name": entry["name"].removeprefix("law_")} for entry in stated]
 
 
-def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw) -> list[dict[str, Any]]:
+def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[dict[str, Any]]:
     amplitudes = [leading.values[name] for name in law.amplitudes]
     size, start = wave(law, leading.values, amplitudes)
     quarter = np.array([start + leading.values["law_period"] / 4])
@@ -225,13 +226,14 @@ def statement(
     beside = tuple(name for name in leading.explanation.names if name != law.name)
     known = f" beside {_listed(beside)}" if beside else ""
     held = document["heldout_rmse_percent"]
+    worth = _worth(held, floor, _held_out(law))
     parts = [
         f"No known mechanism describes this (probability {in_percent(probability)}).",
-        f"What is missing{known} {_does(acts_on)} {_axis_words(leading)}: {_size(leading)}; {_worth(held, floor)}.",
+        f"What is missing{known} {_does(law)} {_axis_words(leading)}: {_size(leading)}; {worth}.",
     ]
     if document["rivals"]:
         rivals = "; ".join(
-            f"{ACTS_ON[entry['acts_on']][0]} over {_plain_axis(entry['axis'])}, {entry['form']} "
+            f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
             f"({in_percent(entry['probability'])} of it)"
             for entry in document["rivals"][:2]
         )
@@ -246,21 +248,29 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join(name.replace("_", " ") for name in names)
 
 
-def _does(acts_on: str) -> str:
+def _held_out(law: UnnamedLaw) -> str:
+    return "samples" if isinstance(law, CurveLaw) else "recordings"
+
+
+def _does(law: UnnamedLaw) -> str:
+    acts_on = law.spoken.acts_on
+    of_curves = {
+        "position": "moves the surface along the travel with",
+        "gain": "changes the gain of the cell with",
+        "force": "adds to the force that is read with",
+    }
+    if isinstance(law, CurveLaw) and acts_on in of_curves:
+        return of_curves[acts_on]
     return {
         "position": "moves the place of the contact with",
         "frequency_response": "changes the frequency response with",
         "gain": "changes the gain with",
         "force": "changes the force on the skin with",
-    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]} with")  # type: ignore[index]
-
-
-def _plain_axis(name: str) -> str:
-    return AXES[name][0] if name in AXES else name
+    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]} with")
 
 
 def _axis_words(leading: LeadingLaw) -> str:
-    words = _plain_axis(leading.law.spoken.axis)
+    words = followed(leading.law.spoken.axis)
     if leading.axis is not None and leading.axis.relative:
         return f"{words} over its own"
     if leading.law.spoken.axis in _SHOWN_AS_HOURS:
@@ -291,6 +301,8 @@ def _size(leading: LeadingLaw) -> str:
 
 def _where(leading: LeadingLaw, at: float) -> str:
     axis = leading.axis
+    if isinstance(leading.law, CurveLaw) and leading.law.shape.variant == TURN:
+        return "on the way back"
     if axis is None:
         return f"at {in_digits(at, 3)} Hz"
     if axis.words:
@@ -304,11 +316,11 @@ def _where(leading: LeadingLaw, at: float) -> str:
     return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
 
 
-def _worth(held: Mapping[str, float | None], floor: float) -> str:
+def _worth(held: Mapping[str, float | None], floor: float, what: str) -> str:
     noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
     if held["before"] is None or held["after"] is None:
-        return "too few recordings to hold any out"
+        return f"too few {what} to hold any out"
     after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
     if held["after"] >= held["before"]:
-        return f"it predicts recordings held out no better: to {after} % instead of {before} %{noise}"
-    return f"with it, recordings held out are predicted to {after} % instead of {before} %{noise}"
+        return f"it predicts {what} held out no better: to {after} % instead of {before} %{noise}"
+    return f"with it, {what} held out are predicted to {after} % instead of {before} %{noise}"

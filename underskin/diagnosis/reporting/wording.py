@@ -9,8 +9,8 @@ from typing import Any
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.reporting.figures import AXES
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.vocabulary import ACTS_ON
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
+from underskin.mechanisms.unnamed.vocabulary import followed
 
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
 
@@ -39,16 +39,6 @@ def words(name: str) -> str:
 def axis(name: str) -> str:
     """An axis with its unit."""
     return AXES.get(name, words(name))
-
-
-def acted_on(name: str) -> str:
-    """What a law that nobody listed acts on."""
-    return next((spoken for key, (spoken, _) in ACTS_ON.items() if key == name), words(name))
-
-
-def followed(name: str) -> str:
-    """The axis that such a law follows; a column of a lab's own by its heading."""
-    return FOLLOWED.get(name, (name, ""))[0]
 
 
 def law_range(name: str, ends: Sequence[Any]) -> str:

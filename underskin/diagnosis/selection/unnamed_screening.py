@@ -31,19 +31,20 @@ _USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 @dataclass(frozen=True, eq=False)
 class Score:
     """What a law gains in log evidence on top of an explanation; where it gains most, its amplitudes over the sds of
-    their priors, and what bends it."""
+    their priors, and what bends it; `others` are fit coordinates elsewhere from which a fit may begin as well."""
 
     law: UnnamedLaw
     gain: float
     log_share: float
     amplitudes: Floats
     bending: Floats
+    others: tuple[Floats, ...] = ()
 
     @property
     def guess(self) -> Floats:
         """The law's fit coordinates there."""
         count = len(self.law.parameters_bound) - len(self.law.amplitudes)
-        return np.concatenate([self.amplitudes * _sds(self.law), self.bending[:count]])
+        return np.concatenate([self.amplitudes * prior_deviations(self.law), self.bending[:count]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class _Group(Generic[Law]):
             grid = np.zeros((first[-1], max(law.grid.shape[1] for law in own)))
             for law, start, end in zip(own, first[:-1], first[1:], strict=True):
                 grid[start:end, : law.grid.shape[1]] = law.grid
-            scale = np.repeat([_sds(law) for law in own], counts, axis=0)
+            scale = np.repeat([prior_deviations(law) for law in own], counts, axis=0)
             each.append(cls(own, [log_share for _, log_share in members], first, grid, scale))
         return each
 
@@ -154,7 +155,7 @@ class Screening:
         key = law.axis, law.shape
         if key not in self._features:
             grid = law.shape.points
-            values = _at(law.shape.bending, grid)
+            values = grid_values(law.shape.bending, grid)
             each = [
                 np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
                 for one in law.shape.features(law.axis.of(self._ids), values)
@@ -176,7 +177,7 @@ class Screening:
         return weights, real + 1j * imag, _Levels(chi2, 2 * len(relative) - lines.recordings)
 
 
-def _at(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:
+def grid_values(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:
     """What bends a form at the points of a grid (points, parameters), as values without derivatives."""
     values = {}
     for entry, at in zip(bending, grid.T, strict=True):
@@ -185,7 +186,8 @@ def _at(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]
     return values
 
 
-def _sds(law: UnnamedLaw) -> Floats:
+def prior_deviations(law: UnnamedLaw) -> Floats:
+    """Of the amplitudes (amplitudes,)."""
     priors = [entry.prior for entry in law.parameters_bound[: len(law.amplitudes)]]
     return np.array([prior.sd for prior in priors if isinstance(prior, Normal)])
 

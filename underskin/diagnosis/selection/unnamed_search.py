@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
+from underskin.diagnosis.selection.curve_law_screening import CurveScreening
 from underskin.diagnosis.selection.search import Search, least_evidence
 from underskin.diagnosis.selection.unnamed_screening import Score, Screening
 from underskin.mechanisms.registry import CATALOGUE
@@ -22,20 +23,18 @@ _BEHIND, _BEHIND_SHARE = (
     0.35,
 )  # nats of the best by its score, or that share of what it gains, behind which none is
 _MAY_MATTER = 6.0  # nats behind the most probable answer by its score
-_ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism
+_ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism; of curves alone, whatever the mechanisms do
+_SHOWS_ALONE = 5.0  # nats
 _INTEGRATED, _WITHIN = 4, 6.0
 
 
 def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     """The explanations that hold a law, fitted, of those that may matter; none of recordings that show too little."""
-    if problem.kind != "frf":
-        return []
-    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values()))
-    if not grammar.laws:
-        return []
-    screening = Screening(problem, grammar)
     nothing = next(entry for entry in search.explanations if not entry.names)
     ranked = sorted((entry for entry in search.explanations if search.shows(entry)), key=search.log_weight)[::-1]
+    screening = _screening(problem, nothing, ranked[0])
+    if screening is None:
+        return []
     best = search.log_weight(ranked[0])
     candidates: list[tuple[float, Explanation, Score]] = []
     for beneath in _beneath(search, nothing, ranked):
@@ -47,13 +46,29 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     candidates.sort(key=lambda entry: -entry[0])
     least = candidates[0][0] - max(_BEHIND, _BEHIND_SHARE * (candidates[0][0] - best))
     chosen = [entry for entry in candidates[:_FITTED] if entry[0] > max(least, best - _MAY_MATTER)]
+    if problem.lines.curves:  # of which many laws bend the force as named mechanisms do
+        alone = [entry for entry in candidates if entry[1] is nothing and entry[2].gain > _SHOWS_ALONE]
+        chosen += [entry for entry in alone[:_ALONE_IN_COMPANY] if entry not in chosen]
     fitted = _fitted(problem, [(beneath, score) for _, beneath, score in chosen])
-    fitted += _beside_named(problem, search, fitted)
+    if not problem.lines.curves:
+        fitted += _beside_named(problem, search, fitted)
     fitted += _without_company(problem, fitted)
     fitted.sort(key=search.log_weight, reverse=True)
+    if problem.lines.curves:  # whose integrals take longer than all else, and move little
+        return fitted
     close = [entry for entry in fitted if search.log_weight(entry) > search.log_weight(fitted[0]) - _WITHIN]
     some = close[:_INTEGRATED]
     return [*integrate(some), *(entry for entry in fitted if entry not in some)] if some else []
+
+
+def _screening(problem: FittingProblem, nothing: Explanation, best: Explanation) -> Screening | CurveScreening | None:
+    """Of recordings of this kind; None where no law follows what they have."""
+    if problem.kind == "indentation":
+        return CurveScreening(problem, nothing, best)
+    if problem.kind != "frf":
+        return None
+    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values()))
+    return Screening(problem, grammar) if grammar.laws else None
 
 
 def _beneath(search: Search, nothing: Explanation, ranked: Sequence[Explanation]) -> list[Explanation]:
@@ -94,7 +109,7 @@ def _admit(problem: FittingProblem, score: Score) -> None:
     """Let models hold the law, and fits begin where the screening found it."""
     law = score.law
     law.log_share = score.log_share
-    law.found = (*law.found, score.guess)
+    law.found = (*law.found, score.guess, *score.others)
     problem.lines.mechanisms.add(law)
 
 

@@ -20,11 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE
-from underskin.diagnosis.inference.curve_products import CurveProducts
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import Hypothesis, own_places
-from underskin.diagnosis.inference.likelihood import Likelihoods
-from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.taken_up import beside, force_and_slopes, information, precision_of
 from underskin.diagnosis.selection.search import PRIORS, least_evidence, log_prior
 from underskin.diagnosis.validation.power import least_chi2
 from underskin.mechanisms.models.curves import CurveModel, times_of
@@ -39,7 +37,6 @@ _FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 
     "threshold": lambda x: np.maximum(x - 0.5, 0.0),
     "step": lambda x: (x > 0.5).astype(float),
 }
-_FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
 _USUAL = 0.05  # of the force, as a root mean square: what a law changes that is taken for missing physics
 _TAKEN_UP = 1e-6  # of a law's own χ²: what is left beside the nuisances is rounding
 
@@ -68,18 +65,18 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     null_model = null.best.hypothesis.model
     assert isinstance(null_model, CurveModel)
     change = force - null_model.forces(null.point.fit[None])[0]
-    information = _information(explanation, np.concatenate([slopes, unlisted, change[None]]))
+    whole = information(explanation, np.concatenate([slopes, unlisted, change[None]]))
     every = np.arange(len(fit))
-    precision = _precision(hypothesis)
-    shown = _left(information, every[hypothesis.own_parameters :], precision)
-    laws = shown[:-1] > _TAKEN_UP * np.diag(information)[len(fit) : -1]
+    precision = precision_of(hypothesis)
+    shown = _left(whole, every[hypothesis.own_parameters :], precision)
+    laws = shown[:-1] > _TAKEN_UP * np.diag(whole)[len(fit) : -1]
     if not (laws.any() and shown[-1] > 0):
         return None
     strength = shown[-1] / shown[:-1][laws]
     least = least_chi2(supported, least_evidence(explanation))
-    imitated = strength * _left(information, every, precision)[:-1][laws] < least
+    imitated = strength * _left(whole, every, precision)[:-1][laws] < least
     for own in own_places(explanation.names, hypothesis.lines).values():
-        imitated &= strength * _left(information, np.delete(every, own), precision)[:-1][laws] > least
+        imitated &= strength * _left(whole, np.delete(every, own), precision)[:-1][laws] > least
     size = len(explanation.names)
     odds = _odds(int(imitated.sum()), int(laws.sum()), size, supported)
     return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0) if size == 1 else odds)
@@ -91,7 +88,7 @@ def unseen(null: Explanation, supported: int) -> Imitation:
     force, slopes, unlisted = _beside(null)
     size = np.sqrt((unlisted**2).mean(axis=1))
     laws = unlisted[size > 0] * (_USUAL * np.sqrt((force**2).mean()) / size[size > 0])[:, None]
-    left = _left(_information(null, np.concatenate([slopes, laws])), np.arange(len(slopes)), _precision(hypothesis))
+    left = _left(information(null, np.concatenate([slopes, laws])), np.arange(len(slopes)), precision_of(hypothesis))
     hidden = int((left < least_chi2(supported, least_evidence(null))).sum())
     return Imitation(len(laws), hidden, _odds(hidden, len(laws), 0, supported))
 
@@ -106,18 +103,12 @@ def _odds(counted: int, laws: int, size: int, supported: int) -> float:
 def _beside(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
     """The force (samples,), its derivatives by the parameters (parameters, samples), and what each unlisted law changes
     in it (laws, samples)."""
+    force, slopes, stiffness = force_and_slopes(explanation)
     model, fit = explanation.best.hypothesis.model, explanation.point.fit
     assert isinstance(model, CurveModel)
-    force, slopes = (values[0] for values in model.forces_and_slopes(fit[None]))
-    stiffness = -slopes[model.contact_points].sum(axis=0)
     campaign = explanation.best.hypothesis.lines.campaign
     recordings = [one for one in campaign.recordings if isinstance(one, CurveConditions)]
     return force, slopes, _unlisted(recordings, fit[model.contact_points], force, stiffness)
-
-
-def _precision(hypothesis: Hypothesis) -> Floats:
-    """Of the parameters' priors (parameters,)."""
-    return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
 
 
 def _unlisted(
@@ -142,21 +133,6 @@ def _unlisted(
     return np.array([*laws, *shapes.get("time", [])])  # a force of its own follows time
 
 
-def _information(explanation: Explanation, rows: Floats) -> Floats:
-    """Jᵀ C⁻¹ J of changes of the force J (changes, samples) under the noise that the explanation found."""
-    fitter = Fitter([explanation.best.hypothesis])
-    at = fitter.evaluate(fitter.at(explanation.point))
-    levels = fitter.levels(at.points.covariance[:, None])
-    assert isinstance(at.products, CurveProducts)
-    along, square = at.products.of_rows(rows, levels)
-    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.bend)
-    level2 = float(levels.level.flat[0]) ** 2
-    return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
-
-
-def _left(information: Floats, places: Indices, precision: Floats) -> Floats:
+def _left(whole: Floats, places: Indices, precision: Floats) -> Floats:
     """χ² that the parameters at `places`, with their priors' precision, leave of each change behind them (changes,)."""
-    first = len(precision)
-    own = information[np.ix_(places, places)] + np.diag(precision[places])
-    shared = information[first:, places]
-    return np.asarray(np.diag(information)[first:] - np.einsum("ij,ji->i", shared, np.linalg.solve(own, shared.T)))
+    return np.diag(beside(whole, places, precision))

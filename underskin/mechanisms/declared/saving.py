@@ -9,6 +9,7 @@ import yaml
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.document import SCHEMA
 from underskin.mechanisms.unnamed.laws import PREFIX
+from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
 _WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
 _ADDS = {"force", "position"}
@@ -22,6 +23,8 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     found = report["provenance"].get("unnamed")
     if found is None:
         raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
+    if law["axis"] in OF_SAMPLES:
+        raise InvalidInput("report", law["axis"], "a law of indentation curves: files of mechanisms act on FRFs alone")
     values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
     expressions, bending = _expressions(law, found["law"], values)
     parameters = {key: _declared(value, logarithmic=key in bending) for key, value in values.items()}

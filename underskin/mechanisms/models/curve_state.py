@@ -1,12 +1,34 @@
 """A characterisation curve on its way through a model: the elastomer, the bench, and the flow of time. SI."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.models.relaxation import Relaxation
 from underskin.units import Floats
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What is known of samples without a law: `travel` from the contact point [m] (points, curves, samples), `time` [s]
+    (curves, samples), and the recordings' `ids`."""
+
+    ids: Sequence[str]
+    travel: Floats
+    time: Floats
+
+
+class SampleLaw(Protocol):
+    """What a law that nobody listed changes of samples."""
+
+    def moved(self, samples: Samples, travel: Floats) -> Floats:
+        """The travel at which a sphere presses [m] (points, curves, samples)."""
+
+    def read(self, samples: Samples, force: Floats) -> Floats:
+        """The force that is read where the contact bears `force` [N] (points, curves, samples)."""
 
 
 @dataclass
@@ -24,6 +46,7 @@ class Curve:
     relaxation: tuple[tuple[Differentiated, Differentiated], ...] = ()  # g and τ [s] of each Prony pair
     stage_stiffness: Differentiated | None = None  # [N/m]
     platen_friction: Differentiated | None = None  # 0 to 1
+    laws: list[SampleLaw] = field(default_factory=list)
 
     @property
     def prony_pairs(self) -> Relaxation | None:

@@ -16,7 +16,7 @@ from underskin.autodiff import constant
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxing, relaxing_on_stage
-from underskin.mechanisms.models.curve_state import Curve, numbers
+from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
 from underskin.mechanisms.models.nuisances import THICKNESS, contact_point, modulus_parameter, required_modulus
 from underskin.mechanisms.models.sphere_contact import (
@@ -49,6 +49,7 @@ class IndentationModel(CurveModel):
         recordings = [entry for entry in conditions.recordings if isinstance(entry, IndentationConditions)]
         nuisances = _nuisances(recordings, conditions.skin)
         super().__init__(mechanisms, conditions, "indentation", recordings, nuisances)
+        self._ids = [entry.id for entry in recordings]
         known = [entry.stage_stiffness_n_per_mm for entry in recordings]
         self._give = np.array([0.0 if stage is None else 1e-3 / stage for stage in known])[:, None]  # m/N
         self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])[:, None]
@@ -67,11 +68,20 @@ class IndentationModel(CurveModel):
 
     def _force(self, curve: Curve, contact: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         travel = self.displacement - contact
+        samples = Samples(self._ids, travel, self.time)
+        for law in curve.laws:
+            travel = law.moved(samples, travel)
+        force, held, inside = self._force_at(curve, travel, held)
+        for law in curve.laws:
+            force = law.read(samples, force)
+        return force, held, inside
+
+    def _force_at(self, curve: Curve, travel: Floats, held: Mask | None) -> tuple[Floats, Mask, Mask]:
         sphere, adhesion = self._sphere(curve), _adhesion(curve)
         relaxation = curve.prony_pairs
         if relaxation is not None:
             on = relaxing if curve.stage_stiffness is None else relaxing_on_stage
-            return self._relaxing(sphere, partial(on, sphere, relaxation, adhesion), adhesion, contact, held)
+            return self._relaxing(sphere, partial(on, sphere, relaxation, adhesion), adhesion, travel, held)
         if adhesion is None:
             depth = np.maximum(travel, 0.0)
             a = sphere.radius_at(depth, None)
@@ -98,13 +108,13 @@ class IndentationModel(CurveModel):
         sphere: Sphere,
         force_on: Callable[[Path], tuple[Floats, Mask]],
         adhesion: Adhesion | None,
-        contact: Floats,
+        travel: Floats,
         held: Mask | None,
     ) -> tuple[Floats, Mask, Mask]:
         """The same through the history, which begins where a recording touches, between two samples."""
-        path = _with_touch(self.displacement - contact, self.time)
+        path = _with_touch(travel, self.time)
         force, own = force_on(path)
-        own = own & (self.displacement - contact >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
+        own = own & (travel >= 0).cumsum(axis=-1).astype(bool)  # the touch lies after its sample
         held = own if held is None else held
         force = np.where(held, force, 0.0)
         if sphere.layers is None:  # a half space, which has no tables to leave

@@ -31,6 +31,9 @@ UNITS: Mapping[str, str] = {
     "x_mm": "mm",
     "y_mm": "mm",
     "sensor": "-",
+    "displacement_mm": "mm",
+    "force_n": "N",
+    "time_s": "s",
 }
 BUILT_IN = tuple(UNITS)
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.unnamed.axes import Axis
+from underskin.mechanisms.unnamed.curve_laws import CurveLaw
 from underskin.mechanisms.unnamed.forms import reference
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
@@ -33,6 +34,8 @@ def expression(law: UnnamedLaw, values: Numbers) -> str:
         return _of_recordings(law, values)
     if isinstance(law, LagLaw):
         return _of_lag(law, values)
+    if isinstance(law, CurveLaw):
+        return _of_curves(law, values)
     assert isinstance(law, FrequencyLaw)
     return _of_frequency(law, values)
 
@@ -43,7 +46,7 @@ def course(law: UnnamedLaw, values: Numbers, x: Floats) -> Array:
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in values.items()}
     if isinstance(law, FrequencyLaw):
         return law.factor(x, seeds).value[0] - 1
-    assert isinstance(law, RecordingLaw | LagLaw)
+    assert isinstance(law, RecordingLaw | LagLaw | CurveLaw)
     features = [
         one.value[0] if isinstance(one, Differentiated) else np.asarray(one) for one in law.shape.features(x, seeds)
     ]
@@ -76,7 +79,7 @@ def _signed(value: float) -> tuple[str, str]:
     return ("−" if value < 0 else "+"), number(abs(value))
 
 
-def change_text(law: RecordingLaw | LagLaw, values: Numbers, amplitudes: list[float]) -> str:
+def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: list[float]) -> str:
     """What is added to 1, with its sign first; of a power the factor."""
     axis, shape = law.axis, law.shape
     a = amplitudes[0]
@@ -117,7 +120,7 @@ def change_text(law: RecordingLaw | LagLaw, values: Numbers, amplitudes: list[fl
             return f"+ s({name}), a smooth course"
 
 
-def wave(law: RecordingLaw | LagLaw, values: Numbers, amplitudes: list[float]) -> tuple[float, float]:
+def wave(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: list[float]) -> tuple[float, float]:
     """The amplitude of a periodic law, and where its sine begins."""
     a, b = amplitudes[:2]
     size = float(np.hypot(a, b))
@@ -163,6 +166,25 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
     if law.kind == "corner":
         return f"FRF = FRF0/(1 + ({change})·{number(law.lowest_hz)} Hz/(i·f))"
     return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^(−({change}))"
+
+
+def _of_curves(law: CurveLaw, values: Numbers) -> str:
+    amplitudes = [values[name] for name in law.amplitudes]
+    sign, size = _signed(amplitudes[0])
+    match law.spoken.form:
+        case "power":
+            over = f"{symbol(law.axis)}/{_with_unit(law.axis.high, law.axis.unit)}"
+            change = f"{sign} {size}·({over})^{number(values['law_exponent'])}"
+        case "step":
+            change = f"{sign} {size}·[on the way back]"
+        case _:
+            change = change_text(law, values, amplitudes)
+    return {
+        "modulus": f"E = E0·(1 {change})",
+        "gain": f"F read = F·(1 {change})",
+        "force": f"F read = F {change} N",
+        "position": f"d = d0 {change} mm",
+    }[law.spoken.acts_on]
 
 
 def _of_frequency(law: FrequencyLaw, values: Numbers) -> str:

@@ -16,7 +16,7 @@ from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.unnamed.axes import Axis
 from underskin.mechanisms.unnamed.forms import Feature, Shape
 from underskin.mechanisms.unnamed.level_tables import LevelTables
-from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES, ActsOn, Form
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES, ActsOn, Form, acted_on, followed
 from underskin.units import Array, Floats, Indices
 
 PREFIX = "unnamed_"
@@ -45,6 +45,11 @@ class Spoken:
     acts_on: ActsOn
     axis: str
     form: Form
+
+    @property
+    def words(self) -> str:
+        """All three, for legends."""
+        return f"{acted_on(self.acts_on, self.axis)} over {followed(self.axis)}, {self.form}"
 
 
 class UnnamedLaw(Mechanism):
@@ -99,9 +104,9 @@ class RecordingLaw(UnnamedLaw):
         count = shape.count * (2 if acts_on == "position" else 1)
         if shape.form == "free":
             usual = usual / 2
-        changes = _amplitudes("law_change", self._unit, usual, count)
-        self.amplitudes = tuple(entry.name for entry in changes)
-        self.parameters_bound = (*changes, *shape.bending)
+        amplitudes = changes("law_change", self._unit, usual, count)
+        self.amplitudes = tuple(entry.name for entry in amplitudes)
+        self.parameters_bound = (*amplitudes, *shape.bending)
         self.grid = shape.points
 
     def on(self, axis: Axis, tables: LevelTables) -> "RecordingLaw":
@@ -182,7 +187,7 @@ def _summed(parts: Sequence[Differentiated]) -> Differentiated:
 
 
 @lru_cache(maxsize=64)
-def _amplitudes(name: str, unit: str, usual: float, count: int) -> tuple[Parameter, ...]:
+def changes(name: str, unit: str, usual: float, count: int) -> tuple[Parameter, ...]:
     """So many changes, each as large as usual."""
     names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
     prior = Normal(0.0, usual)
@@ -219,7 +224,7 @@ class LagLaw(UnnamedLaw):
         self.middle_hz = float(np.exp(np.log(lines).mean()))
         usual = _USUAL["frequency_response"] * {"power": 0.3, "corner": 2.0}.get(kind, 1.0)
         power = shape.logarithmic
-        lags = _amplitudes("law_lag", "-", usual, shape.count)
+        lags = changes("law_lag", "-", usual, shape.count)
         self.amplitudes = tuple(entry.name for entry in lags)
         self.parameters_bound = (*lags, *([_EXPONENT] if power else []), *shape.bending)
         self.grid = _EXPONENTS if power else shape.points

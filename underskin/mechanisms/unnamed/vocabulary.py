@@ -27,4 +27,25 @@ AXES: dict[str, tuple[str, str]] = {  # of built-in axes the words and the symbo
     "y_mm": ("the place along y", "y"),
     "sensor": ("the sensor", "sensor"),
     "frequency_hz": ("frequency", "f"),
+    "displacement_mm": ("the depth", "d"),
+    "force_n": ("the force", "F"),
+    "time_s": ("the time", "t"),
 }
+OF_SAMPLES = ("displacement_mm", "force_n", "time_s")  # axes of laws on curves
+_OF_CURVES: dict[str, str] = {
+    "gain": "gain of the cell",
+    "force": "force that is read",
+    "position": "place of the surface",
+}
+
+
+def acted_on(acts_on: str, axis: str) -> str:
+    """What a law acts on, in words; of one over an axis of samples what that is on a curve."""
+    if axis in OF_SAMPLES and acts_on in _OF_CURVES:
+        return _OF_CURVES[acts_on]
+    return next((words for name, (words, _) in ACTS_ON.items() if name == acts_on), acts_on.replace("_", " "))
+
+
+def followed(axis: str) -> str:
+    """The axis that a law follows, in words; a column of a lab's own by its heading."""
+    return AXES[axis][0] if axis in AXES else axis

@@ -1,0 +1,125 @@
+"""Laws that nobody listed on indentation curves: found, with their numbers, where they are; quiet where nothing is."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.errors import InvalidInput
+from underskin.mechanisms.declared.saving import document
+from underskin.recordings.campaign import parse
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Floats
+
+RADIUS_MM, MODULUS_MPA, DEPTH_MM, NOISE = 4.0, 1.5, 0.3, 1e-3  # noise of the largest force
+SECONDS, PAUSE = 40.0, 0.2  # of a recording; the share of its way that lies in the air
+Change = Callable[[Floats, Floats], Floats]  # of the travel beyond contact [mm] and the time [s]
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def none(travel: Floats, _: Floats) -> Floats:
+    return np.zeros_like(travel)
+
+
+def force_on(travel: Floats) -> Floats:
+    """Hertz's [N], of an incompressible body."""
+    return np.asarray(16 / 9 * MODULUS_MPA * np.sqrt(RADIUS_MM) * np.maximum(travel, 0.0) ** 1.5)
+
+
+LARGEST = float(force_on(np.array(DEPTH_MM)))
+
+
+def campaign(changes: Mapping[str, Change], seed: int = 6) -> dict[str, Any]:
+    """Three curves with air and a way back at three speeds, written from the laws themselves."""
+    moved, factor, added = (changes.get(name, none) for name in ("moved", "factor", "added"))
+    random = np.random.default_rng(seed)
+    recordings = []
+    for number, seconds in enumerate((0.25 * SECONDS, 0.5 * SECONDS, SECONDS)):
+        way_in = DEPTH_MM * np.linspace(-PAUSE, 1.0, 400)
+        travel = np.concatenate([way_in, way_in[-2::-1]])
+        time = np.linspace(0.0, seconds, len(travel))
+        force = force_on(travel + moved(travel, time))
+        force = force * (1 + factor(travel, time)) + added(travel, time)
+        force += NOISE * LARGEST * random.normal(size=len(force))
+        named = {"id": f"c{number}", "kind": "indentation", "indenter_radius_mm": RADIUS_MM}
+        samples = {"displacement_mm": travel.tolist(), "force_n": force.tolist(), "time_s": (time + 7.0).tolist()}
+        recordings.append({**named, **samples})
+    skin = {"thickness_mm": 80.0, "poisson_ratio": 0.5}
+    return {"schema": "campaign/1", "name": "law", "units_checked": True, "skin": skin, "recordings": recordings}
+
+
+LAWS: Mapping[str, tuple[dict[str, Change], str, str, set[str], dict[str, float]]] = {
+    "a cell that is not linear": (
+        {"factor": lambda travel, _: -0.04 * force_on(travel) / LARGEST},
+        "gain", "force_n", {"linear"}, {"change": -0.04},
+    ),
+    "a zero that drifts with the root of time": (
+        {"added": lambda _, time: 0.06 * LARGEST * np.sqrt(time / SECONDS)},
+        "force", "time_s", {"power"}, {"change": 0.06 * LARGEST, "exponent": 0.5},
+    ),
+    "a frame that warms up": (
+        {"moved": lambda _, time: 0.01 * (1 - np.exp(-time / 4.0))},
+        "position", "time_s", {"saturating"}, {"change": 0.01, "approach": 4.0},
+    ),
+    "a screw with a periodic error": (
+        {"added": lambda travel, _: 0.01 * LARGEST * np.sin(2 * np.pi * travel / 0.04) * (travel > 0)},
+        "force", "displacement_mm", {"periodic"}, {"amplitude": 0.01 * LARGEST, "period": 0.04},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(name: str, table: SigmaTable) -> None:
+    changes, acts_on, axis, forms, true = LAWS[name]
+    report = diagnosis_report(parse(campaign(changes)), table)
+    assert report["verdict"] == "unexplained"
+    assert report["probability"] > 0.9
+    law = report["unnamed"]
+    assert (law["acts_on"], law["axis"]) == (acts_on, axis)
+    assert law["form"] in forms
+    values = {entry["name"]: entry for entry in law["parameters"]}
+    for parameter, value in true.items():
+        # A twentieth of the value beside the interval: what bends a form gives way to the amplitude
+        slack = 0.05 * abs(value)
+        assert values[parameter]["low"] - slack < value < values[parameter]["high"] + slack
+    held_out = law["heldout_rmse_percent"]
+    assert held_out["after"] < 0.8 * held_out["before"]
+    assert held_out["after"] < 1.5 * report["fit"]["noise_floor_percent"]
+    assert "samples held out are predicted" in report["statement"]
+    low, high = law["range"][axis]
+    assert low == 0
+    assert high == pytest.approx({"force_n": LARGEST, "displacement_mm": DEPTH_MM, "time_s": SECONDS}[axis], rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [6, 7, 8])
+def test_where_nothing_is_missing_no_law_is_stated(seed: int, table: SigmaTable) -> None:
+    report = diagnosis_report(parse(campaign({}, seed)), table)
+    assert report["verdict"] == "no_mismatch"
+    assert report["unnamed"] is None
+
+
+@pytest.mark.slow
+def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: SigmaTable) -> None:
+    """A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it."""
+    stiffness = LARGEST / (0.05 * DEPTH_MM)
+    travel = np.linspace(0.0, DEPTH_MM, 2000)
+    commanded = travel + force_on(travel) / stiffness
+    gives: dict[str, Change] = {"moved": lambda at, _: np.interp(at, commanded, travel) - np.maximum(at, 0.0)}
+    report = diagnosis_report(parse(campaign(gives)), table)
+    assert report["unnamed"] is None
+    assert report["mechanisms"][0]["name"] == "instrument_compliance"
+
+
+@pytest.mark.slow
+def test_a_law_of_curves_cannot_be_kept_as_a_mechanism_of_frfs(table: SigmaTable) -> None:
+    report = diagnosis_report(parse(campaign(LAWS["a cell that is not linear"][0])), table)
+    with pytest.raises(InvalidInput, match="a law of indentation curves: files of mechanisms act on FRFs alone"):
+        document(report, "bent_cell")
