@@ -7,7 +7,6 @@ import pytest
 
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.reporting.statements import answer_statement, why_not
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.imitation import Imitation, imitation
 from underskin.recordings.campaign import IndentationRecording
@@ -52,17 +51,17 @@ def test_what_is_imitated_takes_from_the_probability_and_is_said(table: SigmaTab
 
 
 @pytest.mark.slow
-def test_an_unlisted_law_outweighs_only_sets_of_several_mechanisms(table: SigmaTable) -> None:
+def test_a_law_that_would_look_like_a_set_never_outweighs_it(table: SigmaTable) -> None:
+    """A law that is more probable than a set is one that was fitted."""
     campaign = pressed(3.0, (5.0,))
     single, null = explained(campaign, ("instrument_compliance",), table)
-    for names, least in ((("instrument_compliance",), 0.49), (("contact_creep", "instrument_compliance"), 0.0)):
+    for names in (("instrument_compliance",), ("contact_creep", "instrument_compliance")):
         leader = replace(single, names=names, log_evidence=single.log_evidence + 40)
-        search = Search((null, leader), (), {}, imitating={names: 5.0})
+        search = Search((null, leader), (), {}, imitating={names: 1.0})
         beside = {answer.names: answer.probability for answer in search.answers}
         assert sum(beside.values()) == pytest.approx(1.0)
-        assert (beside[names] >= beside[("none_of_these",)]) is (least > 0)
-        assert beside[names] >= least
-        assert search.shown_or_nothing(replace(search.answers[0], explanation=None)) is leader
+        assert beside[names] >= beside[("none_of_these",)] > 0.45
+        assert search.answers[0].names == names
 
 
 @pytest.mark.slow
@@ -76,18 +75,6 @@ def test_without_times_no_law_follows_time(table: SigmaTable) -> None:
         assert result is not None
         laws.append(result.laws)
     assert laws[0] > laws[1] >= 20
-
-
-def test_what_one_law_may_do_better_than_several_is_said(table: SigmaTable) -> None:
-    """`none_of_these` leads beside a pair that describes the recordings."""
-    _, null = explained(pressed(60.0, (5.0,)), ("instrument_compliance",), table)
-    pair = replace(null, names=("contact_creep", "instrument_compliance"), log_evidence=null.log_evidence + 40)
-    search = Search((null, pair), (), {}, imitating={pair.names: 9.0})
-    first = search.answers[0]
-    assert (first.explanation, round(first.probability, 2)) == (None, 0.9)
-    said = answer_statement(search.answers, "unexplained", kind="indentation", imitating=pair.names)
-    assert "contact creep and instrument compliance would describe it together" in said
-    assert "one law without a name" in why_not(search.answers[1], first, search.imitating)
 
 
 @pytest.mark.slow

@@ -150,7 +150,7 @@ def _work_out(
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
-    undescribed = leader.explanation is None and shown.names not in result.imitating and result.law is None
+    undescribed = leader.explanation is None and result.law is None
     shape = describe(problem, shown) if undescribed else None
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),

@@ -27,6 +27,7 @@ _PLAIN = 60.0  # F of a drift, beyond which it is plain
 _BACK = 0.25  # of the range of displacement, from where it began
 _QUIET = 3e-3  # of the range of force
 _STRAIGHT = 1.5  # times the noise: samples about the line of a drift
+_LOW = 0.3  # of the range of force: the foot of a contact
 _RISE = 0.02  # of the range of force: below that a sphere has not yet pressed
 
 
@@ -59,6 +60,28 @@ def touch(displacement: Floats, snap_in: int) -> float:
     before = displacement[max(snap_in - 2, 0) : snap_in + 1]
     steps = np.diff(before)
     return float(before[-2] + 0.5 * max(min(steps), 0.0)) if len(before) > 1 else float(displacement[0])
+
+
+def foot(displacement: Floats, force: Floats) -> int | None:
+    """The sample, of a way into contact (samples,), with which a force begins to rise as Hertz's law has it; None of
+    too few samples.
+
+    F = b + k (d − d0)^(3/2) by least squares over a grid of d0, to the samples before the force is large.
+    """
+    high = np.flatnonzero(force - force[: max(len(force) // 50, 3)].mean() > _LOW * float(np.ptp(force)))
+    count = int(high[0]) if len(high) else len(force)
+    at = np.unique(np.linspace(0, count - 1, min(count, _FITTED)).round().astype(int))
+    if len(at) < _LEAST_FITTED:
+        return None
+    travel, measured = displacement[at], force[at]
+
+    def left(begins: float) -> float:
+        hertz = np.maximum(travel - begins, 0.0) ** 1.5
+        hertz, about = hertz - hertz.mean(), measured - measured.mean()
+        square = float(hertz @ hertz)
+        return float(about @ about) - (float(hertz @ about) ** 2 / square if square > 0 else 0.0)
+
+    return int(np.argmax(displacement > _least(travel, left)[1]))
 
 
 def course(displacement: Floats, force: Floats, time: Floats | None = None) -> Course:

@@ -22,6 +22,7 @@ from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin.diagnosis.data.names import in_words
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -76,7 +77,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         limit_fields=FIELDS,
         without=in_words(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
-        unnamed=report is not None and report.get("unnamed") is not None,
+        may_be_kept=report is not None and _may_be_kept(report),
         not_adopted=None if report is None else _not_adopted(report),
         same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )
@@ -133,6 +134,12 @@ def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[s
     all."""
     named = [name for name in verdicts.mechanisms_of(report) if name in CATALOGUE]
     return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
+
+
+def _may_be_kept(report: Mapping[str, Any]) -> bool:
+    """Whether it holds a law that may become a mechanism of the lab's own: one of FRFs."""
+    law = report.get("unnamed")
+    return law is not None and law["axis"] not in OF_SAMPLES
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:

@@ -16,7 +16,7 @@ from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT, CurveError, 
 from underskin.diagnosis.noise.line_noise import LineNoise
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign, CurveRecording
-from underskin.recordings.curve_course import Course, course, roughness
+from underskin.recordings.curve_course import Course, course, foot, roughness
 from underskin.units import Floats, Indices
 
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
@@ -135,7 +135,7 @@ def _thinned(columns: Sequence[Floats], seen: Course, unsteady: float) -> tuple[
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
-    starts = _split(np.union1d(even, _around(seen, force)), straight)
+    starts = _split(np.union1d(even, _around(seen, displacement, force)), straight)
     counts = np.diff(np.append(starts, len(way)))
     *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
     unsure = np.zeros(len(starts))
@@ -213,12 +213,23 @@ def _bend(force: Floats, noise: float) -> float:
     return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, force: Floats) -> Indices:
+def _around(seen: Course, displacement: Floats, force: Floats) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
-    far a contact has grown is told by single samples."""
-    places = np.append(_corners(seen), _hidden_jumps(seen, force))
+    far a contact has grown is told by single samples; and where contact begins and ends without a jump: a mean over
+    that kink lies above the curve."""
+    places = np.concatenate([_corners(seen), _hidden_jumps(seen, force), _feet(seen, displacement, force)])
     near = (places[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
     return np.unique(near[(near >= 0) & (near < len(force))])
+
+
+def _feet(seen: Course, displacement: Floats, force: Floats) -> Indices:
+    """Where contact begins, and where it ends, on the ways on which no jump is seen."""
+    ways = (
+        (seen.snap_in, np.arange(seen.arrive + 1)),
+        (seen.pull_off, np.arange(len(force) - 1, seen.leave - 1, -1)),
+    )
+    feet = [(own, foot(displacement[own], force[own])) for jump, own in ways if jump is None]
+    return np.array([own[place] for own, place in feet if place is not None], dtype=np.intp)
 
 
 def _hidden_jumps(seen: Course, force: Floats) -> Indices:

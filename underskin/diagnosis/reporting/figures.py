@@ -22,7 +22,7 @@ from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
-from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.mechanisms.unnamed.laws import in_plain_words
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
@@ -221,9 +221,8 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
 
 
 def _named(shown: Explanation) -> str:
-    known = [shown.best.hypothesis.lines.mechanisms[name] for name in shown.names]
-    said = [one.spoken.words if isinstance(one, UnnamedLaw) else one.name.replace("_", " ") for one in known]
-    return " + ".join(said) or "nothing added"
+    known = shown.best.hypothesis.lines.mechanisms
+    return " + ".join(in_plain_words(known[name]) for name in shown.names) or "nothing added"
 
 
 def _labelled(entry: Mapping[str, Any]) -> str:

@@ -54,7 +54,8 @@ HINTS: Mapping[tuple[str, str], str] = {
     ("gain", "force_n"): "A cell or a cantilever that is not linear would do this; calibrate it at several forces.",
     ("force", "time_s"): "A cell whose zero drifts otherwise than straight would do this; record longer in the air, "
     "before and after.",
-    ("force", "displacement_mm"): "A screw or an encoder with a periodic error would do this; record in the air.",
+    ("force", "displacement_mm"): "Something that touches on the way, or a screw with a periodic error, would do "
+    "this; record in the air.",
     ("position", "displacement_mm"): "A surface that is rough or dirty, a tip that is no sphere, or an encoder with a "
     "periodic error would do this; look at the tip, and press elsewhere.",
     ("position", "time_s"): "A frame that warms up or creeps, or a surface that does not come back, would do this; "

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.effect_size import EffectSize
@@ -136,7 +136,6 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         caveats=caveats(findings),
         power=diagnosis.power,
         idle=without_effect(named) if named is not None else (),
-        imitating=shown.names if shown.names in search.imitating else (),
         told=_told(problem, mechanisms) if named is not None else (),
     )
     if leading is not None and law is not None:
@@ -146,6 +145,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             for part in (
                 law_statement(leader.probability, leading, law, floor, outweighed=outweighed(search)),
                 caveats(findings),
+                statements.left_by(fit, SIMPLEST[problem.kind], law=True) if problem.lines.curves else "",
             )
             if part
         )

@@ -41,24 +41,23 @@ def answer_statement(
     caveats: str = "",
     power: Sequence[Power] = (),
     idle: Sequence[str] = (),
-    imitating: Sequence[str] = (),
     told: Sequence[str] = (),
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
     also the modulus under the stated answer, or what the base model leaves; where nothing is missing, what would have
     shown (`power`).
 
-    `fit` is the report's; `idle`: mechanisms of the leading answer that may as well have no effect; `imitating`: those
-    that look like an unlisted law; `told`: what the values of the leading answer mean.
+    `fit` is the report's; `idle`: mechanisms of the leading answer that may as well have no effect; `told`: what the
+    values of the leading answer mean.
     """
-    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, imitating, all_used=not caveats)
+    first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, all_used=not caveats)
     if fit is not None and verdict in ("explained", "no_mismatch"):
         first = first.removesuffix(".") + _reserve(fit) + "."
     parts = [first, caveats, rest, *told]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
     if fit is not None and "youngs_modulus" in fit["before"]:
-        parts.append(_left_by(fit, SIMPLEST[kind]) if verdict == "unexplained" else _modulus(fit["after"]))
+        parts.append(left_by(fit, SIMPLEST[kind]) if verdict == "unexplained" else _modulus(fit["after"]))
     return " ".join(part for part in parts if part)
 
 
@@ -95,7 +94,6 @@ def _answer(
     shape: Shape | None,
     model: str,
     idle: Sequence[str],
-    imitating: Sequence[str],
     *,
     all_used: bool,
 ) -> tuple[str, str]:
@@ -110,9 +108,6 @@ def _answer(
         if leader.probability >= EXPLAINED or not rivals:
             return f"{agree}; nothing needs to be added{'' if all_used else ' for those that were used'}.", ""
         return f"{agree}, but they do not rule out: {listed}.", _laws(tuple(mentioned))
-    if verdict == "unexplained" and imitating:
-        together = f"{in_words(imitating)} would describe it together"
-        return f"Something is missing: {together}, but one law without a name more probably does ({percent}).", ""
     if verdict == "unexplained":
         missing = f"Something is missing that none of the known mechanisms describes (probability {percent})."
         return missing, shape_statement(shape)
@@ -131,13 +126,14 @@ def _modulus(after: Mapping[str, Any]) -> str:
     return f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
 
 
-def _left_by(fit: Mapping[str, Any], model: str) -> str:
-    """How far the base model goes, and the best set of mechanisms, where neither describes the curves."""
+def left_by(fit: Mapping[str, Any], model: str, *, law: bool = False) -> str:
+    """How far the base model goes on curves, and the best set of mechanisms or a `law` that nobody listed."""
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before.get("least_squares_modulus_mpa")
     alone = f"{model[0].upper()}{model[1:]} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
     said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
-    beside = f", with {in_words(names)} {in_digits(after['rmse_percent'], 2)} %" if names else ""
+    added = "this law" if law else in_words(names) if names else ""
+    beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
     return f"{said}{beside}."
 
 
@@ -199,8 +195,6 @@ def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...
         return "few laws without a name would not show in these recordings"
     if answer.explanation is None and imitating:
         return "few laws without a name would look like the leading explanation in these recordings"
-    if answer.names in imitating:
-        return "one law without a name is more probable than all of these together"
     if answer.explanation is None:
         return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
     if leader.explanation is None:

@@ -119,13 +119,10 @@ class Search:
         return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
-        """The explanation that an answer stands on: for `none_of_these`, the one that looks like an unlisted law, or
-        else the one beneath its best process."""
+        """The explanation that an answer stands on: for `none_of_these` the best law that nobody listed, or else the
+        one beneath its best process."""
         if answer.explanation is not None:
             return answer.explanation
-        imitating = [entry for entry in self.explanations if entry.names in self.imitating]
-        if imitating:
-            return imitating[0]
         if self.law is not None:
             return self.law
         beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
@@ -211,8 +208,7 @@ class Search:
             return probabilities
         beside = probabilities.copy()
         beside[-1] += self.imitating.get(kept[leader].names, 0.0) * probabilities[leader]
-        if len(kept[leader].names) == 1:
-            beside[-1] = max(probabilities[-1], min(beside[-1], probabilities[leader]))
+        beside[-1] = max(probabilities[-1], min(beside[-1], probabilities[leader]))
         return np.asarray(beside / beside.sum())
 
 

@@ -5,8 +5,8 @@ force, the depth, the time or the way back. Each is given the strength that the 
 beyond what the nuisances take up, under the noise that was found. It is imitated if the explanation would be named for
 it: its parameters leave too little to be named, and without any one of its mechanisms more than that is left (all to
 first order in the parameters). The prior of unlisted physics times the share of such laws that are imitated is the
-weight of those beside the set's own prior. It is never more than that of one listed mechanism that does the same, but
-it may be more than that of two or three that do so together.
+weight of those beside the set's own prior, and never more than that: laws that are more probable are fitted themselves
+(selection/unnamed_search.py).
 
 Where nothing is missing as far as one can see, an unlisted law of a usual strength may still be there and not show,
 since the nuisances take it up: the prior of unlisted physics times the share of such laws stands beside that of
@@ -47,7 +47,7 @@ class Imitation:
 
     laws: int
     imitated: int
-    odds: float  # beside one mechanism at most 1
+    odds: float  # at most 1
 
 
 def imitation(explanation: Explanation, null: Explanation, supported: int) -> Imitation | None:
@@ -79,7 +79,7 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
         imitated &= strength * _left(whole, np.delete(every, own), precision)[:-1][laws] > least
     size = len(explanation.names)
     odds = _odds(int(imitated.sum()), int(laws.sum()), size, supported)
-    return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0) if size == 1 else odds)
+    return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0))
 
 
 def unseen(null: Explanation, supported: int) -> Imitation:

@@ -29,12 +29,12 @@ _ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # where, what it 
     ("modulus", "time_s", ("linear", "power", "saturating", "threshold", "step")),
     ("gain", "force_n", ("linear", "power", "saturating", "threshold")),
     ("force", "time_s", ("power", "saturating", "threshold", "step", "periodic")),  # a linear drift every cell may have
-    ("force", "displacement_mm", ("saturating", "periodic")),
+    ("force", "displacement_mm", ("saturating", "periodic", "peak")),
     ("position", "displacement_mm", ("power", "saturating", "threshold", "periodic")),
     ("position", "time_s", ("linear", "power", "saturating", "threshold", "step")),
 )
 _FORMS: Mapping[Form, float] = {
-    "linear": 0.25, "power": 0.25, "saturating": 0.2, "threshold": 0.1, "step": 0.1, "periodic": 0.1,
+    "linear": 0.25, "power": 0.25, "saturating": 0.2, "threshold": 0.1, "step": 0.1, "periodic": 0.1, "peak": 0.1,
 }  # fmt: skip
 _RELATIVE, _OF_LARGEST = 0.1, 0.03  # sds of the prior: of a relative change; of the largest force or depth
 _LEVELS = 31  # at which an axis is looked at

@@ -84,6 +84,11 @@ class UnnamedLaw(Mechanism):
         ]
 
 
+def in_plain_words(mechanism: Mechanism) -> str:
+    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    return mechanism.spoken.words if isinstance(mechanism, UnnamedLaw) else mechanism.name.replace("_", " ")
+
+
 class RecordingLaw(UnnamedLaw):
     """A law that changes the level of each recording: by its gain, what is pressed, how hard, or where."""
 
