@@ -39,15 +39,16 @@ def force_on(travel: Floats) -> Floats:
 LARGEST = float(force_on(np.array(DEPTH_MM)))
 
 
-def campaign(changes: Mapping[str, Change], seed: int = 6) -> dict[str, Any]:
-    """Three curves with air and a way back at three speeds, written from the laws themselves."""
+def campaign(changes: Mapping[str, Change], seed: int = 6, *, held_s: float = 0.0, back: bool = True) -> dict[str, Any]:
+    """Three curves with air at three speeds, held and with a way back where asked for, from the laws themselves."""
     moved, factor, added = (changes.get(name, none) for name in ("moved", "factor", "added"))
     random = np.random.default_rng(seed)
     recordings = []
     for number, seconds in enumerate((0.25 * SECONDS, 0.5 * SECONDS, SECONDS)):
         way_in = DEPTH_MM * np.linspace(-PAUSE, 1.0, 400)
-        travel = np.concatenate([way_in, way_in[-2::-1]])
-        time = np.linspace(0.0, seconds, len(travel))
+        rest = int(held_s / (seconds / 800))
+        travel: Floats = np.concatenate([way_in, np.full(rest, DEPTH_MM), *([way_in[-2::-1]] if back else [])])
+        time: Floats = seconds / 800 * np.arange(float(len(travel)))
         force = force_on(travel + moved(travel, time))
         force = force * (1 + factor(travel, time)) + added(travel, time)
         force += NOISE * LARGEST * random.normal(size=len(force))
@@ -100,6 +101,39 @@ def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(name: st
     low, high = law["range"][axis]
     assert low == 0
     assert high == pytest.approx({"force_n": LARGEST, "displacement_mm": DEPTH_MM, "time_s": SECONDS}[axis], rel=0.05)
+
+
+def turned(travel: Floats) -> Floats:
+    """1 on the way back."""
+    last = int(np.flatnonzero(travel >= travel.max())[-1])
+    return (np.arange(len(travel)) > last).astype(float)
+
+
+@pytest.mark.slow
+def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(table: SigmaTable) -> None:
+    softer: dict[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}
+    report = diagnosis_report(parse(campaign(softer, held_s=5.0)), table)
+    law = report["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("modulus", "time_s", "step")
+    assert law["expression"] == "F = F0·(1 − 0.04·[on the way back])"
+    (change,) = law["parameters"]
+    assert change["low"] < -0.04 < change["high"]
+    assert "on the way back" in report["statement"]
+    assert "friction that turns with the sphere" in report["statement"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("back", [True, False])
+def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaTable) -> None:
+    """Also where no way back tells it a second time."""
+    bump: dict[str, Change] = {"added": lambda travel, _: 0.3 * LARGEST / (1 + ((travel - 0.15) / 0.02) ** 2)}
+    report = diagnosis_report(parse(campaign(bump, back=back)), table)
+    law = report["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("force", "displacement_mm", "peak")
+    values = {entry["name"]: entry["value"] for entry in law["parameters"]}
+    assert values["change"] == pytest.approx(0.3 * LARGEST, rel=0.1)
+    assert values["centre"] == pytest.approx(0.15, abs=0.01)
+    assert law["heldout_rmse_percent"]["after"] < 0.3 * law["heldout_rmse_percent"]["before"]
 
 
 @pytest.mark.slow

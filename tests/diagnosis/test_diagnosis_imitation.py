@@ -61,6 +61,8 @@ def test_a_law_that_would_look_like_a_set_never_outweighs_it(table: SigmaTable) 
         beside = {answer.names: answer.probability for answer in search.answers}
         assert sum(beside.values()) == pytest.approx(1.0)
         assert beside[names] >= beside[("none_of_these",)] > 0.45
+        fitted = replace(search, imitating={})
+        assert beside[("none_of_these",)] > fitted.answers[1].probability
         assert search.answers[0].names == names
 
 

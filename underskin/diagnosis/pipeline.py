@@ -182,8 +182,7 @@ def _located(
 def _held_out(
     problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
 ) -> list[cross_validation.HeldOut]:
-    """What groups held out say; of a law over recordings that nobody listed, which predicts within its range only,
-    thirds along it."""
+    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
     law = result.law
     if result.answers[0].explanation is not None or law is None:
         return cross_validation.hold_out(
@@ -192,7 +191,7 @@ def _held_out(
     laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
     both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
     if problem.lines.curves:
-        parts = cross_validation.groups(problem.lines)
+        parts = cross_validation.stretches(problem.lines)
         return cross_validation.hold_out(problem, both, nothing, result.log_prior, parts)
     leading = law_of(problem, law)
     ids = [entry.id for entry in problem.lines.campaign.recordings]

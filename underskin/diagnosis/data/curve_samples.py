@@ -50,7 +50,7 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         columns[1] = columns[1] - force_zero
         unsteady = roughness(columns[0])
         thinned, deviation, way, counts = _thinned(
-            _with_corner(_with_still_hold(columns, seen), seen.turn), seen, unsteady
+            _with_corner(_with_still_hold(columns, seen), seen.turn), seen, unsteady, kind
         )
         displacement, force = thinned[:2]
         if kind == "compression":
@@ -126,7 +126,9 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
     return whole
 
 
-def _thinned(columns: Sequence[Floats], seen: Course, unsteady: float) -> tuple[list[Floats], Floats, Floats, Floats]:
+def _thinned(
+    columns: Sequence[Floats], seen: Course, unsteady: float, kind: Kind
+) -> tuple[list[Floats], Floats, Floats, Floats]:
     """The means of the columns over blocks, the deviation of the force's, how far along the curve each lies, and the
     samples in each; `unsteady` is the noise of the displacement."""
     displacement, force = columns[:2]
@@ -135,7 +137,7 @@ def _thinned(columns: Sequence[Floats], seen: Course, unsteady: float) -> tuple[
     steepness = float(np.ptp(force)) / max(float(displacement.max() - np.median(displacement)), 1e-300)
     unseen = seen.noise / steepness if steepness else float(np.ptp(displacement))  # travel that noise of force hides
     straight = ((force, seen.noise), (displacement, max(unsteady, unseen)))
-    starts = _split(np.union1d(even, _around(seen, displacement, force)), straight)
+    starts = _split(np.union1d(even, _around(seen, displacement, force, kind)), straight)
     counts = np.diff(np.append(starts, len(way)))
     *thinned, place = [np.add.reduceat(column, starts) / counts for column in (*columns, way)]
     unsure = np.zeros(len(starts))
@@ -213,11 +215,13 @@ def _bend(force: Floats, noise: float) -> float:
     return float((left @ left) / least**2 - freedom) / np.sqrt(2.0 * freedom)
 
 
-def _around(seen: Course, displacement: Floats, force: Floats) -> Indices:
+def _around(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> Indices:
     """The samples with which blocks begin near the jumps, where a force falls steeply, and where the way turns: how
     far a contact has grown is told by single samples; and where contact begins and ends without a jump: a mean over
     that kink lies above the curve."""
-    places = np.concatenate([_corners(seen), _hidden_jumps(seen, force), _feet(seen, displacement, force)])
+    places = _corners(seen)
+    if kind == "indentation":
+        places = np.concatenate([places, _hidden_jumps(seen, force), _feet(seen, displacement, force)])
     near = (places[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
     return np.unique(near[(near >= 0) & (near < len(force))])
 

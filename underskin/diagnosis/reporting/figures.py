@@ -222,7 +222,8 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
 
 def _named(shown: Explanation) -> str:
     known = shown.best.hypothesis.lines.mechanisms
-    return " + ".join(in_plain_words(known[name]) for name in shown.names) or "nothing added"
+    said = " + ".join(in_plain_words(known[name]) for name in shown.names)
+    return said.replace("_", " ") or "nothing added"
 
 
 def _labelled(entry: Mapping[str, Any]) -> str:

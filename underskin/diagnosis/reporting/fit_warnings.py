@@ -9,6 +9,7 @@ from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.validation.residual_noise import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.unnamed.laws import in_plain_words
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
@@ -26,7 +27,8 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
             if min(abs(fit - bound) for bound in entry.bounds) < 1e-9:
                 scale = multiple_of(explanation, entry)
                 bounds = {"low": scale * entry.low, "high": scale * entry.high, "unit": entry.unit}
-                arguments = {"mechanism": name, "parameter": entry.name, **bounds}
+                known = in_plain_words(lines.mechanisms[name])
+                arguments = {"mechanism": known, "parameter": entry.name.removeprefix("law_"), **bounds}
                 findings.append(Finding(Reason.PARAMETER_AT_BOUND, "", entry.name, arguments))
     return findings
 
@@ -34,7 +36,8 @@ def _at_bounds(explanation: Explanation) -> list[Finding]:
 def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     best = explanation.best
     outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
-    answer = in_words(explanation.names) or SIMPLEST[problem.kind]
+    known = [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]
+    answer = in_words(known) or SIMPLEST[problem.kind]
     entries = problem.lines.campaign.recordings
     return [
         Finding(Reason.OUT_OF_TABLES_FITTED, entries[number].id, "preload_n", {"answer": answer})

@@ -6,6 +6,7 @@ The same table stands in docs/unnamed.md.
 from collections.abc import Mapping
 
 _ANY = ""
+TURNED = "time_s, on the way back"
 HINTS: Mapping[tuple[str, str], str] = {
     ("modulus", "recorded_at"): "A skin that warms up, cures on or swells would do this; note its temperature.",
     ("modulus", "time_of_day"): "The temperature of the room would do this; at equal temperature it should vanish.",
@@ -60,6 +61,13 @@ HINTS: Mapping[tuple[str, str], str] = {
     "periodic error would do this; look at the tip, and press elsewhere.",
     ("position", "time_s"): "A frame that warms up or creeps, or a surface that does not come back, would do this; "
     "press a stiff block in its place.",
+    ("modulus", TURNED): "A body that softens as it is pressed, or friction that turns with the sphere, would do this; "
+    "press again at the same place.",
+    ("force", TURNED): "Friction in the guide would do this; move through the air and back.",
+    (
+        "position",
+        TURNED,
+    ): "Play of the stage, or a surface that does not come back, would do this; press a stiff block.",
     ("frequency_response", "frequency_hz"): "A resonance of the frame, an electronic filter or a cable would do this; "
     "record a stiff steel block in place of the skin.",
     ("frequency_response", "dynamic_force_n"): "Friction that grows with the amplitude would do this; record at "

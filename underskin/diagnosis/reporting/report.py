@@ -23,9 +23,9 @@ from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
+from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
-from underskin.diagnosis.reporting.unnamed_law import statement as law_statement
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
@@ -140,12 +140,13 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
+        beside = [entry["name"] for entry in mechanisms]
         statement = " ".join(
             part
             for part in (
                 law_statement(leader.probability, leading, law, floor, outweighed=outweighed(search)),
                 caveats(findings),
-                statements.left_by(fit, SIMPLEST[problem.kind], law=True) if problem.lines.curves else "",
+                statements.left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else "",
             )
             if part
         )

@@ -126,13 +126,16 @@ def _modulus(after: Mapping[str, Any]) -> str:
     return f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})."
 
 
-def left_by(fit: Mapping[str, Any], model: str, *, law: bool = False) -> str:
-    """How far the base model goes on curves, and the best set of mechanisms or a `law` that nobody listed."""
+def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
+    """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
+    mechanisms beside it, which `law` holds."""
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before.get("least_squares_modulus_mpa")
     alone = f"{model[0].upper()}{model[1:]} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
     said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
-    added = "this law" if law else in_words(names) if names else ""
+    added = in_words(names) if names else ""
+    if law is not None:
+        added = f"this law and {in_words(law)}" if law else "this law"
     beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
     return f"{said}{beside}."
 

@@ -12,10 +12,11 @@ from underskin.diagnosis.inference.taken_up import beside, force_and_slopes, inf
 from underskin.diagnosis.selection.unnamed_screening import Score, grid_values, prior_deviations
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
-from underskin.mechanisms.unnamed.curve_laws import CurveLaw, Extent, curve_laws
+from underskin.mechanisms.unnamed.curve_laws import CurveLaw, Extent, curve_laws, of_samples
 from underskin.recordings.conditions import curves_of
 from underskin.units import Floats
 
+_HELD = 2e-3  # of the range of displacement: off the deepest sample while a sphere is held
 _ELSEWHERE = 30.0  # nats behind the best point of a grid within which a fit begins too
 
 
@@ -31,7 +32,7 @@ class CurveScreening:
         contacts = nothing.point.fit[model.contact_points].tolist()
         depths = [float(one.displacement_mm.max()) - at for one, at in zip(curves, contacts, strict=True)]
         times = {one.id: times_of(one) for one in curves}
-        turns = {one.id: int(np.argmax(one.displacement_mm)) for one in curves}
+        turns = {one.id: _last_deep(one.displacement_mm) for one in curves}
         back = any(turns[one.id] < len(one.displacement_mm) - 1 for one in curves)
         extent = Extent(
             depth_mm=max(depths),
@@ -81,10 +82,7 @@ class CurveScreening:
     @staticmethod
     def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:
         """What each feature changes in the force by an amplitude of its prior's deviation (grid, features, samples)."""
-        values = {
-            name: Differentiated(value.value[..., None], np.zeros((0, *value.value.shape, 1)))
-            for name, value in grid_values(law.shape.bending, law.grid).items()
-        }
+        values = {name: of_samples(value) for name, value in grid_values(law.shape.bending, law.grid).items()}
         unit = {"force": np.ones_like(force), "position": stiffness}.get(law.spoken.acts_on, force)
         each = []
         for feature, deviation in zip(
@@ -94,3 +92,8 @@ class CurveScreening:
             whole = np.broadcast_to(value, (len(law.grid), *samples.travel.shape[1:]))[..., 0]
             each.append(deviation * unit * whole)
         return np.stack(each, axis=1)
+
+
+def _last_deep(displacement: Floats) -> int:
+    """The last sample before a sphere turns back: the deepest one, or that with which a hold ends."""
+    return int(np.flatnonzero(displacement >= displacement.max() - _HELD * np.ptp(displacement))[-1])

@@ -202,13 +202,13 @@ class Search:
         return _IDEALISED if explanation.names and explanation.best.hypothesis.lines.curves else 0.0
 
     def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
-        """With the unlisted laws that the leading set imitates among `none_of_these`, the last."""
+        """With at least the unlisted laws that the leading set imitates among `none_of_these`, the last: some of them
+        were fitted."""
         leader = int(np.argmax(probabilities))
         if leader == len(kept):
             return probabilities
         beside = probabilities.copy()
-        beside[-1] += self.imitating.get(kept[leader].names, 0.0) * probabilities[leader]
-        beside[-1] = max(probabilities[-1], min(beside[-1], probabilities[leader]))
+        beside[-1] = max(beside[-1], self.imitating.get(kept[leader].names, 0.0) * probabilities[leader])
         return np.asarray(beside / beside.sum())
 
 

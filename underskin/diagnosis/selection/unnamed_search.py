@@ -2,7 +2,7 @@
 
 A score test (unnamed_screening.py) ranks them on top of nothing, of the best sets of mechanisms, and of what is left of
 the best set without one member, for which a law may stand. The few that may matter are fitted like any other set. What
-they gain on top of nothing is then tried beside each named mechanism.
+they gain on top of nothing is then tried beside each named mechanism, of FRFs alone.
 """
 
 from collections.abc import Sequence

@@ -22,6 +22,7 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.recordings.conditions import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
+_STRETCHES = 9  # of a curve
 _FURTHEST = 0.6  # of a curve's highest force
 _LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
@@ -140,6 +141,15 @@ def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:
         f"every third recording {name}": (rank % len(names) == place)[lines.recording]
         for place, name in enumerate(names)
     }
+
+
+def stretches(lines: Lines) -> dict[str, Mask]:
+    """The rows of every third of nine stretches of each curve, three times: what lies between is predicted."""
+    counts = np.bincount(lines.recording)
+    row = np.arange(len(lines.value)) - lines.first[lines.recording]
+    third = (_STRETCHES * row // counts[lines.recording]) % 3
+    names = ("from the first", "from the second", "from the third")
+    return {f"every third stretch {name}": third == place for place, name in enumerate(names)}
 
 
 def hold_out(

@@ -9,7 +9,7 @@ from underskin.diagnosis.selection.curve_sets import left_smooth
 from underskin.diagnosis.validation.cross_validation import HeldOut, in_sample, total
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.mechanisms.unnamed.laws import in_plain_words
 
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times what the lines' own roughness says
@@ -34,7 +34,7 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
         arguments = {
             "groups": [entry.group for entry in groups],
-            "mechanisms": [_name(problem, name) for name in explanation.names],
+            "mechanisms": [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names],
             "before_percent": before.rmse_percent,
             "after_percent": after.rmse_percent,
         }
@@ -62,11 +62,6 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     if smooth <= _STRUCTURED * noise and not (known and left_smooth(explanation) > _PLAIN_STRUCTURE):
         return False
     return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
-
-
-def _name(problem: FittingProblem, name: str) -> str:
-    law = problem.lines.mechanisms[name]
-    return law.spoken.words if isinstance(law, UnnamedLaw) else name
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:

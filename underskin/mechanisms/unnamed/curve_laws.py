@@ -1,9 +1,9 @@
 """Laws that nobody listed, of indentation curves: what they change from sample to sample, over depth, force or time.
 
-Where they enter: the modulus, E (1 + u); the gain of the cell, F (1 + u); the force that the cell reads, F + u; the
-place of the surface along the travel, d + u. What they follow: the depth beyond the contact point, the force of the
-contact, the time since a recording began. Forms are those of laws over recordings (forms.py), with powers and with a
-step where the sphere turns back.
+Where they enter: the force of the contact, F (1 + u), as the modulus has it where nothing sticks and no stage gives;
+the gain of the cell, F (1 + u); the force that the cell reads, F + u; the place of the surface along the travel, d + u.
+What they follow: the depth beyond the contact point, the force of the contact, the time since a recording began. Forms
+are those of laws over recordings (forms.py), with powers and with a step where the sphere turns back.
 """
 
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,8 @@ _ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # where, what it 
 _FORMS: Mapping[Form, float] = {
     "linear": 0.25, "power": 0.25, "saturating": 0.2, "threshold": 0.1, "step": 0.1, "periodic": 0.1, "peak": 0.1,
 }  # fmt: skip
-_RELATIVE, _OF_LARGEST = 0.1, 0.03  # sds of the prior: of a relative change; of the largest force or depth
+_RELATIVE, _OF_LARGEST = 0.2, 0.1  # sds of the prior: of a relative change; of the largest force or depth
+_MOST = 0.9  # what they are bounded by
 _LEVELS = 31  # at which an axis is looked at
 _LEAST = 1e-6  # of the range: powers begin at 0
 TURN = "turn"  # the variant of a step
@@ -66,20 +67,20 @@ class CurveLaw(UnnamedLaw):
         """Bind the form to how far the curves of a campaign reach."""
         self.name = PREFIX + "__".join(filter(None, (acts_on, axis.name, shape.form, shape.variant)))
         self.spoken = Spoken(acts_on, axis.name, shape.form)
-        self.axis, self.shape, self.share = axis, shape, shape.share
+        self.axis, self.shape = axis, shape
         self._extent = extent
-        unit, usual = {
-            "force": ("N", _OF_LARGEST * extent.force_n),
-            "position": ("mm", _OF_LARGEST * extent.depth_mm),
-        }.get(acts_on, ("-", _RELATIVE))
-        amplitudes = changes("law_change", unit, usual, shape.count)
+        unit, share, whole = {
+            "force": ("N", _OF_LARGEST, extent.force_n),
+            "position": ("mm", _OF_LARGEST, extent.depth_mm),
+        }.get(acts_on, ("-", _RELATIVE, 1.0))
+        amplitudes = changes("law_change", unit, share * whole, shape.count, _MOST / share)
         self.amplitudes = tuple(entry.name for entry in amplitudes)
         self.parameters_bound = (*amplitudes, *shape.bending)
         self.grid = shape.points
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Change its samples."""
-        own = {name: _of_samples(value) for name, value in values.items()}
+        own = {name: of_samples(value) for name, value in values.items()}
         curve.laws.append(_Bound(self, own))
 
     def features(self, samples: Samples, force: Floats, values: Values) -> Sequence[Feature]:
@@ -163,6 +164,6 @@ def _power(axis: Axis) -> Shape:
     return Shape("power", growing, bending=(exponent,), grid=tuple((float(np.log(n)),) for n in (0.5, 2.0, 3.0)))
 
 
-def _of_samples(value: Differentiated) -> Differentiated:
+def of_samples(value: Differentiated) -> Differentiated:
     """A number of each point (points, 1), as samples take it: (points, 1, 1)."""
     return Differentiated(value.value[..., None], np.zeros((0, *value.value.shape, 1)))

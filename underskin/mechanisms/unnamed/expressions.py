@@ -180,7 +180,7 @@ def _of_curves(law: CurveLaw, values: Numbers) -> str:
         case _:
             change = change_text(law, values, amplitudes)
     return {
-        "modulus": f"E = E0·(1 {change})",
+        "modulus": f"F = F0·(1 {change})",
         "gain": f"F read = F·(1 {change})",
         "force": f"F read = F {change} N",
         "position": f"d = d0 {change} mm",

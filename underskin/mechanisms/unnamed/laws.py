@@ -53,7 +53,7 @@ class Spoken:
 
 
 class UnnamedLaw(Mechanism):
-    """What both kinds of laws share. Attributes: `spoken`, `share` of the prior of its combination, `grid` of values of
+    """What all laws share. Attributes: `spoken`, `share` of the prior of its combination, `grid` of values of
     what bends it (points, parameters), and `amplitudes`, the names of its other parameters."""
 
     plain = "Nobody listed it."
@@ -86,7 +86,7 @@ class UnnamedLaw(Mechanism):
 
 def in_plain_words(mechanism: Mechanism) -> str:
     """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
-    return mechanism.spoken.words if isinstance(mechanism, UnnamedLaw) else mechanism.name.replace("_", " ")
+    return mechanism.spoken.words if isinstance(mechanism, UnnamedLaw) else mechanism.name
 
 
 class RecordingLaw(UnnamedLaw):
@@ -192,11 +192,11 @@ def _summed(parts: Sequence[Differentiated]) -> Differentiated:
 
 
 @lru_cache(maxsize=64)
-def changes(name: str, unit: str, usual: float, count: int) -> tuple[Parameter, ...]:
-    """So many changes, each as large as usual."""
+def changes(name: str, unit: str, usual: float, count: int, most: float = _MOST) -> tuple[Parameter, ...]:
+    """So many changes, each as large as usual; bounded by `most` times that."""
     names = [f"{name}_{number + 1}" for number in range(count)] if count > 1 else [name]
     prior = Normal(0.0, usual)
-    return tuple(Parameter(one, unit, -_MOST * usual, _MOST * usual, prior, "linear", 0.0, _REASON) for one in names)
+    return tuple(Parameter(one, unit, -most * usual, most * usual, prior, "linear", 0.0, _REASON) for one in names)
 
 
 def _unit_of_change(acts_on: ActsOn) -> str:

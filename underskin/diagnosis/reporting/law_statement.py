@@ -1,0 +1,150 @@
+"""A law that nobody listed in plain words: what it changes, by how much, what it is worth, what usually does it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from underskin.diagnosis.reporting.hints import TURNED, hint
+from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
+from underskin.findings.formatting import in_digits, in_percent
+from underskin.mechanisms.unnamed.axes import time_zone
+from underskin.mechanisms.unnamed.curve_laws import TURN, CurveLaw
+from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
+
+_QUANTILE = float(ndtri(0.975))
+_HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
+_DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle
+
+
+def statement(
+    probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float, *, outweighed: bool
+) -> str:
+    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this;
+    `outweighed` by a course of no form."""
+    law = leading.law
+    acts_on, axis = law.spoken.acts_on, law.spoken.axis
+    beside = tuple(name for name in leading.explanation.names if name != law.name)
+    known = f" beside {_listed(beside)}" if beside else ""
+    held = document["heldout_rmse_percent"]
+    worth = _worth(held, floor, _held_out(law))
+    altered = _altered(law, document)
+    parts = [
+        f"No known mechanism describes this (probability {in_percent(probability)}).",
+        f"What is missing{known} {_does(law)} {_axis_words(leading)}: {_size(leading)}; {worth}.",
+        *altered,
+    ]
+    if document["rivals"]:
+        rivals = "; ".join(
+            f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
+            f"({in_percent(entry['probability'])} of it)"
+            for entry in document["rivals"][:2]
+        )
+        parts.append(f"In these recordings this may also be: {rivals}.")
+    if outweighed:
+        parts.append("More probable still is a course of no listed form: take this law as the nearest that has one.")
+    turns = isinstance(law, CurveLaw) and law.shape.variant == TURN
+    told = "" if altered else hint(acts_on, TURNED if turns else axis)
+    return " ".join([*parts, *([told] if told else [])])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(name.replace("_", " ") for name in names)
+
+
+def _altered(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
+    """That a power law is one that is known with another exponent."""
+    if law.spoken.form != "power":
+        return []
+    stated = {entry["name"]: entry for entry in document["parameters"]}
+    if isinstance(law, RecordingLaw) and law.spoken.acts_on == "contact_radius" and law.axis.name in _HERTZ:
+        value, low, high = (1 / 3 + stated["change"][name] for name in ("value", "low", "high"))
+        power = f"{value:.2f} ({low:.2f} to {high:.2f}) in place of 1/3"
+        grows = f"the contact radius grows with {followed(law.axis.name)} to the power {power}"
+        return [f"This is Hertz's law with another exponent: {grows}."]
+    exponent = stated.get("exponent")
+    if isinstance(law, FrequencyLaw) and law.variant == "phase" and exponent and exponent["value"] > _DELAY:
+        power = f"{exponent['value']:.2f} ({exponent['low']:.2f} to {exponent['high']:.2f}) in place of 1"
+        return [f"This is a delay with another exponent: its phase grows with frequency to the power {power}."]
+    return []
+
+
+def _held_out(law: UnnamedLaw) -> str:
+    return "samples" if isinstance(law, CurveLaw) else "recordings"
+
+
+def _does(law: UnnamedLaw) -> str:
+    acts_on = law.spoken.acts_on
+    of_curves = {
+        "position": "moves the surface along the travel with",
+        "gain": "changes the gain of the cell with",
+        "force": "adds to the force that is read with",
+    }
+    if isinstance(law, CurveLaw) and acts_on in of_curves:
+        return of_curves[acts_on]
+    return {
+        "position": "moves the place of the contact with",
+        "frequency_response": "changes the frequency response with",
+        "gain": "changes the gain with",
+        "force": "changes the force on the skin with",
+    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]} with")
+
+
+def _axis_words(leading: LeadingLaw) -> str:
+    words = followed(leading.law.spoken.axis)
+    if leading.axis is not None and leading.axis.relative:
+        return f"{words} over its own"
+    if leading.law.spoken.axis in SHOWN_AS_HOURS:
+        return f"{words} ({time_zone()})"
+    return words
+
+
+def _size(leading: LeadingLaw) -> str:
+    """−8 % (−10 to −6) at 14:00."""
+    at, size, deviation = leading.largest()
+    law = leading.law
+    where = _where(leading, at)
+    half = _QUANTILE * deviation
+    if law.spoken.acts_on in ("force", "position"):
+        unit = "N" if law.spoken.acts_on == "force" else "mm"
+        return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}) {where}"
+    if isinstance(law, LagLaw) and law.kind == "corner":
+        hz = [law.lowest_hz * (size + way * half) for way in (0, -1, 1)]
+        return f"lines below a corner of {hz[0]:.3g} Hz ({hz[1]:.3g} to {hz[2]:.3g}) fall off {where}"
+    if leading.is_phase or (isinstance(law, LagLaw) and law.kind != "power"):
+        turned = np.degrees([size, size - half, size + half]) * (1 if leading.is_phase else -1)
+        low, high = sorted(turned[1:])
+        return f"the phase by {turned[0]:+.3g}° ({low:+.3g} to {high:+.3g}) {where}"
+    if isinstance(law, LagLaw):
+        return f"by a power of frequency of {-size:+.3g} ({-size - half:+.3g} to {-size + half:+.3g}) {where}"
+    return f"{100 * size:+.3g} % ({100 * (size - half):+.3g} to {100 * (size + half):+.3g}) {where}"
+
+
+def _where(leading: LeadingLaw, at: float) -> str:
+    axis = leading.axis
+    if isinstance(leading.law, CurveLaw) and leading.law.shape.variant == TURN:
+        return "on the way back"
+    if axis is None:
+        return f"at {in_digits(at, 3)} Hz"
+    if axis.words:
+        return f"at {axis.words[round(at)]}"
+    if axis.name == "time_of_day":
+        return f"at {int(at):02d}:{int(60 * (at % 1)):02d}"
+    if axis.name == "recorded_at":
+        return f"{in_digits(at, 3)} h after the first midnight"
+    if axis.name == "order":
+        return f"at recording {in_digits(at + 1, 3)}"
+    return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
+
+
+def _worth(held: Mapping[str, float | None], floor: float, what: str) -> str:
+    noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
+    if held["before"] is None or held["after"] is None:
+        return f"too few {what} to hold any out"
+    after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
+    if held["after"] >= held["before"]:
+        return f"it predicts {what} held out no better: to {after} % instead of {before} %{noise}"
+    return f"with it, {what} held out are predicted to {after} % instead of {before} %{noise}"
