@@ -14,6 +14,7 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.curve_starts import between_samples
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.cross_validation import PredictionScore
 from underskin.diagnosis.validation.imitation import unseen
@@ -221,3 +222,26 @@ def test_a_bend_below_the_noise_that_all_samples_show_contradicts_hertz(
     (null,) = problem.explain([Request(())])
     assert null is not None
     assert keeps_structure(problem, null, null) is contradicted
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("work", [5e-6, 5e-5])
+def test_adhesion_of_a_gel_in_a_liquid_leaves_the_modulus_right(work: float, table: SigmaTable) -> None:
+    """Some µJ/m², a ten-thousandth of a silicone's in air."""
+    pressing = experiment(
+        {
+            "schema": "experiment/1", "name": "gel", "seed": 5, "kind": "indentation",
+            "skin": {"thickness_mm": 5.0, "youngs_modulus_mpa": 0.01, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0},
+            "curves": {
+                "indenters_mm": [0.025], "largest_displacement_mm": 3e-3, "samples": 2000, "retract": True,
+                "approach_mm": 1e-3, "retreat_mm": 1.5e-3, "force_noise_n": 5e-10, "modulus_declared": False,
+                "stage_stiffness_n_per_mm": 5e-4, "stage_declared": True, "units_checked": True,
+            },
+            "effects": {"adhesion": {"work_j_per_m2": work}},
+        }
+    )  # fmt: skip
+    report = diagnosis_report(parse(campaign_of_curves(pressing, record_curves(pressing))), table)
+    assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(0.01, rel=0.03)
+    assert [entry["name"] for entry in report["mechanisms"]] == ["adhesion"]
+    stated = report["mechanisms"][0]["parameters"][0]
+    assert 0.8 * stated["low"] < work < 1.25 * stated["high"]

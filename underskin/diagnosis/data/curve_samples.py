@@ -32,6 +32,9 @@ _BESIDE = 5  # samples on either side of the deepest one
 _STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that between samples at which a sphere rests
 _IN_THE_AIR, _AT_CONTACT = 0.2, 0.7  # of the largest force, what the smooth error counts where there is less
 _SURE = 4.0  # standard deviations
+_AIR_BLOCKS, _AIR_SAMPLES = 10, 4  # blocks of samples in the air, and samples of each at least
+_AWAY = 0.6  # of the samples in the air: what lies near may belong to a contact
+_PLAINLY = 4.0  # times the variance that is expected: by chance in 1 of 4,000, of χ² over 7
 _FEW_FOR_ZERO = 0.01  # of the largest force: how well a cell's zero is known that no sample shows
 
 
@@ -47,10 +50,11 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
             continue
         seen = course(*columns)
         force_zero = seen.zero if kind == "indentation" else 0.0
+        slow = _slow_noise(seen, columns[1]) if kind == "indentation" else 0.0
         columns[1] = columns[1] - force_zero
         unsteady = roughness(columns[0])
         thinned, deviation, way, counts = _thinned(
-            _with_corner(_with_still_hold(columns, seen), seen.turn), seen, unsteady, kind
+            _with_corner(_with_still_hold(columns, seen), seen.turn), seen, unsteady, slow, kind
         )
         displacement, force = thinned[:2]
         if kind == "compression":
@@ -61,7 +65,16 @@ def curve_lines(campaign: Campaign, kind: Kind) -> Lines:
         forces.append(force)
         deviations.append(deviation)
         drift = _drift_in_air(seen, columns[1], columns[2] if len(columns) > 2 else None)
-        error = _error(kind, seen, displacement, force, time, way, drift, _straight_lines(columns[1], counts))
+        error = _error(
+            kind,
+            seen,
+            displacement,
+            force,
+            time,
+            way,
+            drift,
+            (*_straight_lines(columns[1], counts), np.full(len(force), slow)),
+        )
         errors.append(error)
         span = float(np.ptp(displacement)) or 1.0
         places.append(_PLACE[0] + (_PLACE[1] - _PLACE[0]) * (displacement - displacement.min()) / span)
@@ -127,10 +140,11 @@ def _with_corner(columns: Sequence[Floats], turn: int) -> list[Floats]:
 
 
 def _thinned(
-    columns: Sequence[Floats], seen: Course, unsteady: float, kind: Kind
+    columns: Sequence[Floats], seen: Course, unsteady: float, slow: float, kind: Kind
 ) -> tuple[list[Floats], Floats, Floats, Floats]:
     """The means of the columns over blocks, the deviation of the force's, how far along the curve each lies, and the
-    samples in each; `unsteady` is the noise of the displacement."""
+    samples in each; `unsteady` is the noise of the displacement, `slow` what
+    neighbouring samples of force share."""
     displacement, force = columns[:2]
     way = way_along(displacement, force, seen.noise)
     even = np.searchsorted(way, np.linspace(0.0, 1.0, _SAMPLES, endpoint=False))
@@ -150,8 +164,24 @@ def _thinned(
     steep = np.where(np.isfinite(slope) & ~held, slope, 0.0) * unsteady
     steep = np.clip(np.abs(steep), 0.0, 3 * seen.noise + 1e-2 * float(np.ptp(force)))
     least = _LEAST_NOISE * float(np.ptp(force))
-    deviation = np.sqrt((seen.noise**2 + steep**2) / counts + least**2 + unsure**2)
+    deviation = np.sqrt((seen.noise**2 + steep**2) / counts + least**2 + unsure**2 + slow**2)
     return thinned, deviation, place, counts.astype(float)
+
+
+def _slow_noise(seen: Course, force: Floats) -> float:
+    """The standard deviation of noise that neighbouring samples share, which second differences do not see: by how
+    much means over blocks in the air, away from the contact, scatter about a parabola, which a drift is, beyond what a
+    sample's noise gives; 0 where that is not plain."""
+    away = int(_AWAY * len(seen.air))
+    air = seen.air[:away] if len(seen.air) and seen.air[0] == 0 else seen.air[len(seen.air) - away :]
+    count = len(air) // _AIR_BLOCKS
+    if count < _AIR_SAMPLES:
+        return 0.0
+    means = force[air[: count * _AIR_BLOCKS]].reshape(_AIR_BLOCKS, count).mean(axis=1)
+    place = np.arange(_AIR_BLOCKS)
+    about = means - np.polyval(np.polyfit(place, means, 2), place)
+    variance, expected = float(about @ about) / (_AIR_BLOCKS - 3), seen.noise**2 / count
+    return float(np.sqrt(variance - expected)) if variance > _PLAINLY * expected else 0.0
 
 
 def _corners(seen: Course) -> Indices:
@@ -282,7 +312,7 @@ def _error(
     time: Floats | None,
     way: Floats,
     drift: float,
-    samples: tuple[Floats, Floats, Floats],
+    samples: tuple[Floats, Floats, Floats, Floats],
 ) -> CurveError:
     """What the samples of one curve share; `drift` [N] is what the air shows, `samples` as CurveError has them."""
     largest = float(np.abs(force).max()) or 1.0

@@ -45,6 +45,7 @@ class CurveError:
     count: Floats  # (rows,) raw samples that each row is the mean of
     slope: Floats  # (rows,) [N per sample] of the straight line through these
     about_line: Floats  # (rows,) [N²] the sum of their squares about it
+    slow: Floats  # (rows,) [N] the noise of its curve that neighbouring samples share, as the air shows it
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -54,11 +55,13 @@ class CurveError:
         def of(name: str) -> Floats:
             return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
 
-        return cls(of("scale"), of("place"), np.concatenate(columns), of("count"), of("slope"), of("about_line"))
+        return cls(
+            of("scale"), of("place"), np.concatenate(columns), *map(of, ("count", "slope", "about_line", "slow"))
+        )
 
     def part(self, order: Indices) -> Self:
         """Of some of the rows."""
-        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line)
+        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line, self.slow)
         return type(self)(*(entry[order] for entry in rows))
 
     def within(self, force: Floats, curves: Sequence[slice]) -> float:

@@ -7,6 +7,8 @@ they gain on top of nothing is then tried beside each named mechanism, of FRFs a
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection.curve_law_screening import CurveScreening
@@ -25,6 +27,7 @@ _BEHIND, _BEHIND_SHARE = (
 _MAY_MATTER = 6.0  # nats behind the most probable answer by its score
 _ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism; of curves alone, whatever the mechanisms do
 _SHOWS_ALONE = 5.0  # nats
+_OVER_SLOW = 25.0  # nats
 _INTEGRATED, _WITHIN = 4, 6.0
 
 
@@ -55,10 +58,22 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     fitted += _without_company(problem, fitted)
     fitted.sort(key=search.log_weight, reverse=True)
     if problem.lines.curves:  # whose integrals take longer than all else, and move little
-        return fitted
+        return _beyond_slow_noise(problem, search, fitted)
     close = [entry for entry in fitted if search.log_weight(entry) > search.log_weight(fitted[0]) - _WITHIN]
     some = close[:_INTEGRATED]
     return [*integrate(some), *(entry for entry in fitted if entry not in some)] if some else []
+
+
+def _beyond_slow_noise(problem: FittingProblem, search: Search, fitted: Sequence[Explanation]) -> list[Explanation]:
+    """Of curves: where the air shows noise that neighbouring samples share, a law must bring more, since it bends to
+    that."""
+    smooth = problem.lines.smooth
+    if smooth is None or not smooth.slow.any():
+        return list(fitted)
+    named = problem.lines.mechanisms.named
+    known = {frozenset(entry.names): entry.log_evidence for entry in search.explanations}
+    beneath = [known.get(frozenset(name for name in entry.names if name in named), -np.inf) for entry in fitted]
+    return [entry for entry, less in zip(fitted, beneath, strict=True) if entry.log_evidence > less + _OVER_SLOW]
 
 
 def _screening(problem: FittingProblem, nothing: Explanation, best: Explanation) -> Screening | CurveScreening | None:

@@ -17,6 +17,7 @@ _GRANTED = 4.0  # times as much remainder of a compression as the null hypothesi
 _GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
 _STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
 _LEAST_STRUCTURE = 5e-4  # of the largest force
+_SLOW = 3.0  # times the slow noise that the air shows
 _PLAIN_STRUCTURE = 40.0  # nats of a smooth error; a law that is right leaves 5 to 20, very seldom more than 30
 _LEAST_LEVEL = 0.6  # of the noise that samples show: below, how few of them bend, or steps of a converter, made that
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
@@ -56,7 +57,9 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     smooth, noise = _smooth_part(problem, explanation)
     if problem.kind != "indentation":
         return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
-    if smooth <= _LEAST_STRUCTURE:
+    assert problem.lines.smooth is not None
+    slow = float(problem.lines.smooth.slow.max() / np.median(problem.lines.smooth.scale))
+    if smooth <= max(_LEAST_STRUCTURE, _SLOW * slow):
         return False
     known = explanation.best.levels.level > _LEAST_LEVEL
     if smooth <= _STRUCTURED * noise and not (known and left_smooth(explanation) > _PLAIN_STRUCTURE):

@@ -18,7 +18,9 @@ _REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels 
 _OF_FRF = Parameter(
     "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
 )
-_WORK = replace(_OF_FRF, low=1e-4, high=30.0, prior=Normal(-2.0, 2.0))  # of curves, which show far smaller ones
+_WORK = replace(
+    _OF_FRF, low=1e-6, high=30.0, prior=Normal(-3.0, 3.0)
+)  # of curves: from gels in a liquid, 1e-5, to tacky ones
 _SEPARATION = Parameter(
     name="work_of_separation",
     unit="J/m²",
