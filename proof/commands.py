@@ -2,6 +2,7 @@
 
 import os
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -34,6 +35,13 @@ def prove(
     docs_dir: Annotated[Path, typer.Option(help="Where proof.md and its figures are written.")] = Path("docs"),
 ) -> None:
     """Judge the diagnosis, part by part, and write docs/proof.md from every stored part."""
+    if find_spec("matplotlib") is None:
+        typer.echo(
+            "underskin: Figures of the proof need matplotlib, which is not installed: run `make proof`, or "
+            "`pip install -e '.[docs]'`.",
+            err=True,
+        )
+        raise typer.Exit(1)
     from proof.page import write_page
     from proof.results import PARTS, stored_parts, work_out
     from proof.stored import Work

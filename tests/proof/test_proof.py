@@ -234,6 +234,16 @@ def test_an_unknown_part_is_named() -> None:
         assert name in result.output
 
 
+def test_what_the_figures_need_is_named_where_it_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("proof.commands.find_spec", lambda _: None)
+    command = typer.Typer()
+    command.command()(prove)
+    result = CliRunner().invoke(command, ["sealed"])
+    assert result.exit_code == 1
+    assert "matplotlib" in result.output
+    assert "make proof" in result.output
+
+
 def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
     from proof.concealed import judged_of
 
