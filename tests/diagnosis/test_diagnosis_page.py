@@ -17,6 +17,7 @@ from tests.support.adhesive_curves import adhesive_figure
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.figures import figures
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -253,5 +254,11 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     if not names:
         assert tags.count("script") == 0
     assert ("Depth is counted from the fitted contact point" in tags.text) == ("curve" in names)
+    fitted = document["fit"]["after"].get("youngs_modulus") if document["fit"] else None
+    assert ("Young's modulus [MPa]" in tags.text) == (fitted is not None) == ("curve" in names)
+    if fitted is not None:
+        assert f"after{wording.number(fitted['value'])}{wording.interval(fitted)}" in tags.text.replace(
+            " ", ""
+        ).replace("to", " to ")
     for figure in drawn.values():
         json.loads(figure.to_json())
