@@ -259,7 +259,5 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     if fitted is not None:
         stated = f"{wording.number(fitted['value'])}{wording.interval(fitted)}".replace(" ", "")
         assert f"after{stated}" in tags.text.replace(" ", "")
-            " ", ""
-        ).replace("to", " to ")
     for figure in drawn.values():
         json.loads(figure.to_json())
