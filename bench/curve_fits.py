@@ -19,7 +19,6 @@ from underskin.recordings.curve_course import course
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 _LARGEST, _SMALLEST = 1.02, 0.98
-_OF_A_JUMP = 1.03  # SciPy's fit to single samples lets the noise of their depths choose which of them stick
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ def _of_jkr(table: SigmaTable) -> list[Figure]:
     beside = [entry.over(jkr_left(entry.raw)) for entry in ours]
     name = f"{len(ours)} ways in of a sphere that sticks, JKR, all samples"
     return [
-        Figure(f"{name}: ours over SciPy's, largest", max(beside), "×", _OF_A_JUMP, "lower"),
+        Figure(f"{name}: ours over SciPy's, largest", max(beside), "×", _LARGEST, "lower"),
         Figure(f"{name}: ours over SciPy's, smallest", min(beside), "×"),
     ]
 

@@ -185,19 +185,25 @@ def test_a_curve_without_air_or_jumps_has_none() -> None:
     assert seen.turn == seen.leave == 399
 
 
-def test_thinned_samples_lie_on_the_curve_to_within_their_deviation() -> None:
+@pytest.mark.parametrize("unsteady", [0.0, 1e-3])
+def test_thinned_samples_lie_on_the_curve_to_within_their_deviation(unsteady: float) -> None:
+    """Also where the displacement is noisier than it moves between samples: a slope between two of them is noise."""
+    random = np.random.default_rng(3)
     displacement = np.concatenate([np.linspace(-0.1, 0.3, 2000), np.linspace(0.3, -0.1, 2000)])
-    force = np.maximum(displacement, 0.0) ** 1.5
-    noisy = force + 1e-4 * np.random.default_rng(3).normal(size=len(force))
+    noisy = np.maximum(displacement, 0.0) ** 1.5 + 1e-4 * random.normal(size=len(displacement))
+    read = displacement + unsteady * random.normal(size=len(displacement))
     skin = SkinDescription(poisson_ratio=0.5)
-    lines = curve_lines(Campaign("c", skin, (IndentationRecording("i", 1.0, displacement, noisy),)), "indentation")
+    lines = curve_lines(Campaign("c", skin, (IndentationRecording("i", 1.0, read, noisy),)), "indentation")
     (entry,) = lines.campaign.recordings
     assert isinstance(entry, IndentationRecording)
-    zero = course(displacement, noisy).zero
-    left = (entry.force_n + zero - np.maximum(entry.displacement_mm, 0.0) ** 1.5) / lines.deviation
+    zero = course(read, noisy).zero
+    depth = np.maximum(entry.displacement_mm, 0.0)
+    left = (entry.force_n + zero - depth**1.5) / lines.deviation
     assert len(left) < 200
     assert abs(left.mean()) < 3 / np.sqrt(len(left)) + 0.2
     assert np.sqrt((left**2).mean()) == pytest.approx(1.0, abs=0.25)
+    of_one_sample = np.hypot(1e-4, unsteady * 1.5 * np.sqrt(depth + 0.02))
+    assert (lines.deviation < 1.5 * of_one_sample).all()
 
 
 @pytest.mark.parametrize(("samples", "ripple"), [(1500, 0.0), (360, 5e-3)])

@@ -16,6 +16,7 @@ from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.findings.formatting import in_percent
+from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
 from underskin.surrogate.sigma_table import SigmaTable
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
@@ -27,6 +28,7 @@ _SAYS = {
     "no_mismatch": "no mismatch found",
     "insufficient_data": "too little data",
 }
+_BY_A_LAW = "mismatch, a law that nobody listed"
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
     at = row.ended_at or row.asked_at
     if not report:
         return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at)
-    tag = _SAYS[report["verdict"]]
+    law = report["verdict"] == "unexplained" and report.get("unnamed")
+    tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
         return VerdictSummary(row.id, tag, "quiet", "", at)
     probability = report["probability"]
@@ -67,8 +70,11 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
 
 
 def _beside(report: Mapping[str, Any]) -> str:
-    """The explanations with their probabilities; of no mismatch, what is not ruled out."""
+    """The explanations with their probabilities, or the law; of no mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
+    law = report.get("unnamed")
+    if verdict == "unexplained" and law:
+        return f"{acted_on(law['acts_on'], law['axis'])} over {followed(law['axis'])}"
     leader = [f"{in_words(mechanisms_of(report))} {in_percent(probability)}"] if report["mechanisms"] else []
     rivals = [
         f"{in_words(entry['mechanisms'])} {in_percent(entry['probability'])}"

@@ -24,6 +24,7 @@ from underskin.units import Floats, Mask
 
 _ERROR = 3e-3  # of the largest force: the unit of the residuals
 _TOLERANCE, _OF_STARTS, _EVALUATIONS = 1e-4, 1e-3, 40  # of the sum of squares; the likelihood goes on from starts
+_STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far wider than a snap-in is deep
 _PASSED = 4  # samples at most, either way, past which a contact point is moved
 _RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
@@ -237,7 +238,7 @@ def _solved(
         bounds=(1 + (low - start) / unit, 1 + (high - start) / unit),
         x_scale="jac",
         ftol=tolerance,
-        xtol=tolerance,
+        xtol=_STEP * tolerance,
         gtol=1e-12,
         max_nfev=_EVALUATIONS,
     )

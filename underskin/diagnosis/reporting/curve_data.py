@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.data.curve_samples import finite_samples, way_along
+from underskin.diagnosis.data.curve_samples import finite_samples
+from underskin.diagnosis.data.thinning import way_along
 from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.reporting.numbers import place_of
