@@ -147,6 +147,14 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
     assert "adopted" in page.get_by_role("row", name="friday").locator("a.tag").inner_text()
 
 
+WARMTH = {
+    "acts_on": "modulus", "axis": "time_of_day", "form": "linear", "expression": "E = E0·(1 - 0.02·(t - 8 h)/h)",
+    "parameters": [{"name": "change", "unit": "-", "value": -0.02, "low": -0.03, "high": -0.01}],
+    "probability": 0.93, "rivals": [], "heldout_rmse_percent": {"before": 9.4, "after": 2.1},
+    "range": {"time_of_day_h": [8.0, 17.5]},
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("verdict", "probability", "mechanisms", "alternatives", "tag", "beside", "mood"),
     [
@@ -158,6 +166,8 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
         ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
          "mismatch, several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
         ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch, no explanation, 99.9 %", "", "look"),
+        ("unexplained", 0.998, [], [], "mismatch, a law that nobody listed, 99.8 %", "modulus over the time of day",
+         "look"),
         ("insufficient_data", 0.5, [], [], "too little data", "", "quiet"),
     ],
 )  # fmt: skip
@@ -178,6 +188,7 @@ def test_a_tag_says_how_sure_it_is(
         "probability": probability,
         "mechanisms": [entry for entry in report()["mechanisms"] if entry["name"] in mechanisms],
         "alternatives": [{"mechanisms": [name], "probability": share, "why_not": "."} for name, share in alternatives],
+        "unnamed": WARMTH if "a law" in tag else None,
     }
     skin = f"tag {verdict} {probability}"
     campaign_id, _ = diagnosed(idle, resonant(skin), found, skin)
@@ -192,6 +203,6 @@ def test_a_tag_says_how_sure_it_is(
     shown.click()
     reader.page.locator(".report .verdict").wait_for()
     cannot = reader.page.get_by_text("It cannot be adopted as the skin's model:")
-    assert cannot.count() == (0 if verdict == "explained" else 1)
+    assert cannot.count() == (0 if verdict == "explained" or "a law" in tag else 1)
     assert reader.page.get_by_role("button", name="Adopt this model").count() == 1 - cannot.count()
     reader.require_accessible()
