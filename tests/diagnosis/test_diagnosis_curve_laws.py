@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.saving import document
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.recordings.conditions import curves_of
 from underskin.recordings.curve_course import course
@@ -177,10 +179,33 @@ def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: Sig
 
 
 @pytest.mark.slow
-def test_a_law_of_curves_cannot_be_kept_as_a_mechanism_of_frfs(table: SigmaTable) -> None:
-    report = diagnosis_report(parse(campaign(LAWS["a cell that is not linear"][0])), table)
-    with pytest.raises(InvalidInput, match="a law of indentation curves: files of mechanisms act on FRFs alone"):
-        document(report, "bent_cell")
+@pytest.mark.parametrize("name", LAWS)
+def test_a_law_of_curves_is_kept_and_recognised_by_name(
+    name: str, table: SigmaTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    changes = LAWS[name][0]
+    found = diagnosis_report(parse(campaign(changes)), table)
+    (tmp_path / "kept.yaml").write_text(document(found, "our_law"), encoding="utf-8")
+    monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
+    CATALOGUE.reload()
+    try:
+        later = diagnosis_report(parse(campaign(changes, seed=8)), table)
+        fitted = diagnosis_report(parse(campaign({}, seed=8)), table)
+    finally:
+        CATALOGUE.reload()
+    assert later["verdict"] == "explained"
+    assert [entry["name"] for entry in later["mechanisms"]] == ["our_law"]
+    held_out, floor = later["fit"]["after"]["heldout_rmse_percent"], later["fit"]["noise_floor_percent"]
+    assert held_out < 1.3 * floor
+    assert fitted["verdict"] == "no_mismatch"
+
+
+@pytest.mark.slow
+def test_a_step_where_the_sphere_turns_back_cannot_be_kept(table: SigmaTable) -> None:
+    softer: dict[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}
+    report = diagnosis_report(parse(campaign(softer, held_s=5.0)), table)
+    with pytest.raises(InvalidInput, match="turns back is no expression"):
+        document(report, "softer_back")
 
 
 def indentations(whole: Campaign) -> list[IndentationRecording]:

@@ -91,6 +91,7 @@ def _diagnosed(
         begun = begun.with_findings(*unusable, *curves.findings)
         if curves.findings and curves.lacking:
             return replace(begun, lacking=curves.lacking)
+        mechanisms.bind(curves.campaign, table, kind)
         rows = replace(curve_lines(curves.campaign, kind), mechanisms=mechanisms)
         if rows.recordings:
             problem = FittingProblem(rows, table)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from underskin import extensions
 from underskin.errors import FileError, InvalidInput, not_one_of
 from underskin.mechanisms import laws
-from underskin.mechanisms.base import Mechanism
+from underskin.mechanisms.base import Kind, Mechanism
 
 if TYPE_CHECKING:
     from underskin.recordings.conditions import Conditions
@@ -91,10 +91,11 @@ class Known(Mapping[str, Mechanism]):
         """Those of the catalogue."""
         return self._named
 
-    def bind(self, conditions: Conditions, table: SigmaTable) -> None:
-        """Bind the lab's own mechanisms to the recordings of this diagnosis."""
+    def bind(self, conditions: Conditions, table: SigmaTable, kind: Kind) -> None:
+        """Bind the lab's own mechanisms to the recordings of this diagnosis, which are of one kind."""
         for name, mechanism in self._named.items():
-            self._named[name] = mechanism.bind(conditions, table)
+            if kind in mechanism.kinds:
+                self._named[name] = mechanism.bind(conditions, table)
 
     def add(self, law: Mechanism) -> None:
         """One more, bound to the recordings of this diagnosis."""

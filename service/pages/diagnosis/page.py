@@ -20,9 +20,9 @@ from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
+from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -137,9 +137,14 @@ def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[s
 
 
 def _may_be_kept(report: Mapping[str, Any]) -> bool:
-    """Whether it holds a law that may become a mechanism of the lab's own: one of FRFs."""
-    law = report.get("unnamed")
-    return law is not None and law["axis"] not in OF_SAMPLES
+    """Whether it holds a law that may become a mechanism of the lab's own: one that an expression can say."""
+    from underskin.mechanisms.declared.saving import document
+
+    try:
+        document(report, "kept")
+    except InvalidInput:
+        return False
+    return True
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:

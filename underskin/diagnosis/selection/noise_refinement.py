@@ -30,7 +30,7 @@ def frf_problem(
 ) -> tuple[FittingProblem, list[Explanation]]:
     """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
     measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
-    mechanisms.bind(measured.campaign, table)
+    mechanisms.bind(measured.campaign, table, "frf")
     problem = FittingProblem(measured, table)
     nothing, *singles = known = _along_frequency(problem)
     fixed = [one for one in singles if not any(entry.acts_on == "line_variance" for entry in one.model.parameters)]

@@ -11,8 +11,11 @@
     source: Our own measurements.
 
 `law` is a factor on gain, modulus, thickness or contact_radius, a complex factor on frequency_response, newtons added
-to the force; for position it is a list of two, the millimetres added to x and y. `prior` is normal on the value, or on
-its natural logarithm where `scale` is log (then `mean` is a value and `sd` one of the logarithm), or left out: uniform.
+to the force; for position it is a list of two, the millimetres added to x and y. Over displacement_mm (the depth),
+force_n and time_s (since a recording began) it is a law of indentation curves, of each sample: a factor on gain (of
+the cell) or modulus, newtons added to the force that is read, millimetres added to the travel (position). `prior` is
+normal on the value, or on its natural logarithm where `scale` is log (then `mean` is a value and `sd` one of the
+logarithm), or left out: uniform.
 """
 
 import os
@@ -28,8 +31,9 @@ import yaml
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.declared.expressions import Expression, read, together
 from underskin.mechanisms.declared.mechanism import FREQUENCY, DeclaredMechanism, DeclaredOfLines, DeclaredOfRecordings
+from underskin.mechanisms.declared.of_curves import DeclaredOfCurves
 from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
-from underskin.mechanisms.unnamed.vocabulary import ActsOn
+from underskin.mechanisms.unnamed.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
 
 SCHEMA = "mechanism/1"
 FOLDER = "UNDERSKIN_MECHANISMS"  # the setting
@@ -90,15 +94,19 @@ def from_dict(document: Any) -> DeclaredMechanism:
     if acts_on not in get_args(ActsOn):
         raise InvalidInput("acts_on", acts_on, f"must be one of {', '.join(get_args(ActsOn))}")
     axes = _axes(document.get("axes"), acts_on)
+    of_curves = set(axes) <= set(OF_SAMPLES)
     parameters = _parameters(document.get("parameters"), name)
     known = {*axes, *parameters}
     texts = document.get("law")
     texts = list(texts) if isinstance(texts, list) else [texts]
-    if len(texts) != (2 if acts_on == "position" else 1):
-        raise InvalidInput("law", None, "must be one expression, of a position a list of two: x and y")
+    if len(texts) != (2 if acts_on == "position" and not of_curves else 1):
+        raise InvalidInput("law", None, "must be one expression, of a position of FRFs a list of two: x and y")
     laws = tuple(read(text, "law", known) for text in texts)
     _used(laws, axes, parameters)
-    kind = DeclaredOfLines if acts_on == "frequency_response" else DeclaredOfRecordings
+    kind: type[DeclaredMechanism] = DeclaredOfLines if acts_on == "frequency_response" else DeclaredOfRecordings
+    if of_curves:
+        kind = DeclaredOfCurves
+        _real(laws, axes, parameters)
     renamed = tuple(parameters.values())
     return kind(
         name,
@@ -156,6 +164,11 @@ def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
         raise InvalidInput(
             "axes", value, "must be a list of fields, of axes such as order, or of columns of conditions"
         )
+    sampled = [name for name in value if name in OF_SAMPLES]
+    if sampled and len(sampled) < len(value):
+        raise InvalidInput("axes", value, f"{sampled[0]} is of the samples of curves: none of recordings beside it")
+    if sampled and acts_on not in OF_CURVES:
+        raise InvalidInput("acts_on", acts_on, f"must be one of {', '.join(OF_CURVES)} for a law of curves")
     if FREQUENCY in value and acts_on != "frequency_response":
         raise InvalidInput("axes", FREQUENCY, "is an axis of acts_on frequency_response only")
     return tuple(value)
@@ -202,6 +215,13 @@ def _number(document: Mapping[str, Any], name: str, field: str) -> float:
     if type(value) not in (int, float) or not np.isfinite(value):  # type: ignore[arg-type]
         raise InvalidInput(f"{field}.{name}", value, "must be a finite number")
     return float(value)  # type: ignore[arg-type]
+
+
+def _real(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
+    with np.errstate(all="ignore"):
+        one = np.asarray(laws[0]({name: np.ones(1) for name in (*axes, *parameters)}))
+    if np.iscomplexobj(one):
+        raise InvalidInput("law", laws[0].text, "must be real for a law of curves: without i")
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -44,11 +45,10 @@ def _bound(conditions: Conditions) -> Bound:
 
 
 class DeclaredMechanism(Mechanism):
-    """What a file declares. A diagnosis binds it to its campaign, so that a part of that has the order of the whole."""
+    """What a file declares."""
 
-    kinds = ("frf",)
     order = 300
-    bound: Bound | None = None
+    needs_axes: ClassVar[str]  # what is said of the axes that it reads
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class DeclaredMechanism(Mechanism):
         self.law = f"{acts_on}: {', '.join(entry.text for entry in laws)}"
         self.assumptions = "As declared by the lab; what other mechanisms do to its factor is left out."
         self.source = source
-        self.needs = f"{' and '.join(axes)} of every recording, not all the same"
+        self.needs = f"{' and '.join(axes)} {self.needs_axes}"
         self.acts_on, self.laws, self.axes_read = acts_on, laws, axes
         self.parameters_stated = parameters
 
@@ -75,7 +75,15 @@ class DeclaredMechanism(Mechanism):
         """Those that it reads."""
         return self.axes_read
 
-    def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredMechanism":
+
+class DeclaredOfFrf(DeclaredMechanism):
+    """One of FRFs. A diagnosis binds it to its campaign, so that a part of that has the order of the whole."""
+
+    kinds = ("frf",)
+    needs_axes = "of every recording, not all the same"
+    bound: Bound | None = None
+
+    def bind(self, conditions: Conditions, table: SigmaTable) -> "DeclaredOfFrf":
         """The same, bound to the recordings of a campaign."""
         other = copy(self)
         other.bound = Bound.to(conditions, table)
@@ -115,7 +123,7 @@ class DeclaredMechanism(Mechanism):
         return {name: np.array([bound.axes[name][key] for key in ids]) for name in self.axes_read if name != FREQUENCY}
 
 
-class DeclaredOfRecordings(DeclaredMechanism):
+class DeclaredOfRecordings(DeclaredOfFrf):
     """One that changes the level of each recording."""
 
     stage = Stage.RECORDING
@@ -135,7 +143,7 @@ class DeclaredOfRecordings(DeclaredMechanism):
         return tables.factor(self.acts_on, rows, log_of(first))
 
 
-class DeclaredOfLines(DeclaredMechanism):
+class DeclaredOfLines(DeclaredOfFrf):
     """One that changes each line."""
 
     stage = Stage.LINES

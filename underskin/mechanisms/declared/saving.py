@@ -23,8 +23,6 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     found = report["provenance"].get("unnamed")
     if found is None:
         raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
-    if law["axis"] in OF_SAMPLES:
-        raise InvalidInput("report", law["axis"], "a law of indentation curves: files of mechanisms act on FRFs alone")
     values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
     expressions, bending = _expressions(law, found["law"], values)
     parameters = {key: _declared(value, logarithmic=key in bending) for key, value in values.items()}
@@ -79,6 +77,11 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
     if law["acts_on"] == "frequency_response":
         raise InvalidInput("report", kind, "a lag that follows an axis of the recordings: write its file by hand")
     amplitudes = [key for key in values if key.startswith("change")]
+    if law["axis"] in OF_SAMPLES and form == "power":
+        growing = f"change * ({x} / {high:.6g}) ** exponent"
+        return [growing if law["acts_on"] in _ADDS else f"1 + {growing}"], {*bending, "exponent"}
+    if law["axis"] in OF_SAMPLES and form == "step":
+        raise InvalidInput("report", form, "a step where the sphere turns back is no expression: it cannot be kept")
     shape = _SHAPES[form](x, low, high, variant)
     if form == "power" and law["acts_on"] != "position":
         middle = float(np.sqrt(low * high))

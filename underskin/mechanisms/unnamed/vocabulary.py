@@ -32,7 +32,8 @@ AXES: dict[str, tuple[str, str]] = {  # of built-in axes the words and the symbo
     "time_s": ("the time", "t"),
 }
 OF_SAMPLES = ("displacement_mm", "force_n", "time_s")  # axes of laws on curves
-_OF_CURVES: dict[str, str] = {
+OF_CURVES: dict[str, str] = {  # what laws act on there, and what it is called
+    "modulus": "modulus",
     "gain": "gain of the cell",
     "force": "force that is read",
     "position": "place of the surface",
@@ -41,8 +42,8 @@ _OF_CURVES: dict[str, str] = {
 
 def acted_on(acts_on: str, axis: str) -> str:
     """What a law acts on, in words; of one over an axis of samples what that is on a curve."""
-    if axis in OF_SAMPLES and acts_on in _OF_CURVES:
-        return _OF_CURVES[acts_on]
+    if axis in OF_SAMPLES and acts_on in OF_CURVES:
+        return OF_CURVES[acts_on]
     return next((words for name, (words, _) in ACTS_ON.items() if name == acts_on), acts_on.replace("_", " "))
 
 
