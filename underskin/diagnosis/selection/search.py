@@ -23,7 +23,7 @@ from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
 
 # "Nothing" stands for all that does not show as well, which is every other campaign.
-PRIORS = {"nothing_missing": 0.45, "one": 0.34, "two": 0.14, "three": 0.02, "none_of_these": 0.05}
+PRIORS = {"nothing_missing": 0.54, "one": 0.29, "two": 0.115, "three": 0.015, "none_of_these": 0.04}
 _OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
