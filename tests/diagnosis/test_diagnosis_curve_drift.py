@@ -113,3 +113,15 @@ def test_a_drift_in_time_is_no_mismatch_where_the_file_has_no_times(table: Sigma
     document = {"schema": "campaign/1", "name": "drift", "skin": skin, "recordings": recordings}
     report = diagnosis_report(parse(document), table)
     assert (report["verdict"], report["probability"] > 0.95) == ("no_mismatch", True)
+
+
+def test_a_drift_is_believed_where_the_way_back_ends_as_soon_as_contact_has() -> None:
+    """Noise of 0.4 % hides how straight the air is; the force where the sphere is free again does not. The foot of a
+    law that rises otherwise than Hertz's is gone there."""
+    random = np.random.default_rng(8)
+    depth = np.concatenate([np.linspace(-0.4, 0.4, 600), np.linspace(0.4, -0.05, 340)])
+    time, rate = np.linspace(0, 300, len(depth)), 7e-4
+    noise = 4e-3 * random.normal(size=len(depth))
+    pressed = {power: np.maximum(depth / 0.4, 0.0) ** power + noise for power in (1.5, 2.5)}
+    assert course(depth, pressed[1.5] + rate * time, time).drift == pytest.approx(rate, rel=0.1)
+    assert [course(depth, force, time).drift for force in pressed.values()] == [0.0, 0.0]

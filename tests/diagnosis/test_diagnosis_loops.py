@@ -8,7 +8,7 @@ import pytest
 from tests.diagnosis.rig_pads import pressed
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
-from underskin.recordings.curve_course import jumps
+from underskin.recordings.curve_jumps import jumps
 from underskin.surrogate.sigma_table import load_table
 
 

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
+from underskin.recordings.curve_jumps import jumps, roughness
 from underskin.units import Floats, Indices
 
-_BEYOND_NOISE = 3.0  # standard deviations; a jump that was none only ends a mean early
 _BLOCKS = 60  # of a curve, over whose means jumps are sought
 _AIR = 5  # samples at least that tell what the cell shows in the air
 _BEYOND_JUMP, _LEAST_JUMP = 6.0, 2e-3  # standard deviations, and of the range of force, of a jump of contact
@@ -170,44 +169,6 @@ def _held(displacement: Floats, turn: int) -> tuple[int, int]:
     return (low, high - 1) if still and speed > 0 and len(held) * speed > _HIDDEN * noise else plain
 
 
-def roughness(force: Floats) -> float:
-    """The noise of a raw sample; second differences of a smooth curve are small against it, or cautious."""
-    second = force[2:] - 2 * force[1:-1] + force[:-2]
-    if not len(second):
-        return 0.0
-    noise = 1.4826 * float(np.median(np.abs(second))) / np.sqrt(6.0)
-    steps = np.abs(np.diff(force))
-    steps = steps[steps > 0]
-    quantum = float(steps.min()) if len(steps) else 0.0
-    coarse = len(np.unique(force)) < len(force) / 2  # an analog-digital converter's steps show
-    return float(np.hypot(noise, quantum / np.sqrt(12.0))) if coarse else noise
-
-
-def jumps(force: Floats, noise: float, block: int) -> Indices:
-    """The samples (jumps,) with which a new course begins, where means over `block` samples would hide it.
-
-    A mean over samples on both sides is a force that never was. `noise`: the standard deviation of one sample. The
-    mean of a block ahead less that of the block behind is held against a third of the same over the blocks beyond,
-    which on a straight course is equal to it; near there the jump is the largest change between two samples.
-    """
-    if block == 1 or len(force) < 2 * block + 1:
-        return np.zeros(0, dtype=np.intp)
-    longer = np.pad(force, 2 * block, mode="reflect", reflect_type="odd")  # straight on at both ends
-    means = np.convolve(longer, np.full(block, 1 / block), mode="valid")  # of longer[i : i + block]
-    at = np.arange(len(force)) + 2 * block
-    size = np.abs(means[at] - means[at - block] - (means[at + block] - means[at - 2 * block]) / 3)
-    least = _BEYOND_NOISE * noise * np.sqrt(20 / 9 / block)
-    about = np.flatnonzero((size > least) & (size == maximum_filter1d(size, 2 * block + 1)))
-    change = np.abs(np.diff(force, prepend=force[0]))
-    return np.array([_largest(change, sample - block, sample + block) for sample in about.tolist()], dtype=np.intp)
-
-
-def _largest(change: Floats, first: int, last: int) -> int:
-    """The place of the largest change from first to last."""
-    first = max(first, 0)
-    return first + int(np.argmax(change[first : last + 1]))
-
-
 def _air(force: Floats, turn: int, snap_in: int | None, pull_off: int | None, noise: float, span: float) -> Indices:
     """The samples in the air: up to the snap-in, or while the force stays where it began; else those after the end."""
     if snap_in is not None:
@@ -230,7 +191,7 @@ def _drifting_air(
     See `_straight_air`.
     """
     air = _straight_air(displacement[:count], force[:count], time[:count], noise, 1.0)
-    return air if air is not None and _believed(displacement, force, time, count, noise, air[1]) else None
+    return air if air is not None and _believed(displacement, force, time, count, noise, *air) else None
 
 
 def _drifting_after(
@@ -293,16 +254,20 @@ def _least(travel: Floats, left: Callable[[float], float]) -> tuple[float, float
     return least, begins
 
 
-def _believed(displacement: Floats, force: Floats, time: Floats, count: int, noise: float, slope: float) -> bool:
-    """Whether what looks like a drift is none of the foot of a law that rises otherwise than Hertz's.
+def _believed(
+    displacement: Floats, force: Floats, time: Floats, count: int, noise: float, first: int, slope: float
+) -> bool:
+    """Whether what looks like a drift is none of the foot of a law that rises otherwise than Hertz's; `first` samples
+    lie in the air.
 
-    A contact does not lower the force; a drift is still there where the way back has returned; a small noise shows how
-    straight the samples in the air are.
+    A contact does not lower the force; a drift is still there where the way back has returned, or left the contact; a
+    small noise shows how straight the samples in the air are.
     """
     if slope < 0:
         return True
     returned = count + int(np.argmin(displacement[count:])) if count < len(force) else 0
-    if returned and displacement[returned] <= displacement[0] + _BACK * float(np.ptp(displacement)):
+    free = max(displacement[0] + _BACK * float(np.ptp(displacement)), displacement[first - 1])
+    if returned and displacement[returned] <= free:
         expected = slope * float(time[returned] - time[0])
         return abs(float(force[returned] - force[0]) - expected) < 0.5 * expected + 4 * noise
     return noise < _QUIET * float(np.ptp(force))

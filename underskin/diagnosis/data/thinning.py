@@ -9,7 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.mechanisms.base import Kind
-from underskin.recordings.curve_course import Course, foot, roughness
+from underskin.recordings.curve_course import Course, foot
+from underskin.recordings.curve_jumps import roughness
 from underskin.units import Floats, Indices
 
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
