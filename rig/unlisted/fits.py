@@ -181,9 +181,13 @@ class Lines:
         return np.asarray(np.broadcast_to(h, (self.design.count, h.shape[1])))
 
     def residual(self, form: str, p: Array) -> Array:
-        """Whitened residuals, real and imaginary."""
-        h = self.response(form, p)[self.keep] * self.root
-        g = self.frf * self.root
+        """Whitened residuals of one form."""
+        return self.misfit(self.response(form, p))
+
+    def misfit(self, response: Complex, weight: Array | float = 1.0) -> Array:
+        """Whitened residuals of any response (recordings, lines), weighted: real parts, then imaginary parts."""
+        root = self.root * weight
+        h, g = response[self.keep] * root, self.frf * root
         amplitude = (g * h.conj()).real.sum(axis=1) / (np.abs(h) ** 2).sum(axis=1)
         r = g - amplitude[:, None] * h
         return np.asarray(np.concatenate([r.real.ravel(), r.imag.ravel()]))

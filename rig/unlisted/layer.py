@@ -61,16 +61,30 @@ def hertz_transform(s: Array) -> Array:
     )
 
 
+def punch_transform(s: Array) -> Array:
+    """p(s) = sin s/s of a flat punch, q(r) = 1/(2 pi a^2 sqrt(1 - r^2/a^2))."""
+    return np.asarray(np.sinc(s / np.pi))
+
+
+def base_stress(pressure: Array, rho: Array | float, e: Array | float, m: Array | None = None) -> Array:
+    """sigma of any axisymmetric pressure on any layer.
+
+    Parameters: pressure, its transform p at the wavenumbers of `transfer`, (..., 200); rho and e as in `sigma`; m, the
+    layer's M at the same wavenumbers, by default that of the bonded, incompressible one.
+    """
+    rho_, e_ = (np.asarray(v, dtype=np.float64)[..., None] for v in (rho, e))
+    s = _K * rho_
+    disc = _WEIGHT * (_TRANSFER if m is None else m) * _K * 2.0 * j1(s) / s
+    return np.asarray((pressure * (disc * j0(_K * e_))).sum(axis=-1) / 3.0)
+
+
 def sigma(a: Array, rho: Array | float, e: Array | float) -> Array:
     """Normal stress at the base, averaged over the sensor's disc, in units of 3F/(2 pi h^2).
 
     Parameters: a, contact radius; rho, sensor radius; e, distance of the contact from the sensor's centre; each in h.
     The quadrature (200 Gauss points up to k h = 32) was checked for a <= 3 and rho >= 0.1, and e <= 12.
     """
-    a_, rho_, e_ = (np.asarray(v, dtype=np.float64)[..., None] for v in (a, rho, e))
-    s = _K * rho_
-    disc = _WEIGHT * _TRANSFER * _K * 2.0 * j1(s) / s
-    return np.asarray((hertz_transform(_K * a_) * (disc * j0(_K * e_))).sum(axis=-1) / 3.0)
+    return base_stress(hertz_transform(_K * np.asarray(a, dtype=np.float64)[..., None]), rho, e)
 
 
 def log_transmission(a_mm: Array, h_mm: Array | float, sensor_radius_mm: float, offset_mm: Array | float) -> Array:
@@ -82,18 +96,32 @@ def log_transmission(a_mm: Array, h_mm: Array | float, sensor_radius_mm: float, 
 
 
 @lru_cache(maxsize=1)
-def _stiffness_table() -> CubicSpline:
+def _deficit() -> tuple[Array, Array]:
     s = np.asarray(15.0 * (_X + 1.0))
-    weight = 15.0 * _W
-    deficit = 1.0 - (np.sinh(2 * s) - 2 * s) / (1.0 + 2.0 * s**2 + np.cosh(2 * s))
+    return s, np.asarray(15.0 * _W * (1.0 - (np.sinh(2 * s) - 2 * s) / (1.0 + 2.0 * s**2 + np.cosh(2 * s))))
+
+
+def contact_equation(a: float) -> tuple[Array, Array, Array, Array]:
+    """Nodes t (24,) and weights on [0, a], the matrix of the integral equation there, and 2 N(a, t) with the weights.
+
+    matrix @ phi is the right side at the nodes, in units of E'; pi phi(a) is the right side at a plus the last item
+    times phi.
+    """
+    s, deficit = _deficit()
     nodes, node_weight = np.polynomial.legendre.leggauss(24)
+    t, w = np.asarray(0.5 * a * (nodes + 1.0)), np.asarray(0.5 * a * node_weight)
+    kernel = (np.cos(np.outer(t, s)) * deficit) @ np.cos(np.outer(s, t))
+    edge = 2.0 * ((np.cos(a * s) * deficit) @ np.cos(np.outer(s, t))) * w
+    return t, w, np.asarray(np.pi * np.eye(t.size) - 2.0 * kernel * w), np.asarray(edge)
+
+
+@lru_cache(maxsize=1)
+def _stiffness_table() -> CubicSpline:
     radii = np.linspace(0.02, 3.0, 61)
     ratio = []
     for a in radii:
-        t, w = 0.5 * a * (nodes + 1.0), 0.5 * a * node_weight
-        kernel = (np.cos(np.outer(t, s)) * (weight * deficit)) @ np.cos(np.outer(s, t))
-        phi = np.linalg.solve(np.pi * np.eye(t.size) - 2.0 * kernel * w, np.ones(t.size))
-        ratio.append(np.pi * float(w @ phi) / a)
+        t, w, matrix, _ = contact_equation(float(a))
+        ratio.append(np.pi * float(w @ np.linalg.solve(matrix, np.ones(t.size))) / a)
     return CubicSpline(np.concatenate([[0.0], radii]), np.concatenate([[1.0], ratio]))
 
 

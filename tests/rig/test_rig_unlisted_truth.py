@@ -62,7 +62,9 @@ def test_truth_is_consistent(campaigns: list[Campaign]) -> None:
         assert law["form"] not in t["form_also"]
         assert law["axis"] not in t["axis_also"]
         assert law["acts_on"] not in t["acts_on_also"]
-        assert t["identifiable"] == (t["chi2_gain_over_base"] > IDENTIFIABLE)
+        assert t["chi2_gain_over_best_listed"] <= t["chi2_gain_over_base"] + 1e-3, c.name
+        assert t["identifiable"] == (min(t["chi2_gain_over_base"], t["chi2_gain_over_best_listed"]) > IDENTIFIABLE)
+        assert t["best_listed"]
         assert not t["altered"] or law["form"] == "power"
         assert t["noise_floor_percent"] > 0.0
         assert np.isfinite(t["heldout_ideal_percent"])
@@ -129,6 +131,7 @@ def test_quiet_campaigns_hide_nothing(tmp_path: Path) -> None:
     for name, entry in truth.items():
         assert entry["law"] is None
         assert not entry["identifiable"]
+        assert entry["best_listed"] is None
         assert entry["effects"] == []
         recordings = json.loads((tmp_path / f"{name}.json").read_text(encoding="utf-8"))["recordings"]
         assert {"note_01", "note_02", "note_03", "note_04"} <= set(recordings[0]["conditions"])

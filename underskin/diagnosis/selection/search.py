@@ -1,7 +1,7 @@
 """Which sets of mechanisms are fitted, and how probable each is.
 
-Priors over sets are fixed: see PRIORS. Within a size, every set of mechanisms that the campaign supports is equally
-probable. Singles are all fitted; pairs and triples grow greedily from the best, but of curves all pairs are.
+Priors over sets are fixed (priors.py). Singles are all fitted; pairs and triples grow greedily from the best, but of
+curves all pairs are.
 """
 
 import math
@@ -17,18 +17,15 @@ from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection import curve_sets
 from underskin.diagnosis.selection.curve_sets import Explanations
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
+from underskin.diagnosis.selection.priors import least_evidence, log_prior, log_prior_beneath
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy, discrepancy
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
 
-# "Nothing" stands for all that does not show as well, which is every other campaign.
-PRIORS = {"nothing_missing": 0.54, "one": 0.29, "two": 0.115, "three": 0.015, "none_of_these": 0.04}
 _OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
-SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
-_SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
@@ -210,24 +207,6 @@ class Search:
         beside = probabilities.copy()
         beside[-1] = max(beside[-1], self.imitating.get(kept[leader].names, 0.0) * probabilities[leader])
         return np.asarray(beside / beside.sum())
-
-
-def least_evidence(explanation: Explanation) -> float:
-    """Nats of evidence that a mechanism, or a process, must bring on recordings of this kind."""
-    return _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
-
-
-def log_prior(size: int, supported: int) -> float:
-    """The logarithm of the prior of one set of that many mechanisms."""
-    share = PRIORS[("nothing_missing", "one", "two", "three")[size]]
-    return math.log(share) - math.log(math.comb(supported, size))
-
-
-def log_prior_beneath(size: int, supported: int) -> float:
-    """The logarithm of the prior of something undescribed on top of one set: a mechanism like any other."""
-    if size == 0:
-        return math.log(PRIORS[NONE_OF_THESE])
-    return log_prior(size, supported) + math.log(PRIORS[NONE_OF_THESE] * PRIORS["two"] / PRIORS["one"])
 
 
 def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search:

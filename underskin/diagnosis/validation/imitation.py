@@ -23,7 +23,7 @@ from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.taken_up import beside, force_and_slopes, information, precision_of
-from underskin.diagnosis.selection.search import PRIORS, least_evidence, log_prior
+from underskin.diagnosis.selection.priors import PRIORS, least_evidence, log_prior
 from underskin.diagnosis.validation.power import least_chi2
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.recordings.conditions import CurveConditions

@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.selection.search import SHOWS
+from underskin.diagnosis.selection.priors import SHOWS
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.registry import CATALOGUE

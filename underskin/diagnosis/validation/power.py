@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.selection.search import least_evidence, log_prior
+from underskin.diagnosis.selection.priors import least_evidence, log_prior
 from underskin.diagnosis.validation.signatures import Signatures
 
 _LARGEST = 100.0  # % of the response: what changes less than that nowhere is not told from the nuisances
