@@ -18,33 +18,39 @@ _UNLISTED_LIMIT, _LEFT_OUT_LIMIT = 1.5, 1.3  # times the noise, and the error wi
 def hidden(result: Result, quiet: Result | None = None) -> str:
     """Of campaigns that hide a law."""
     known = [entry for entry in result["judged"] if entry["identifiable"]]
-    over = [entry["over_noise"] for entry in known if entry["over_noise"] is not None]
-    rows = [
-        ["recognised as not in the catalogue", _share(known, "recognised")],
-        ["where it enters and what it follows", _share(known, "placed")],
-        ["and its form", _share(known, "shaped")],
-    ]
-    if over:
-        few = percent(share([ratio <= _UNLISTED_LIMIT for ratio in over]))
-        rows += [
-            ["error held out over the noise, median", median_of(over)],
-            [f"at most {_UNLISTED_LIMIT} times the noise, of those modelled", few],
-        ]
+    visible = [entry for entry in result["judged"] if entry["visible"]]
     missed = [[entry["name"], entry["law"], entry["verdict"], f"{entry['probability']:.2f}", entry["statement"]]
               for entry in known if not entry["placed"]]  # fmt: skip
     misses = table(["campaign", "hidden", "verdict", "probability", "stated"], missed) if missed else "No misses.\n"
     return f"""\
 ## Physics that nobody listed
 
-{len(result["judged"])} campaigns of a rig that knows neither the catalogue nor the grammar's code (`rig/unlisted`, seed
-{result["seed"]}); {len(known)} hide what is identifiable by that rig's own equations. An equivalent counts as right
-that the rig itself cannot tell from what it hid.
+{len(result["judged"])} campaigns of a rig that knows neither the diagnosis' catalogue nor its grammar (`rig/unlisted`,
+seed {result["seed"]}). By that rig's own equations {len(visible)} hide a law that gains more than 20 in χ² over the
+base model, and {len(known)} one that gains as much over the best single mechanism of the catalogue too: of these it can
+be told that the law is unlisted. An equivalent counts as right that the rig itself cannot tell from what it hid.
 
-{table(["of the identifiable", "share"], rows)}
+{table(["share", "of the identifiable, over both", "of all that gain over the base model"], _shares(known, visible))}
 {_trade_off(known, quiet["judged"]) if quiet is not None else ""}
 ### Every miss
 
 {misses}"""
+
+
+def _shares(known: Sequence[Result], visible: Sequence[Result]) -> list[list[str]]:
+    """Of each kind of success that of the identifiable, and that of all that are visible."""
+    both = (known, visible)
+    said = {"recognised": "recognised as not in the catalogue", "placed": "where it enters and what it follows",
+            "shaped": "and its form"}  # fmt: skip
+    rows = [[words, *(_share(entries, key) for entries in both)] for key, words in said.items()]
+    over = [[entry["over_noise"] for entry in entries if entry["over_noise"] is not None] for entries in both]
+    if all(over):
+        few = [percent(share([ratio <= _UNLISTED_LIMIT for ratio in own])) for own in over]
+        rows += [
+            ["error held out over the noise, median", *map(median_of, over)],
+            [f"at most {_UNLISTED_LIMIT} times the noise, of those modelled", *few],
+        ]
+    return rows
 
 
 def alarms(result: Result) -> str:

@@ -17,6 +17,7 @@ from proof.cases import FileCase
 from proof.judge import unnamed_over_noise
 from proof.stored import FAILED, Work, reports, sources
 from proof.text_unlisted import alarms, hidden
+from rig.identifiable import THRESHOLD
 from rig.unlisted.campaign import write
 
 SEED, COUNT, QUIET = 51051, 120, 500
@@ -60,6 +61,7 @@ def judged(name: str, truth: Mapping[str, Any], report: Mapping[str, Any]) -> di
         "name": name,
         "law": None if law is None else f"{law['acts_on']} over {law['axis']}, {law['form']}",
         "identifiable": bool(truth.get("identifiable", False)),
+        "visible": truth.get("chi2_gain_over_base", 0.0) > THRESHOLD,
         "verdict": report["verdict"],
         "missing": 1 - nothing,
         "recognised": report["verdict"] == "unexplained",

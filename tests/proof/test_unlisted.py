@@ -12,10 +12,16 @@ from proof.unlisted import judge_unlisted, judged
 
 
 def entry(
-    law: dict[str, Any] | None, *, floor: float = 2.0, verdict: str = "unexplained", probability: float = 0.9
+    law: dict[str, Any] | None,
+    *,
+    floor: float = 2.0,
+    verdict: str = "unexplained",
+    probability: float = 0.9,
+    identifiable: bool = True,
 ) -> dict[str, Any]:
     truth = {
-        "identifiable": True,
+        "identifiable": identifiable,
+        "chi2_gain_over_base": 30.0,
         "law": {"acts_on": "modulus", "axis": "order", "form": "linear"},
         "acts_on_also": ["force"],
         "axis_also": ["recorded_at"],
@@ -64,10 +70,13 @@ def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
         entry(law("modulus", "order", "linear")),
         entry(law("gain", "order", "step", after=8.0)),
         entry(None, verdict="explained"),
+        entry(None, verdict="explained", identifiable=False),  # a listed mechanism does the same
     ]
     quiet = {"seed": 2, "judged": [entry(None, verdict="no_mismatch"), entry(None, verdict="ambiguous")]}
     text = hidden({"seed": 1, "judged": entries}, quiet)
+    assert "4 hide a law that gains more than 20 in χ² over the\nbase model, and 3 one that gains as much" in text
     assert "| recognised as not in the catalogue | 2 of 3: 67 % [" in text
+    assert "] | 2 of 4: 50 % [" in text
     assert "| where it enters and what it follows | 1 of 3: 33 % [" in text
     assert "median | 2.55 [" in text
     assert "| at most 1.5 times the noise, of those modelled | 1 of 2" in text
