@@ -31,7 +31,7 @@ def statement(
     known = f" beside {_listed(beside)}" if beside else ""
     held = document["heldout_rmse_percent"]
     worth = _worth(held, floor, _held_out(law))
-    altered = _altered(law, document)
+    altered = [*_altered(law, document), *_order(law, document)]
     parts = [
         f"No known mechanism describes this (probability {in_percent(probability)}).",
         f"What is missing{known} {_does(law)} {_axis_words(leading)}: {_size(leading)}; {worth}.",
@@ -70,6 +70,17 @@ def _altered(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
         power = f"{exponent['value']:.2f} ({exponent['low']:.2f} to {exponent['high']:.2f}) in place of 1"
         return [f"This is a delay with another exponent: its phase grows with frequency to the power {power}."]
     return []
+
+
+def _order(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
+    """That lines fall off towards low frequencies as behind a high pass, of what order."""
+    if not (isinstance(law, FrequencyLaw) and law.variant == "high_pass"):
+        return []
+    stated = {entry["name"]: entry for entry in document["parameters"]}
+    value, low, high = (stated["exponent"][name] for name in ("value", "low", "high"))
+    if value < 0:
+        return []
+    return [f"This is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}); an amplifier's is of order 1."]
 
 
 def _held_out(law: UnnamedLaw) -> str:

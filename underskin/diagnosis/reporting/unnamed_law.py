@@ -98,7 +98,7 @@ class LeadingLaw:
     @property
     def is_phase(self) -> bool:
         """Whether it turns the phase alone."""
-        return isinstance(self.law, FrequencyLaw) and self.law.variant == "phase"
+        return isinstance(self.law, FrequencyLaw) and self.law.variant in ("phase", "delay")
 
     def variance(self, x: Floats) -> Floats:
         """Of the change, from the quadratic of the law's own parameters."""

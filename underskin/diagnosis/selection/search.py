@@ -140,8 +140,15 @@ class Search:
 
     @cached_property
     def law(self) -> Explanation | None:
-        """The most probable set with a law that nobody listed, each member of which shows."""
-        return max((entry for entry in self.laws if self.shows(entry)), key=self.log_weight, default=None)
+        """The most probable set with a law that nobody listed, each member of which shows.
+
+        Of equals that over the order of the recordings, which times and load cycles follow.
+        """
+
+        def rank(entry: Explanation) -> tuple[float, bool]:
+            return round(self.log_weight(entry), 2), any("__order__" in name for name in entry.names)
+
+        return max((entry for entry in self.laws if self.shows(entry)), key=rank, default=None)
 
     @cached_property
     def answers(self) -> list[Answer]:

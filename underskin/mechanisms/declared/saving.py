@@ -137,6 +137,8 @@ def _over_frequency(variant: str, middle: float) -> str:
     resonance = "(1 - u ** 2 + 2 * i * damping * u)".replace("u", "(frequency_hz / centre)")
     told = {
         "phase": f"exp(-i * lag * ({ratio}) ** exponent)",
+        "delay": f"exp(-i * lag * {ratio})",
+        "high_pass": "exp(-exponent * log(1 + corner / (i * frequency_hz)))",
         "magnitude": f"exp(exponent * (log({ratio}) + i * pi / 2))",
         "step": "1 + change * (i * frequency_hz / corner) / (1 + i * frequency_hz / corner)",
         "corner": "exp(exponent * log(1 + i * frequency_hz / corner))",

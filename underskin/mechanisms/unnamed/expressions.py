@@ -202,6 +202,10 @@ def _of_frequency(law: FrequencyLaw, values: Numbers) -> str:
     match law.variant:
         case "phase":
             return f"FRF = FRF0·exp(−i·{said('law_lag')}·(f/{number(law.middle_hz)} Hz)^{said('law_exponent')})"
+        case "delay":
+            return f"FRF = FRF0·exp(−i·{said('law_lag')}·f/{number(law.middle_hz)} Hz)"
+        case "high_pass":
+            return f"FRF = FRF0·(1 + {said('law_corner')} Hz/(i·f))^(−{said('law_exponent')})"
         case "magnitude":
             return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^{said('law_exponent')}"
         case "step":

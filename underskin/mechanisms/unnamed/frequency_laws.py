@@ -21,6 +21,7 @@ from underskin.units import Array, Floats
 
 _REASON = "nothing is known of it; as large as what is usually left out"
 _BAND = "anywhere within the measured band"
+_BELOW = 30.0  # times below the band a corner may lie whose phase still shows in it
 _BUMPS, _BUMP_WIDTH = 8, 0.55  # of a free response; width over the distance of neighbours
 
 Factor = Callable[[Floats, Values], Differentiated]  # at frequencies [Hz]
@@ -99,18 +100,22 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
 
 
 def _phases(middle: float) -> list[_Law]:
-    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses."""
+    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses; a delay alone is one more."""
     exponent = Parameter("law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴")
 
     def factor(frequency: Floats, values: Values) -> Differentiated:
         return exp(values["law_lag"] * exp(values["law_exponent"] * np.log(frequency / middle)) * -1j)
 
+    def late(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_lag"] * (-1j * frequency / middle))
+
     grid = [(value,) for value in (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)]
-    return [_Law("power", "phase", (_amplitude(0.2, "law_lag"),), (exponent,), grid, factor)]
+    lag = _amplitude(0.2, "law_lag")
+    return [_Law("power", "phase", (lag,), (exponent,), grid, factor), _Law("linear", "delay", (lag,), (), [()], late)]
 
 
 def _powers(low: float, high: float, middle: float) -> list[_Law]:
-    """Minimum phase: (if)^n; a step from 1 to 1 + A; (1 + if/f1)^n beyond a corner."""
+    """Minimum phase: (if)^n; a step from 1 to 1 + A; beyond a corner (1 + if/f1)^n; below one (1 + f1/(if))^(−n)."""
 
     def power(frequency: Floats, values: Values) -> Differentiated:
         return exp(values["law_exponent"] * (np.log(frequency / middle) + 0.5j * np.pi))
@@ -122,12 +127,18 @@ def _powers(low: float, high: float, middle: float) -> list[_Law]:
     def beyond(frequency: Floats, values: Values) -> Differentiated:
         return exp(values["law_exponent"] * log(1.0 + 1j * frequency / values["law_corner"]))
 
-    corner = _corner(low, high)
+    def beneath(frequency: Floats, values: Values) -> Differentiated:
+        return exp(-values["law_exponent"] * log(1.0 + values["law_corner"] * (-1j / frequency)))
+
+    corner, lower = _corner(low, high), _corner(low / _BELOW, high)
     grid = [(at,) for at in _over_band(low, high, 8)]
+    from_below = [(at,) for at in _over_band(low / _BELOW, high, 8)]
+    order = _amplitude(0.7, "law_exponent")
     return [
         _Law("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
         _Law("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
-        _Law("threshold", "corner", (_amplitude(0.7, "law_exponent"),), (corner,), grid, beyond),
+        _Law("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
+        _Law("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
     ]
 
 
