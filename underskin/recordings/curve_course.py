@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from underskin.recordings.curve_jumps import jumps, roughness
+from underskin.recordings.curve_jumps import hidden_samples, jumps, roughness
 from underskin.units import Floats, Indices
 
 _BLOCKS = 60  # of a curve, over whose means jumps are sought
@@ -94,7 +95,7 @@ def _course(*columns: bytes) -> Course:
     displacement, force, time = map(np.frombuffer, columns)
     noise = roughness(force)
     block = int(np.ceil(len(force) / _BLOCKS))
-    turn = int(np.argmax(displacement))
+    turn = _deepest(displacement)
     span = float(np.ptp(force))
     found = jumps(force, float(np.hypot(noise, 1e-3 * span)), block)
     least = np.maximum(_BEYOND_JUMP * noise, _LEAST_JUMP * span)
@@ -120,6 +121,12 @@ def _course(*columns: bytes) -> Course:
     air = _air(force, turn, snap_in, pull_off, noise, span) if drifting is None else np.arange(drifting[0])
     zero = float(np.median(force[air])) if len(air) >= _AIR else float(force[0])
     return Course(noise, turn, arrive, leave, snap_in, pull_off, air, zero, 0.0 if drifting is None else drifting[1])
+
+
+def _deepest(displacement: Floats) -> int:
+    """The deepest sample, of means over samples as close as the noise."""
+    count = hidden_samples(displacement)
+    return int(np.argmax(uniform_filter1d(displacement, count, mode="nearest") if count > 1 else displacement))
 
 
 def _single_snap(force: Floats, begin: float, noise: float) -> int | None:
@@ -164,7 +171,8 @@ def _held(displacement: Floats, turn: int) -> tuple[int, int]:
         low, high = low - len(before) * bool(earlier), high + len(after) * bool(later)
     beyond = [displacement[max(low - 2 * _HELD_BLOCK, 0) : low], displacement[high : high + 2 * _HELD_BLOCK]]
     falls = [(held.mean() - part.mean()) / len(part) for part in beyond if len(part) == 2 * _HELD_BLOCK]
-    speed = min(falls, default=0.0)  # of the sphere on its way, at least
+    # Of the sphere on its way, at least: beside the hold, which noise may hide, and over all of the way in
+    speed = min([*falls, float(np.ptp(displacement)) / max(turn, 1)]) if falls else 0.0
     still = bool(np.std(held) < _AS_NOISE * noise)
     return (low, high - 1) if still and speed > 0 and len(held) * speed > _HIDDEN * noise else plain
 

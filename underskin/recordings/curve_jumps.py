@@ -1,4 +1,4 @@
-"""The noise of the raw samples of a curve, and where it jumps."""
+"""The noise of the raw samples of a curve, over how many of them it hides the travel, and where a curve jumps."""
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -19,6 +19,15 @@ def roughness(force: Floats) -> float:
     quantum = float(steps.min()) if len(steps) else 0.0
     coarse = len(np.unique(force)) < len(force) / 2  # an analog-digital converter's steps show
     return float(np.hypot(noise, quantum / np.sqrt(12.0))) if coarse else noise
+
+
+def hidden_samples(displacement: Floats) -> int:
+    """Over so many samples, at least 1, the displacement moves about as far as twice the noise of their mean.
+
+    Noise σ and a step s from sample to sample: n s = 2 σ/√n.
+    """
+    step = float(np.ptp(displacement)) / max(int(displacement.argmax()), 1)
+    return max(1, int((2 * roughness(displacement) / step) ** (2 / 3))) if step > 0 else 1
 
 
 def jumps(force: Floats, noise: float, block: int) -> Indices:

@@ -10,18 +10,20 @@ import numpy as np
 
 from underskin.mechanisms.base import Kind
 from underskin.recordings.curve_course import Course, foot
-from underskin.recordings.curve_jumps import roughness
-from underskin.units import Floats, Indices
+from underskin.recordings.curve_jumps import hidden_samples, roughness
+from underskin.units import Floats, Indices, Mask
 
 _SAMPLES, _MOST_SAMPLES = 50, 160  # of a curve, before and after blocks are split
 _STRAIGHT = 3.0  # standard deviations of χ² about a straight line beyond which a block is split
 _LEAST_NOISE = 2e-5  # of the range of force: what numbers written with five digits are good to
 _COARSE, _BEYOND_NOISE = 240, 4.0  # samples at which changes of force are summed, standard deviations of noise
-_NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # samples from it at which blocks begin
+_NEAR_JUMP = np.array([0, 1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64])  # from it, where blocks begin: in samples, or in
+# as many of them as hide the travel, since a law of single displacements that are noisy is biased where it bends
 _BESIDE = 5  # samples on either side of the deepest one
-_STEP, _RESTS = 0.2, 1e-3  # of the usual step: the smaller way's, and that between samples at which a sphere rests
+_STEP = 0.2  # of the larger step of both ways, which the smaller must exceed for their lines to meet in a corner
+_RESTS = 1e-3  # of that step: where the deepest samples differ by less, the sphere was held
 _SURE = 4.0  # standard deviations
-_TOLD = 5.0  # standard deviations by which two displacements differ, between which a slope is read
+_DISTINCT = 5.0  # standard deviations by which two displacements differ, between which a slope is read
 
 
 def thinned(
@@ -47,24 +49,24 @@ def thinned(
         means[number] = means[number] - sag
         unsure = doubt if number == 1 else unsure
     held = (starts >= seen.arrive) & (starts <= seen.leave) & (seen.arrive < seen.turn)
-    slope = np.where(held, 0.0, _slopes(means[0], means[1], unsteady / np.sqrt(counts)))
-    steep = np.minimum(slope * unsteady, 3 * seen.noise + 1e-2 * float(np.ptp(force)))
+    slope = np.where(held, 0.0, _slopes(means[0], means[1], unsteady / np.sqrt(counts), starts >= seen.turn))
     least = _LEAST_NOISE * float(np.ptp(force))
-    deviation = np.sqrt((seen.noise**2 + steep**2) / counts + least**2 + unsure**2 + slow**2)
+    deviation = np.sqrt((seen.noise**2 + (slope * unsteady) ** 2) / counts + least**2 + unsure**2 + slow**2)
     return means, deviation, place, counts.astype(float)
 
 
-def _slopes(displacement: Floats, force: Floats, unsteady: Floats) -> Floats:
+def _slopes(displacement: Floats, force: Floats, noise: Floats, back: Mask) -> Floats:
     """How steep the force rises over displacement at each block (blocks,): the lesser of the slopes to either side.
 
-    Each is that to the next block whose displacement differs by more than its noise, `unsteady` (blocks,). Beside a
-    jump, one side is none; between blocks as close as the noise, a slope would be noise too.
+    Each is that to the next block of the same way whose displacement differs by more than its `noise` (blocks,); `back`
+    are blocks of the way back. Beside a jump, one side has none; between blocks as close as the noise, a slope would be
+    noise too.
     """
     apart = displacement - displacement[:, None]
-    told = np.abs(apart) > _TOLD * np.hypot(unsteady, unsteady[:, None])
+    distinct = (np.abs(apart) > _DISTINCT * np.hypot(noise, noise[:, None])) & (back == back[:, None])
     number = np.arange(len(displacement))
-    after = told & (number > number[:, None])
-    before = told & (number < number[:, None])
+    after = distinct & (number > number[:, None])
+    before = distinct & (number < number[:, None])
     slopes = []
     for beside, other in ((after, after.argmax(axis=1)), (before, number[-1] - before[:, ::-1].argmax(axis=1))):
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -142,7 +144,8 @@ def _around(seen: Course, displacement: Floats, force: Floats, kind: Kind) -> In
     places = _corners(seen)
     if kind == "indentation":
         places = np.concatenate([places, _hidden_jumps(seen, force), _feet(seen, displacement, force)])
-    near = (places[:, None] + np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])).ravel()
+    apart = hidden_samples(displacement) * np.concatenate([-_NEAR_JUMP[:0:-1], _NEAR_JUMP])
+    near = (places[:, None] + apart).ravel()
     return np.unique(near[(near >= 0) & (near < len(force))])
 
 
