@@ -77,6 +77,10 @@ LAWS: Mapping[str, tuple[dict[str, Change], str, str, set[str], dict[str, float]
         {"moved": lambda _, time: 0.01 * (1 - np.exp(-time / 4.0))},
         "position", "time_s", {"saturating"}, {"change": 0.01, "approach": 4.0},
     ),
+    "a frame that gives way after a while": (
+        {"moved": lambda _, time: 0.012 * np.maximum(time - 15.0, 0.0) / 25.0},
+        "position", "time_s", {"threshold"}, {"change": 0.012, "onset": 15.0},
+    ),
     "a screw with a periodic error": (
         {"added": lambda travel, _: 0.01 * LARGEST * np.sin(2 * np.pi * travel / 0.04) * (travel > 0)},
         "force", "displacement_mm", {"periodic"}, {"amplitude": 0.01 * LARGEST, "period": 0.04},

@@ -7,14 +7,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.pressed_curves import pressed
+from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.recordings.campaign import Campaign, CompressionRecording
 from underskin.recordings.conditions import SkinDescription
-from underskin.surrogate.sigma_table import load_table
+from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 Change = Callable[[CompressionRecording], CompressionRecording]
 MODULUS_MPA = 0.5
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
 
 
 def pad(name: str, seed: int) -> CompressionRecording:
@@ -121,3 +130,18 @@ def test_a_copy_of_a_curve_is_left_out(pads: Campaign) -> None:
     assert codes(found.findings) == {("duplicated_recording", "copy", "force_n")}
     assert len(found.campaign.recordings) == len(pads.recordings)
     assert without_inconsistent(pads, "compression").findings == []
+
+
+@pytest.mark.parametrize(("thickness_mm", "said"), [(None, ["thickness_unknown"]), (80.0, [])])
+def test_a_layer_that_could_not_be_tried_is_said(
+    thickness_mm: float | None, said: list[str], table: SigmaTable
+) -> None:
+    campaign = pressed(1e6, (4.0,))
+    campaign = replace(campaign, skin=replace(campaign.skin, thickness_mm=thickness_mm))
+    problem = FittingProblem(curve_lines(campaign, "indentation"), table)
+    (null,) = problem.explain([Request(())])
+    assert null is not None
+    (found,) = problem.explain([Request(("strain_stiffening",), begin=null.point)])
+    assert found is not None
+    assert [entry.code.value for entry in fit_warnings(problem, found) if entry.field == "thickness_mm"] == said
+    assert [entry for entry in fit_warnings(problem, null) if entry.field == "thickness_mm"] == []

@@ -338,5 +338,5 @@ def test_a_displacement_much_noisier_than_its_steps_makes_no_hold_and_no_bias(se
     (entry,) = lines.campaign.recordings
     assert isinstance(entry, IndentationRecording)
     error = (entry.force_n + seen.zero - np.maximum(entry.displacement_mm, 0.0) ** 1.5) / lines.deviation
-    assert np.sqrt((error**2).mean()) < 1.5
+    assert np.sqrt((error**2).mean()) < 2
     assert abs(error.mean()) < 0.5

@@ -82,6 +82,8 @@ def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
     )
     assert "spread over all of the recordings" in both
     assert "off by 12 % (root mean square" in both
+    hidden = location_statement([entry for entry in AXES if entry.p_value is None], {}, {}, size)
+    assert hidden == "Whether the misfit depends on load cycles, this design cannot tell."
 
 
 @pytest.mark.parametrize(

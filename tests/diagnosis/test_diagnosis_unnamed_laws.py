@@ -310,6 +310,18 @@ def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out
     assert np.median(shares) > 0.8
 
 
+def test_a_high_pass_of_another_order_is_said_to_be_one(quiet: Campaign, table: SigmaTable) -> None:
+    document = diagnosis_report(
+        changed(quiet, lambda _, __, hz: np.asarray((1 / (1 - 2j / hz)) ** 0.4, complex)), table
+    )
+    law = document["unnamed"]
+    assert (law["acts_on"], law["axis"], law["form"]) == ("frequency_response", "frequency_hz", "threshold")
+    order = next(entry for entry in law["parameters"] if entry["name"] == "exponent")
+    assert order["low"] < 0.4 < order["high"]
+    assert f"This is a high pass of order {order['value']:.2f} (" in document["statement"]
+    assert "Hz/(i·f))^(-" in law["expression"]
+
+
 def test_what_the_lab_declared_is_recognised_by_name(
     warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -11,6 +11,7 @@ from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign, IndentationRecording
+from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
 BENT = """\
@@ -82,8 +83,28 @@ def test_times_are_needed_where_the_law_reads_them(campaign: Campaign) -> None:
     assert creeping.kinds == ("indentation",)
 
 
-def test_an_expression_that_is_no_number_somewhere_gives_no_force_that_is_none(campaign: Campaign) -> None:
-    assert np.isfinite(forces(campaign, mechanism("gain", "force_n", "1 + bend * log(force_n - force_n)"))).all()
+def test_a_law_far_from_its_usual_parameters_gives_a_force_all_the_same(campaign: Campaign) -> None:
+    steep = mechanism("gain", "force_n", "1 + bend * (exp(500 * force_n) - 1)")
+    assert np.isfinite(forces(campaign, steep)).all()
+
+
+def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campaign) -> None:
+    """Also where its first half is held out."""
+    own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
+    timed = [replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in own]
+    whole = replace(campaign, recordings=tuple(timed))
+    halves = [len(entry.force_n) // 2 for entry in own]
+    later = [
+        replace(entry, displacement_mm=entry.displacement_mm[half:], force_n=entry.force_n[half:], time_s=time[half:])
+        for entry, half in zip(timed, halves, strict=True)
+        for time in [entry.time_s]
+        if time is not None
+    ]
+    drift = mechanism("force", "time_s", "bend * time_s").bind(whole, load_table())
+    part = replace(campaign, recordings=tuple(later))
+    added = forces(part, drift) - forces(part)
+    expected = [BEND * np.arange(float(len(entry.force_n)))[half:] for entry, half in zip(own, halves, strict=True)]
+    assert added == pytest.approx(np.concatenate(expected))
 
 
 @pytest.mark.parametrize(
@@ -94,6 +115,11 @@ def test_an_expression_that_is_no_number_somewhere_gives_no_force_that_is_none(c
         ("1 - bend * force_n", "1 - i * bend * force_n", 6, "must be real"),
         ("law: 1 - bend * force_n", "law: [bend * force_n, force_n]", 6, "must be one expression"),
         ("[force_n]", "[force_n, time_s]", 5, "is not in the law"),
+        ("1 - bend * force_n", "1 + bend * log(force_n)", 6, "is no number where force_n is 0"),
+        ("1 - bend * force_n", "1 + sqrt(force_n - 0.2 - bend)", 6, "is no number where force_n is 0"),
+        ("1 - bend * force_n", "bend * force_n", 6, "must be 1, which changes nothing"),
+        ("acts_on: gain", "acts_on: position", 5, "of a position is a stage that gives"),
+        ("mean: 0, sd", "mean: 3, sd", 8, "must lie within -1 to 1"),
     ],
 )
 def test_what_cannot_act_on_curves_is_refused_with_its_line(old: str, new: str, line: int, said: str) -> None:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from underskin.mechanisms import CATALOGUE
+from underskin.mechanisms.declared.document import parse
+from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
@@ -197,6 +199,33 @@ def test_laws_over_frequency_are_of_minimum_phase_or_turn_the_phase_alone() -> N
             continue  # rise and fall without end
         expected = hilbert_phase(np.log(np.abs(factor)), wide)
         assert np.unwrap(np.angle(factor))[inner] == pytest.approx(expected[inner], abs=0.02), law.name
+
+
+def test_a_delay_is_late_and_a_high_pass_is_an_amplifiers_of_any_order() -> None:
+    frequency = np.geomspace(1.0, 1000.0, 30)
+    laws = {law.variant: law for law in frequency_laws(frequency)}
+    late = laws["delay"].factor(frequency, {"law_lag": differentiated(0.1)}).value[0]
+    assert np.unwrap(np.angle(late)) == pytest.approx(-0.1 * frequency / np.sqrt(1000.0))
+    amplifier = 1 / (1 - 3j / frequency)
+    for order in (1.0, 2.0, 0.5):
+        values = {"law_exponent": differentiated(order), "law_corner": differentiated(3.0)}
+        assert laws["high_pass"].factor(frequency, values).value[0] == pytest.approx(amplifier**order)
+
+
+def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
+    frequency = np.geomspace(2.0, 500.0, 9)
+    for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        found = {"law": law.name, "parameters": values}
+        said = {"acts_on": "frequency_response", "axis": "frequency_hz", "form": law.spoken.form}
+        stated = {**said, "expression": "FRF", "range": {"frequency_hz": [1.0, 1000.0]}}
+        report = {"unnamed": stated, "provenance": {"unnamed": found}, "campaign": "c", "verdict": "unexplained"}
+        if law.spoken.form == "free":
+            continue
+        kept = parse(document(report, "kept").encode(), "kept.yaml")
+        short = {name.removeprefix("law_"): value for name, value in values.items()}
+        exact = law.factor(frequency, {name: differentiated(value) for name, value in values.items()}).value[0]
+        assert kept.laws[0]({**short, "frequency_hz": frequency}) == pytest.approx(exact, abs=2e-3), law.name
 
 
 def differentiated(value: float):  # type: ignore[no-untyped-def]

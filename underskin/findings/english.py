@@ -171,6 +171,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,
+    Reason.THICKNESS_UNKNOWN: "the thickness of the sample is not declared, so that a thin layer on a stiff base "
+    "(layered contact) was not tried, which stiffens a curve much like {answer}: declare thickness_mm",
     Reason.LINE_NOISE_LEVEL: sentences.line_noise,
     Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
     "noise, is left that no mechanism here describes",

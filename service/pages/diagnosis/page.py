@@ -23,6 +23,7 @@ from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words
 from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -77,7 +78,8 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         limit_fields=FIELDS,
         without=in_words(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
-        may_be_kept=report is not None and _may_be_kept(report),
+        has_law=report is not None and report.get("unnamed") is not None,
+        not_kept=None if report is None else _not_kept(report),
         not_adopted=None if report is None else _not_adopted(report),
         same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )
@@ -136,15 +138,15 @@ def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[s
     return [(in_words([name]), " ".join([*without, name])) for name in dict.fromkeys(named)]
 
 
-def _may_be_kept(report: Mapping[str, Any]) -> bool:
-    """Whether it holds a law that may become a mechanism of the lab's own: one that an expression can say."""
-    from underskin.mechanisms.declared.saving import document
+def _not_kept(report: Mapping[str, Any]) -> str | None:
+    """Why the law that a report holds cannot become a mechanism of the lab's own; None where it can."""
+    from underskin.mechanisms.declared.saving import document  # the models, which few pages need
 
     try:
         document(report, "kept")
-    except InvalidInput:
-        return False
-    return True
+    except InvalidInput as refusal:
+        return refusal.allowed
+    return None
 
 
 def _not_adopted(report: Mapping[str, Any]) -> str | None:
@@ -152,9 +154,10 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
     from underskin.prediction.adopted_model import implausible_d33, not_adopted
 
     why_not = not_adopted(report)
+    law = report.get("unnamed")
+    if (why_not is None and report["d33"] is None) or (law is not None and law["axis"] in OF_SAMPLES):
+        return "it is of curves, which have no d33: a model of a skin is of FRFs"
     if why_not is None:
-        if report["d33"] is None:
-            return "it is of curves, which have no d33: a model of a skin is of FRFs"
         reason = implausible_d33(report)
         return None if reason is None else f"its d33 cannot be right: {reason}"
     return why_not

@@ -9,12 +9,18 @@ from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.validation.residual_noise import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.base import Mechanism
+from underskin.mechanisms.unnamed.curve_laws import CurveLaw
 from underskin.mechanisms.unnamed.laws import in_plain_words
+
+_STIFFENS = ("strain_stiffening", "compressible_layer")  # with depth, as a layer on a stiff base does
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """Parameters at their bounds, recordings beyond the tables, noise that is larger than the lines' own."""
-    return [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
+    """Parameters at their bounds, recordings beyond the tables, noise that is larger than the lines' own, and a layer
+    that could not be tried."""
+    found = [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
+    return [*found, *_of_unknown_thickness(problem, explanation)]
 
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
@@ -50,3 +56,16 @@ def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     if problem.lines.curves or level < NOISY:
         return []
     return [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})]
+
+
+def _of_unknown_thickness(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    if problem.kind != "indentation" or problem.lines.campaign.skin.thickness_mm is not None:
+        return []
+    mechanisms = [problem.lines.mechanisms[name] for name in explanation.names]
+    alike = [one for one in mechanisms if one.name in _STIFFENS or _of_depth(one)]
+    answer = in_words([in_plain_words(one) for one in alike])
+    return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", {"answer": answer})] if alike else []
+
+
+def _of_depth(mechanism: Mechanism) -> bool:
+    return isinstance(mechanism, CurveLaw) and mechanism.spoken.axis in ("displacement_mm", "force_n")

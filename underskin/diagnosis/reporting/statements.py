@@ -243,6 +243,8 @@ def location_statement(
     telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
     undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
     tail = f"; whether it depends on {listed(undecidable)}, this design cannot tell" if undecidable else ""
+    if len(undecidable) == len(axes) and undecidable:
+        return f"Whether the misfit depends on {listed(undecidable)}, this design cannot tell."
     if not telling:
         return f"The misfit depends on none of the axes beyond chance{tail}."
     names = listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])

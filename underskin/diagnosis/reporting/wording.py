@@ -53,9 +53,9 @@ def law_range(name: str, ends: Sequence[Any]) -> str:
 
 
 def group(name: str) -> str:
-    """A group of recordings, "preload_n 3.0", by its axis and value."""
+    """A group of recordings, "preload_n 3.0", by its axis and value; another as it is called."""
     field, _, value = name.partition(" ")
-    return f"{axis(field)}: {value}"
+    return f"{axis(field)}: {value}" if field in {*AXES, *WORDS, *FOLLOWED} else name
 
 
 def number(value: float | None) -> str:

@@ -28,6 +28,7 @@ _PARENTS = 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
 _UNTHOUGHT = 0.015  # probability that none of what was compared is right
+_EQUAL = 0.01  # nats, within which laws are equally probable
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
@@ -144,11 +145,16 @@ class Search:
 
         Of equals that over the order of the recordings, which times and load cycles follow.
         """
+        showing = [entry for entry in self.laws if self.shows(entry)]
+        best = max(map(self.log_weight, showing), default=0.0)
+        equal = [entry for entry in showing if self.log_weight(entry) > best - _EQUAL]
+        return max(equal, key=lambda entry: (self._follows_order(entry), self.log_weight(entry)), default=None)
 
-        def rank(entry: Explanation) -> tuple[float, bool]:
-            return round(self.log_weight(entry), 2), any("__order__" in name for name in entry.names)
-
-        return max((entry for entry in self.laws if self.shows(entry)), key=rank, default=None)
+    @staticmethod
+    def _follows_order(explanation: Explanation) -> bool:
+        known = explanation.best.hypothesis.lines.mechanisms
+        laws = [known[name] for name in explanation.names]
+        return any(isinstance(law, UnnamedLaw) and law.spoken.axis == "order" for law in laws)
 
     @cached_property
     def answers(self) -> list[Answer]:

@@ -34,6 +34,7 @@ from underskin.mechanisms.declared.mechanism import FREQUENCY, DeclaredMechanism
 from underskin.mechanisms.declared.of_curves import DeclaredOfCurves
 from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
 from underskin.mechanisms.unnamed.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
+from underskin.units import Array
 
 SCHEMA = "mechanism/1"
 FOLDER = "UNDERSKIN_MECHANISMS"  # the setting
@@ -44,6 +45,8 @@ _NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 _MOST_PARAMETERS = 6
 _LONGEST_TEXT = 500
+_PLACES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, where a law is looked at
+_NEUTRAL = 1e-6
 
 
 def parse(data: bytes, file: str) -> DeclaredMechanism:
@@ -106,7 +109,8 @@ def from_dict(document: Any) -> DeclaredMechanism:
     kind: type[DeclaredMechanism] = DeclaredOfLines if acts_on == "frequency_response" else DeclaredOfRecordings
     if of_curves:
         kind = DeclaredOfCurves
-        _real(laws, axes, parameters)
+        _defined(laws[0], axes, parameters)
+    _neutral(laws, acts_on, axes, parameters)
     renamed = tuple(parameters.values())
     return kind(
         name,
@@ -169,6 +173,8 @@ def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
         raise InvalidInput("axes", value, f"{sampled[0]} is of the samples of curves: none of recordings beside it")
     if sampled and acts_on not in OF_CURVES:
         raise InvalidInput("acts_on", acts_on, f"must be one of {', '.join(OF_CURVES)} for a law of curves")
+    if acts_on == "position" and "force_n" in value:
+        raise InvalidInput("axes", "force_n", "of a position is a stage that gives: see instrument_compliance")
     if FREQUENCY in value and acts_on != "frequency_response":
         raise InvalidInput("axes", FREQUENCY, "is an axis of acts_on frequency_response only")
     return tuple(value)
@@ -195,8 +201,11 @@ def _parameter(name: Any, entry: Any, mechanism: str) -> Parameter:
     if not low < high or (scale == "log" and low <= 0):
         raise InvalidInput(f"{field}.high", high, f"must be above low, {low:g}, and both above 0 on a log scale")
     limit = None if entry.get("limit") is None else _number(entry, "limit", field)
+    prior = _prior(entry.get("prior"), scale, field)
+    if isinstance(prior, Normal) and not low <= entry["prior"]["mean"] <= high:
+        raise InvalidInput(f"{field}.prior.mean", entry["prior"]["mean"], f"must lie within {low:g} to {high:g}")
     reason = entry.get("reason", f"declared by the lab for {mechanism}")
-    return Parameter(name, unit, low, high, _prior(entry.get("prior"), scale, field), scale, limit, str(reason))
+    return Parameter(name, unit, low, high, prior, scale, limit, str(reason))
 
 
 def _prior(value: Any, scale: str, field: str) -> Prior:
@@ -217,11 +226,41 @@ def _number(document: Mapping[str, Any], name: str, field: str) -> float:
     return float(value)  # type: ignore[arg-type]
 
 
-def _real(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
+def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
+    """Whether a law of curves is a real number wherever a curve goes, from 0 on, with usual parameters."""
+    found = _evaluated(law, axes, {name: entry.from_fit(entry.quantile(0.5)) for name, entry in parameters.items()})
+    if np.iscomplexobj(found):
+        raise InvalidInput("law", law.text, "must be real for a law of curves: without i")
+    wrong = ~np.isfinite(found[:-1])  # beyond, an exponential may be too large for a number
+    if wrong.any():
+        at = _PLACES[int(np.argmax(wrong))]
+        raise InvalidInput("law", law.text, f"is no number where {axes[0]} is {at:g}: max(0, …) may help")
+
+
+def _neutral(
+    laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
+) -> None:
+    """Whether a law changes nothing where each parameter that has a limit is at it."""
+    if all(entry.limit is None for entry in parameters.values()):
+        return
+    values = {
+        name: entry.from_fit(entry.quantile(0.5)) if entry.limit is None else entry.limit
+        for name, entry in parameters.items()
+    }
+    nothing = 0.0 if acts_on in ("force", "position") else 1.0
+    for law in laws:
+        found = _evaluated(law, axes, values)
+        known = found[np.isfinite(found)]
+        if len(known) and np.abs(known - nothing).max() > _NEUTRAL:
+            said = f"must be {nothing:g}, which changes nothing, where each parameter is at its limit"
+            raise InvalidInput("law", law.text, f"{said}; it is {known[np.abs(known - nothing).argmax()]:.3g} there")
+
+
+def _evaluated(law: Expression, axes: tuple[str, ...], values: Mapping[str, float]) -> Array:
+    """At a few places of all axes together (places,)."""
     with np.errstate(all="ignore"):
-        one = np.asarray(laws[0]({name: np.ones(1) for name in (*axes, *parameters)}))
-    if np.iscomplexobj(one):
-        raise InvalidInput("law", laws[0].text, "must be real for a law of curves: without i")
+        found = np.asarray(law({**values, **dict.fromkeys(axes, np.array(_PLACES))}))
+    return np.asarray(found + np.zeros(len(_PLACES)))
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:

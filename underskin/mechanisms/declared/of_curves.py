@@ -14,7 +14,7 @@ from underskin.recordings.conditions import Conditions, IndentationConditions, c
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-_LARGEST = 1e6  # a factor, or newtons or millimetres: what an expression gives beyond that, or as no number, is none
+_LARGEST = 1e6  # a factor, newtons or millimetres: the bound on what an expression gives far from usual parameters
 
 
 class DeclaredOfCurves(DeclaredMechanism):

@@ -1,6 +1,6 @@
 """A law that a diagnosis found, as the document of a declared mechanism."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from underskin.mechanisms.unnamed.laws import PREFIX
 from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
 _WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
+_MARGIN = 0.05  # of the range, off its ends
 _ADDS = {"force", "position"}
+_PLACES = ("onset", "centre")  # parameters that are places along the axis
 
 
 def document(report: Mapping[str, Any], name: str, description: str | None = None) -> str:
@@ -25,7 +27,17 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
         raise InvalidInput("report", "an older report", "says too little of its law: diagnose the campaign again")
     values: dict[str, float] = {key.removeprefix("law_"): float(value) for key, value in found["parameters"].items()}
     expressions, bending = _expressions(law, found["law"], values)
-    parameters = {key: _declared(value, logarithmic=key in bending) for key, value in values.items()}
+    units = {entry["name"]: entry["unit"] for entry in law.get("parameters", ())}
+    strengths = {key for key in values if key.startswith(("change", "lag"))} or {"exponent"}
+    parameters: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        if key in bending:
+            declared = _logarithmic(value)
+        elif key in _PLACES:
+            declared = _within(next(iter(law["range"].values())))
+        else:
+            declared = {**_linear_in(value), **({"limit": 0} if key in strengths else {})}
+        parameters[key] = {"unit": units.get(key, "-"), **declared}
     axes = [law["axis"], *(["preload_n"] if "__relative__" in found["law"] else [])]
     body = {
         "schema": SCHEMA,
@@ -40,14 +52,22 @@ def document(report: Mapping[str, Any], name: str, description: str | None = Non
     return str(yaml.safe_dump(body, sort_keys=False, allow_unicode=True, width=110))
 
 
-def _declared(value: float, *, logarithmic: bool) -> dict[str, Any]:
-    if logarithmic:
-        low, high = float(f"{value / 10:.4g}"), float(f"{value * 10:.4g}")
-        return {"unit": "-", "low": low, "high": high, "scale": "log", "prior": {"mean": value, "sd": _WIDER}}
+def _logarithmic(value: float) -> dict[str, Any]:
+    low, high = float(f"{value / 10:.4g}"), float(f"{value * 10:.4g}")
+    return {"low": low, "high": high, "scale": "log", "prior": {"mean": value, "sd": _WIDER}}
+
+
+def _linear_in(value: float) -> dict[str, Any]:
     size = max(abs(value), 1e-6)
-    ends = float(f"{value - 6 * size:.4g}"), float(f"{value + 6 * size:.4g}")
-    sd = float(f"{_WIDER * size:.4g}")
-    return {"unit": "-", "low": ends[0], "high": ends[1], "prior": {"mean": value, "sd": sd}, "limit": 0}
+    low, high = float(f"{value - 6 * size:.4g}"), float(f"{value + 6 * size:.4g}")
+    return {"low": low, "high": high, "prior": {"mean": value, "sd": float(f"{_WIDER * size:.4g}")}}
+
+
+def _within(ends: Sequence[float]) -> dict[str, Any]:
+    """A place along the axis, inside the range that was measured: at its end a threshold's slope has no bound."""
+    low, high = ends
+    margin = _MARGIN * (high - low)
+    return {"low": float(f"{low + margin:.6g}"), "high": float(f"{high - margin:.6g}")}
 
 
 _BENDING = {  # what lies on a logarithmic scale

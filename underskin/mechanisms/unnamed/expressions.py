@@ -205,7 +205,8 @@ def _of_frequency(law: FrequencyLaw, values: Numbers) -> str:
         case "delay":
             return f"FRF = FRF0·exp(−i·{said('law_lag')}·f/{number(law.middle_hz)} Hz)"
         case "high_pass":
-            return f"FRF = FRF0·(1 + {said('law_corner')} Hz/(i·f))^(−{said('law_exponent')})"
+            power = number(-values["law_exponent"])
+            return f"FRF = FRF0·(1 + {said('law_corner')} Hz/(i·f))^({power})"
         case "magnitude":
             return f"FRF = FRF0·(i·f/{number(law.middle_hz)} Hz)^{said('law_exponent')}"
         case "step":
