@@ -3,11 +3,14 @@
 import json
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from underskin.errors import InvalidInput, UnderskinError
+
+if TYPE_CHECKING:
+    from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="Mechanisms of the lab's own, kept in files.")
 
@@ -33,7 +36,7 @@ def check(files: Annotated[list[Path], typer.Argument(help="Files of mechanisms 
             failed = True
             typer.echo(f"underskin: {error}", err=True)
         else:
-            typer.echo(f"{file}: {mechanism} can be used")
+            typer.echo(f"{file}: {mechanism.name} can be used {_on(mechanism)}")
     if failed:
         raise typer.Exit(2)
 
@@ -67,7 +70,17 @@ def save(
     typer.echo(str(file))
 
 
-def _read(file: Path) -> str:
+def _on(mechanism: "DeclaredMechanism") -> str:
+    """On what, with the columns of `conditions` that it reads: a name that nobody records is a slip."""
+    from underskin.mechanisms.declared.mechanism import FREQUENCY
+    from underskin.mechanisms.unnamed.axes import BUILT_IN
+
+    own = [name for name in mechanism.axes if name not in (*BUILT_IN, FREQUENCY)]
+    columns = f", by {' and '.join(own)} of their conditions" if own else ""
+    return ("on FRFs" if "frf" in mechanism.kinds else "on indentation curves") + columns
+
+
+def _read(file: Path) -> "DeclaredMechanism":
     from underskin.mechanisms.contract import check_numbers
     from underskin.mechanisms.declared.document import parse
 
@@ -77,4 +90,4 @@ def _read(file: Path) -> str:
         raise UnderskinError(f"{file}: cannot be opened: {error.strerror}") from error
     mechanism = parse(data, str(file))
     check_numbers(mechanism)
-    return mechanism.name
+    return mechanism

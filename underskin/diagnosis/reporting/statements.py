@@ -137,7 +137,7 @@ def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None
     if law is not None:
         added = f"this law and {in_words(law)}" if law else "this law"
     beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
-    return f"{said}{beside}."
+    return f"{said}{beside}." + (f" {_modulus(after)}" if added and "youngs_modulus" in after else "")
 
 
 def power_statement(power: Sequence[Power], kind: Kind) -> str:
