@@ -3,12 +3,14 @@
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+from anyio import to_thread
 from fastapi import APIRouter, Depends, FastAPI, Security
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
 from service import pages
 from service.auth.access_control import AccessControl
+from service.auth.login_throttle import LoginThrottle
 from service.dependencies import authorised
 from service.ingest.uploads import UploadFolder
 from service.jobs import Planner, Runner, WorkerProcesses
@@ -37,6 +39,7 @@ from service.routes import (
 from service.routes.query_guard import known_query
 from service.settings import Settings
 from service.store import Database
+from service.store.write_turns import THREADS
 from underskin import __version__
 from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 
@@ -46,6 +49,7 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state = api.state
     state.uploads = UploadFolder(state.settings.data)
     state.pending_uploads = PendingUploads(state.uploads.path, state.settings.max_upload_bytes)
+    to_thread.current_default_thread_limiter().total_tokens = THREADS
     state.access.requirement.start()
     state.runner.start()
     yield
@@ -71,6 +75,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.settings = settings
     api.state.table = table
     api.state.access = access
+    api.state.login_throttle = LoginThrottle()
     api.state.store = store
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
     processes = WorkerProcesses(

@@ -15,6 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Literal
 
+from service import durable
 from service.settings import make_data_folder
 from underskin.errors import not_one_of, not_unique
 
@@ -167,4 +168,4 @@ def _write(path: Path, keys: list[Key]) -> None:
         file.write(text)
         file.flush()
         os.fsync(file.fileno())
-    Path(partial).replace(path)
+    durable.replace(Path(partial), path)

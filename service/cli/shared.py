@@ -1,5 +1,6 @@
 """What the commands share: settings, and how a command fails."""
 
+import os
 from typing import NoReturn
 
 import typer
@@ -19,7 +20,8 @@ def fail(reason: str) -> NoReturn:
 
 
 def read_settings() -> Settings:
-    """The settings; a wrong one ends the command."""
+    """The settings; a wrong one ends the command. What the command writes from here on is its owner's alone."""
+    os.umask(0o077)
     try:
         return Settings()
     except ValidationError as error:

@@ -17,7 +17,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import AccessControl
 from service.middleware.error_handlers import ProblemPage, problem_response
-from service.middleware.request_log import Answered, record
+from service.middleware.request_log import KEY, Answered, record
 from service.problems import Refusal, unexpected
 
 logger = logging.getLogger("underskin")
@@ -79,7 +79,7 @@ class AsgiMiddleware:
         record(Answered(time.time(), request_id, method, route, path, exchange.status, seconds, key, why))
 
     def _request_id(self, sent: bytes | None) -> str:
-        if sent is not None and _SANE_ID.fullmatch(sent):
+        if sent is not None and _SANE_ID.fullmatch(sent) and not KEY.search(sent.decode()):
             return sent.decode()
         return f"{self._prefix}-{next(self._numbers):x}"
 
@@ -88,6 +88,8 @@ class AsgiMiddleware:
     ) -> None:
         """Check access, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
+        if sum(name == b"host" for name, _ in scope["headers"]) > 1:  # a proxy may have checked the other one
+            raise Refusal(400, "The request has several Host headers; it must have one.")
         scope["key"] = self._access.check(method, path, headers)
         hot = self._hot.get((method, path))
         limited = self._limited(receive, path, headers)

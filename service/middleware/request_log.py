@@ -17,7 +17,7 @@ from service.auth.keys import Key
 _DELAY_S = 0.2
 
 _LONGEST_WHY = 300
-_KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
+KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
 
 _seconds = Histogram(
     "underskin_request_seconds",
@@ -68,7 +68,7 @@ def _series(method: str, route: str, status: int) -> Histogram:
 
 
 def _line(request: Answered) -> bytes:
-    path = request.path[:200]
+    path = KEY.sub("us_…", request.path)[:200]
     fields = {
         "time": datetime.fromtimestamp(request.ended, UTC),
         "level": "info",
@@ -83,5 +83,5 @@ def _line(request: Answered) -> bytes:
         "key": request.key.name if request.key else None,
     }
     if request.why is not None:
-        fields["error"] = _KEY.sub("us_…", request.why)[:_LONGEST_WHY]
+        fields["error"] = KEY.sub("us_…", request.why)[:_LONGEST_WHY]
     return orjson.dumps(fields, option=orjson.OPT_APPEND_NEWLINE)

@@ -13,6 +13,7 @@ from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
+from service import durable
 from service.store.engine import Database
 from service.store.errors import StoreError
 from service.store.tables import metadata
@@ -40,9 +41,10 @@ def make(database: Database, file: Path) -> None:
         verify(database, part)
         with part.open("rb") as written:
             os.fsync(written.fileno())
-        part.replace(file)
+        durable.replace(part, file)
     finally:
-        part.unlink(missing_ok=True)
+        for suffix in ("", "-journal", "-wal", "-shm"):  # SQLite's own, where it ended half way
+            part.with_name(part.name + suffix).unlink(missing_ok=True)
 
 
 def verify(database: Database, file: Path) -> str:

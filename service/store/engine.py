@@ -4,7 +4,7 @@ import errno
 import fcntl
 import sqlite3
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 
@@ -15,6 +15,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError
 
 from service.store.errors import StoreError
 from service.store.sqlite_files import SqliteFiles
+from service.store.write_turns import WAIT_S, WriteTurns
 
 SQLITE_FILE = "underskin.sqlite3"
 _PG_DISK_FULL = "53100"
@@ -37,6 +38,9 @@ class Database:
         self.url = url
         self._files = SqliteFiles(Path(url.database or "")) if url.get_backend_name() == "sqlite" else None
         self.engine = _engine(url, self._files)
+        # PostgreSQL's writers wait on their connections: readers have others
+        self._writers = self.engine if self.is_sqlite else _engine(url, None)
+        self._turns = WriteTurns()
 
     @property
     def is_sqlite(self) -> bool:
@@ -73,13 +77,13 @@ class Database:
     def writing(self) -> Iterator[Connection]:
         """A transaction that commits at the end of the block.
 
-        Raises StorageFull where there was no room, StoreMoved where it would be kept in a file that is not the one on
-        the disk.
+        Raises OperationalError where others write for too long, or too many wait to; StorageFull where there was no
+        room; StoreMoved where it would be kept in a file that is not the one on the disk.
         """
-        sole_writer = self._locked_file() if self.is_sqlite else nullcontext()
         try:
-            with sole_writer, self.engine.connect().execution_options(write=True) as connection, connection.begin():
+            with self._turn(), self._writers.connect().execution_options(write=True) as connection, connection.begin():
                 if not self.is_sqlite:
+                    connection.execute(text(f"SET LOCAL lock_timeout = '{WAIT_S:g}s'"))
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
                 self.require_in_place()
@@ -116,16 +120,32 @@ class Database:
                 connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": number})
 
     @contextmanager
-    def _locked_file(self) -> Iterator[None]:
+    def _turn(self) -> Iterator[None]:
         """SQLite has one writer at a time anyway; this lock also covers what SQLite's own cannot span, a restore."""
-        self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
-        with Path(f"{self.url.database}.lock").open("a") as lock:
+        with self._turns.place():
+            if not self.is_sqlite:
+                yield
+                return
+            self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
+            with self._turns.sole(self._lock_file):
+                yield
+
+    @property
+    def _lock_file(self) -> Path:
+        return Path(f"{self.url.database}.lock")
+
+    @contextmanager
+    def _locked_file(self) -> Iterator[None]:
+        """For a restore, which waits as long as it takes."""
+        self.require_in_place()
+        with self._lock_file.open("a") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             yield
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+        self._writers.dispose()
         if self._files is not None:
             self._files.close()
 

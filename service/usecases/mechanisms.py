@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sqlalchemy import Connection
 
+from service import durable
 from service.problems import Refusal
 from service.schemas.mechanisms import MechanismEntry, MechanismParameter
 from service.store import diagnoses, models
@@ -101,6 +102,8 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         if parse(file.read_bytes(), str(file)).name == name:
             (folder / _DISCARDED).mkdir(exist_ok=True)
             file.rename(folder / _DISCARDED / f"{file.stem} {now().replace(':', '')}.yaml")
+            durable.keep_entries(folder / _DISCARDED)
+            durable.keep_entries(folder)
     discarded = _entry(mechanism)
     catalogue()
     return discarded
@@ -120,6 +123,7 @@ def _write(folder: Path, file: Path, content: bytes) -> None:
         new.flush()
         os.fsync(new.fileno())
         os.link(new.name, file)
+    durable.keep_entries(folder)
 
 
 def _entry(mechanism: Mechanism) -> MechanismEntry:

@@ -1,5 +1,6 @@
 """Logging in with a key, where keys are needed."""
 
+import math
 from typing import Annotated
 from urllib.parse import quote
 
@@ -7,8 +8,10 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
 from service.auth.access_control import AccessControl
+from service.auth.login_throttle import LoginThrottle
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, set_session
+from service.problems import Refusal
 
 router = APIRouter()
 
@@ -26,9 +29,17 @@ def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> R
 def login(request: Request, sent: Form) -> Response:
     """Starts a session."""
     access: AccessControl = request.app.state.access
+    throttle: LoginThrottle = request.app.state.login_throttle
+    address = request.client.host if request.client else ""
+    wait_s = throttle.wait_s(address)
+    if wait_s:
+        seconds = math.ceil(wait_s)
+        again = f"Too many keys from this address were wrong: try again in {seconds} s."
+        raise Refusal(429, again, title="Too many tries", headers={"Retry-After": str(seconds)})
     key = access.key_of_login(sent.get("key", ""))
     back = sent.get("next", "/")
     if key is None:
+        throttle.failed(address)
         request.scope["why"] = "the key that was typed is not known"
         return page(request, "login.html", status=401, back=back, refused=True, missing=access.keys_missing())
     answer = see(_own(back))

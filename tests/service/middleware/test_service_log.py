@@ -153,3 +153,15 @@ def test_metrics_are_prometheus_text(own: Server) -> None:
     answer = httpx.get(f"{own.url}/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=")
     assert series(own.url)["process_resident_memory_bytes"] > 1e7
+
+
+KEY = "us_0123456789abcdefABCDEF"  # of a key's shape
+
+
+@pytest.mark.parametrize("path", ["/v1/skins/" + KEY, "/" + KEY])
+def test_a_key_in_a_path_or_a_request_id_does_not_reach_the_log(own: Server, path: str) -> None:
+    answer = httpx.get(own.url + path, headers={"X-Request-ID": KEY})
+    assert answer.headers["x-request-id"] != KEY
+    (line,) = lines_of(own.log, answer.headers["x-request-id"])
+    assert line["path"] == path.replace(KEY, "us_…")
+    assert KEY not in own.log.read_text()

@@ -142,3 +142,12 @@ def test_nothing_odd_was_a_failure_of_the_server(shared_server: Server, http: ht
     assert http.get("/health").status_code == 200
     assert 'status="500"' not in http.get("/metrics").text
     assert "Traceback" not in shared_server.log.read_text()
+
+
+@pytest.mark.parametrize("path", ["/health", ONE_SIGMA])
+def test_two_host_headers_are_refused(shared_server: Server, path: str) -> None:
+    """A proxy may have looked at the other one."""
+    with connect(shared_server) as connection:
+        connection.sendall(f"GET {path} HTTP/1.1\r\n{HEAD}Host: skin.example.org\r\n\r\n".encode())
+        status, *_ = read_answer(connection)
+    assert status == 400

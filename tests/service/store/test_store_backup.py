@@ -38,6 +38,20 @@ def test_a_backup_brings_back_what_was_there(server: Server, tmp_path: Path) -> 
     assert names(server) == {"before", "after"}
 
 
+def test_what_the_service_writes_is_its_owners_alone_and_nothing_lies_beside_a_backup(
+    server: Server, tmp_path: Path
+) -> None:
+    file = tmp_path / "shared" / "kept.backup"
+    file.parent.mkdir()
+    for suffix in (".part", ".part-journal"):  # of a backup that was killed
+        file.with_name(file.name + suffix).write_bytes(b"half")
+    send(server, "kept")
+    assert server.place.command("backup", str(file)).returncode == 0
+    assert [entry.name for entry in file.parent.iterdir()] == [file.name]
+    ours = [file, *(entry for entry in server.place.folder.rglob("*") if entry.is_file())]
+    assert {entry.name: entry.stat().st_mode & 0o077 for entry in ours if entry.stat().st_mode & 0o077} == {}
+
+
 def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> None:
     if server.place.database_url:
         return  # the other machine would be another database: the next line's restore is the same

@@ -1,0 +1,19 @@
+"""Files put in place so that a power cut leaves either the old one or the new one, whole."""
+
+import os
+from pathlib import Path
+
+
+def replace(written: Path, place: Path) -> None:
+    """Put a file that was written, and flushed to the disk, in the place of another; durable once this returns."""
+    written.replace(place)
+    keep_entries(place.parent)
+
+
+def keep_entries(folder: Path) -> None:
+    """Have the disk keep which files a folder holds: a rename, or a new name, is lost with the power until then."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

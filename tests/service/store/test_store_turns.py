@@ -1,0 +1,95 @@
+"""Writers that wait for another's lock: readers are answered meanwhile, and nobody waits for ever."""
+
+import fcntl
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
+
+from service.store import Database, open_store, write_turns
+from tests.support.store_server import Place, Server, campaign
+
+WRITERS = 45
+
+
+@contextmanager
+def locked(place: Place) -> Iterator[None]:
+    """While another process has what a restore has."""
+    with closing(store_of(place)) as store, store.without_writers():
+        yield
+
+
+def store_of(place: Place) -> Database:
+    return open_store(place.database_url, place.folder)
+
+
+def test_readers_are_answered_while_writers_wait(server: Server) -> None:
+    sent = server.http.post("/v1/campaigns", json=campaign("excluded")).json()
+    path = f"{server.http.base_url}/v1/campaigns/{sent['id']}/exclusions"
+    document = {"recording": campaign("excluded")["recordings"][0]["id"], "reason": "slipped"}
+
+    def write() -> int:
+        return httpx.post(path, json=document, timeout=60).status_code
+
+    with ThreadPoolExecutor(WRITERS) as pool:
+        with locked(server.place):
+            waiting = [pool.submit(write) for _ in range(WRITERS)]
+            time.sleep(1.0)
+            assert not any(one.done() for one in waiting)
+            for read in ("/ready", "/health", "/v1/campaigns", "/v1/skins", "/"):
+                began = time.monotonic()
+                assert server.http.get(read, timeout=10).status_code == 200
+                assert time.monotonic() - began < 2.0
+        answers = [one.result() for one in waiting]
+    assert {200, 201} & set(answers)
+    assert max(answers) < 500
+
+
+def test_a_write_that_waits_too_long_is_refused_and_keeps_nothing(
+    place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(write_turns, "WAIT_S", 0.3)
+    monkeypatch.setattr("service.store.engine.WAIT_S", 0.3)
+    with closing(store_of(place)) as store:
+        began = time.monotonic()
+        with locked(place), pytest.raises(OperationalError), store.writing():
+            raise AssertionError("nobody else may write")
+        assert 0.2 < time.monotonic() - began < 5.0
+        with store.writing() as connection:
+            assert connection.execute(text("SELECT 1")).scalar() == 1
+
+
+def test_no_more_wait_than_there_are_places(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(write_turns, "_FOR_A_PLACE_S", 0.1)
+    with closing(store_of(place)) as store, ExitStack() as stack:
+        for _ in range(write_turns.MOST_WAITING):
+            stack.enter_context(store._turns.place())
+        with pytest.raises(OperationalError), store.writing():
+            raise AssertionError("there was no place")
+
+
+def test_turns_are_taken_one_at_a_time(tmp_path: Path) -> None:
+    turns, inside, most = write_turns.WriteTurns(), [], []
+
+    def write() -> None:
+        with turns.place(), turns.sole(tmp_path / "lock"):
+            inside.append(threading.get_ident())
+            most.append(len(inside))
+            time.sleep(0.002)
+            inside.pop()
+
+    writers = [threading.Thread(target=write) for _ in range(20)]
+    for one in writers:
+        one.start()
+    for one in writers:
+        one.join()
+    assert most == [1] * 20
+    with (tmp_path / "lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)  # free again
