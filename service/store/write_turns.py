@@ -14,7 +14,7 @@ from sqlalchemy.exc import OperationalError
 WAIT_S = 20.0  # for others' writes, a restore included; then the client is asked to come again
 MOST_WAITING = 64  # of the threads of a process (`THREADS`)
 THREADS = 2 * MOST_WAITING  # that answer requests
-_FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
+FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
 _LOOK_S = 0.005  # how often another process' lock is looked at
 
 
@@ -29,7 +29,7 @@ class WriteTurns:
     @contextmanager
     def place(self) -> Iterator[None]:
         """A place among those that write or wait for a turn; raises OperationalError where none gets free soon."""
-        if not self._places.acquire(timeout=_FOR_A_PLACE_S):
+        if not self._places.acquire(timeout=FOR_A_PLACE_S):
             raise _busy()
         try:
             yield

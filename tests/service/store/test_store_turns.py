@@ -66,13 +66,16 @@ def test_a_write_that_waits_too_long_is_refused_and_keeps_nothing(
             assert connection.execute(text("SELECT 1")).scalar() == 1
 
 
-def test_no_more_wait_than_there_are_places(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(write_turns, "_FOR_A_PLACE_S", 0.1)
-    with closing(store_of(place)) as store, ExitStack() as stack:
+def test_no_more_wait_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(write_turns, "FOR_A_PLACE_S", 0.1)
+    turns = write_turns.WriteTurns()
+    with ExitStack() as stack:
         for _ in range(write_turns.MOST_WAITING):
-            stack.enter_context(store._turns.place())
-        with pytest.raises(OperationalError), store.writing():
+            stack.enter_context(turns.place())
+        with pytest.raises(OperationalError), turns.place():
             raise AssertionError("there was no place")
+    with turns.place():
+        pass
 
 
 def test_turns_are_taken_one_at_a_time(tmp_path: Path) -> None:
