@@ -17,7 +17,8 @@ from underskin.diagnosis.reporting.numbers import parameter
 from underskin.mechanisms.base import Kind
 from underskin.prediction.forward_model import predict
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
-from underskin.recordings.conditions import Conditions, IndentationConditions
+from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
+from underskin.recordings.curve_course import course
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 
@@ -178,3 +179,21 @@ def test_a_compression_has_no_jumps_and_one_model_where_nothing_is_added() -> No
     assert {trace.meta["shows"] for trace in figure.data} == {"measured", "after", "residual after", "contact point"}
     assert figure.layout.xaxis2.title.text == "displacement from the contact point [mm]"
     assert figure.layout.title.text == "Force against displacement"
+
+
+def test_the_contact_point_lies_on_the_way_in_whatever_the_cell_drifts() -> None:
+    random = np.random.default_rng(2)
+    depth = np.concatenate([np.linspace(-0.1, 0.2, 300), np.linspace(0.2, -0.1, 300)])
+    hertz = 16 / 9 * 2.0 * np.sqrt(5.0) * np.maximum(depth, 0) ** 1.5
+    drift = np.linspace(0.0, 0.4, len(depth)) * hertz.max()
+    force = hertz + drift + 1e-3 * hertz.max() * random.normal(size=len(depth))
+    skin = SkinDescription(poisson_ratio=0.5)
+    campaign = Campaign("c", skin, (IndentationRecording("i", 5.0, depth, force, time_s=np.linspace(0, 60, 600)),))
+    problem = FittingProblem(curve_lines(campaign, "indentation"), load_table())
+    (null,) = problem.explain([Request(())])
+    assert null is not None
+    (curve,) = shown_curves(problem, campaign, null, null)
+    at = int(np.argmax(depth > 0.0))
+    zero = course(depth, force, np.linspace(0, 60, 600)).zero
+    assert curve.after.contact.displacement_mm == pytest.approx(0.0, abs=5e-3)
+    assert curve.after.contact.force_n == pytest.approx(drift[at] - zero, abs=0.02 * hertz.max())

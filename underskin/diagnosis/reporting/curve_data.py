@@ -91,8 +91,10 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
         assert isinstance(entry, CurveRecording)
         contact = float(explanation.point.fit[place_of(explanation, f"contact_point {entry.id}")])
-        nearest = int(np.abs(entry.displacement_mm - contact).argmin())
-        predicted.append(CurvePrediction(reading[own], Mark(contact, float(cell.offset[own][nearest]))))
+        # What the cell shows in the air just before, a drift included, whatever describes it
+        in_air = np.flatnonzero(entry.displacement_mm[: int(entry.displacement_mm.argmax()) + 1] <= contact)
+        shown = reading[own][in_air[-1]] if len(in_air) else cell.offset[own][0]
+        predicted.append(CurvePrediction(reading[own], Mark(contact, float(shown))))
     return predicted
 
 
