@@ -15,7 +15,7 @@ from underskin.diagnosis.inference.curve_starts import between_samples
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation.cross_validation import PredictionScore
 from underskin.diagnosis.validation.imitation import unseen
 from underskin.diagnosis.validation.residual_noise import keeps_structure

@@ -15,8 +15,8 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference import least_squares
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import PRIORS
-from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.cross_validation import PredictionScore, groups, hold_out
 from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable, load_table

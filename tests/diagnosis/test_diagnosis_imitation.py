@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation.imitation import Imitation, imitation
 from underskin.recordings.campaign import IndentationRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table

@@ -17,7 +17,8 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.next_experiment import next_experiment
-from underskin.diagnosis.selection.search import Answer, Search, search
+from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.selection.search import search
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording

@@ -14,8 +14,8 @@ from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.numbers import parameter, without_effect
 from underskin.diagnosis.reporting.report import DiagnosisResult, verdict
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import SHOWS
-from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.validation.power import least_chi2, power
 from underskin.diagnosis.validation.signatures import Signatures
 from underskin.mechanisms import compose

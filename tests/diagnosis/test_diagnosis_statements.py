@@ -17,8 +17,8 @@ from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
+from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
-from underskin.diagnosis.selection.search import Answer
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from underskin.errors import FileError
+from tests.support.declared_documents import refusal
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.models.indentation import IndentationModel
@@ -123,7 +123,6 @@ def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campai
     ],
 )
 def test_what_cannot_act_on_curves_is_refused_with_its_line(old: str, new: str, line: int, said: str) -> None:
-    with pytest.raises(FileError) as refused:
-        parse(BENT.replace(old, new).encode(), "lab.yaml")
-    assert said in str(refused.value)
-    assert f"line {line}" in str(refused.value)
+    error = refusal(BENT.replace(old, new))
+    assert error.place == f"line {line}"
+    assert said in error.reason

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.support.declared_documents import refusal
 from underskin.autodiff import Differentiated
 from underskin.cli.mechanism import app
-from underskin.errors import FileError, InvalidInput
+from underskin.errors import InvalidInput
 from underskin.mechanisms.declared import saving
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.expressions import read
@@ -45,12 +46,6 @@ def campaign() -> Campaign:
         assert isinstance(entry, FrfRecording)
         recordings.append(replace(entry, conditions={"temperature_c": 20.0 + 0.7 * number}))
     return replace(reference_campaign("frf"), recordings=tuple(recordings))
-
-
-def refusal(text: str) -> FileError:
-    with pytest.raises(FileError) as refused:
-        parse(text.encode(), "lab.yaml")
-    return refused.value
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -13,16 +9,9 @@ import pytest
 from rig.unlisted.contact_pressure import adhesive_contact, force_over_hertz, layered_contact
 from rig.unlisted.elastic_layer import layer_transfer
 from rig.unlisted.layer import base_stress, hertz_radius, hertz_transform, punch_transform, sigma, transfer
+from tests.support.oracle import oracle_rows
 
 Array = npt.NDArray[np.float64]
-
-
-def _oracle(name: str) -> list[dict[str, str]]:
-    folder = os.environ.get("UNDERSKIN_ORACLE")
-    if not folder or not (Path(folder) / name).exists():
-        pytest.skip("UNDERSKIN_ORACLE does not name a folder with the exact values")
-    with (Path(folder) / name).open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
 
 
 def test_bonded_incompressible_layer_is_the_closed_form() -> None:
@@ -44,7 +33,7 @@ def test_frictionless_glue_line(offset: float, exact: float) -> None:
 @pytest.mark.parametrize("quantity", ["sigma_hertz", "sigma_edge"])
 def test_any_layer_against_the_exact_values(quantity: str) -> None:
     """The oracle's glue stiffness is kappa/2."""
-    rows = [r for r in _oracle("linear_layer.csv") if r["quantity"] == quantity]
+    rows = [r for r in oracle_rows("linear_layer.csv") if r["quantity"] == quantity]
     form = hertz_transform if quantity == "sigma_hertz" else punch_transform
     for case in sorted({(r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) for r in rows}):
         same = [r for r in rows if (r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) == case]

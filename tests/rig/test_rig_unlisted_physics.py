@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -19,20 +15,13 @@ from rig.unlisted.layer import (
     transfer,
 )
 from rig.unlisted.response import REFERENCE_HZ, MinimumPhase, frequency_law
-
-
-def _oracle(name: str) -> list[dict[str, str]]:
-    folder = os.environ.get("UNDERSKIN_ORACLE")
-    if not folder or not (Path(folder) / name).exists():
-        pytest.skip("UNDERSKIN_ORACLE does not name a folder with the exact values")
-    with (Path(folder) / name).open(encoding="utf-8") as stream:
-        return list(csv.DictReader(stream))
+from tests.support.oracle import oracle_rows
 
 
 def test_sigma_against_the_exact_layer() -> None:
     rows = [
         r
-        for r in _oracle("linear_layer.csv")
+        for r in oracle_rows("linear_layer.csv")
         if (r["quantity"], r["poisson_ratio"], r["glue_stiffness_h_over_2g"]) == ("sigma_hertz", "0.5", "inf")
     ]
     a, rho, e, exact = (
@@ -48,7 +37,7 @@ def test_sigma_of_four_published_cases() -> None:
 
 
 def test_stiffness_against_the_exact_sphere() -> None:
-    rows = _oracle("sphere_on_layer.csv")
+    rows = oracle_rows("sphere_on_layer.csv")
     a, exact = (np.array([float(r[k]) for r in rows]) for k in ("a_over_h", "stiffness_over_hertz"))
     np.testing.assert_allclose(stiffness_ratio(a), exact, rtol=1e-6)
 

@@ -24,8 +24,9 @@ from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.noise_refinement import frf_problem
-from underskin.diagnosis.selection.search import Search, search
+from underskin.diagnosis.selection.search import search
 from underskin.diagnosis.selection.unnamed_search import law_of, with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open

@@ -18,7 +18,7 @@ import numpy as np
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
-from underskin.diagnosis.selection.search import Answer, Search
+from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE

@@ -8,7 +8,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 

@@ -26,7 +26,7 @@ from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power

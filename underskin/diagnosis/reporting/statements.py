@@ -15,7 +15,7 @@ from underskin.diagnosis.localisation.residual_shape import (
     Shape,
     ShapeForm,
 )
-from underskin.diagnosis.selection.search import Answer
+from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.identifiability import Likeness
 from underskin.diagnosis.validation.power import Power
 from underskin.findings.english import lacking

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.reporting.numbers import parameter, rounded
-from underskin.diagnosis.selection.search import Search
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.unnamed_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.axes import Axis

@@ -11,9 +11,9 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
+from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.curve_law_screening import CurveScreening
 from underskin.diagnosis.selection.priors import least_evidence
-from underskin.diagnosis.selection.search import Search
 from underskin.diagnosis.selection.unnamed_screening import Score, Screening
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.grammar import Grammar, combination

@@ -13,7 +13,7 @@ import numpy as np
 
 from underskin.diagnosis.noise.correlated_error import TYPICAL
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
-from underskin.diagnosis.selection.search import Answer
+from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.signatures import Signatures
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.recordings.usual_scatter import USUAL_GAIN

@@ -1,0 +1,210 @@
+"""How probable each set of mechanisms that was fitted is, and the answers that follow."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
+from underskin.diagnosis.selection.priors import least_evidence, log_prior, log_prior_beneath
+from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
+from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.units import Floats
+
+_OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
+_IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
+_UNTHOUGHT = 0.015  # probability that none of what was compared is right
+_EQUAL = 0.01  # nats, within which laws are equally probable
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One of the rivals and its posterior probability: a set of mechanisms (maybe none), or `none_of_these`."""
+
+    explanation: Explanation | None  # None for none_of_these
+    probability: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As a report names it."""
+        if self.explanation is None:
+            return (NONE_OF_THESE,)
+        return self.explanation.names or (NOTHING_MISSING,)
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
+
+    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_noise.py);
+    their probability, or of curves most of it, is that of `none_of_these`. `imitating`: the odds of an unlisted law
+    that looks like a set on these recordings, or does not show; `none_of_these` has them beside the leading set.
+    """
+
+    explanations: tuple[Explanation, ...]
+    discrepancies: tuple[tuple[Explanation, Discrepancy], ...]
+    unsupported: dict[str, str]
+    contradicted: frozenset[tuple[str, ...]] = frozenset()
+    imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
+    laws: tuple[Explanation, ...] = ()  # sets with one law that nobody listed
+    tried: int = 0  # sets, of which the explanations are those that were not left out early
+
+    @property
+    def supported(self) -> int:
+        """How many mechanisms the campaign supports."""
+        lines = self.explanations[0].best.hypothesis.lines
+        return len(lines.mechanisms.named) - len(self.unsupported)
+
+    def log_weight(self, explanation: Explanation) -> float:
+        """Prior times evidence; a law that nobody listed gains nothing by a narrower prior than mechanisms have."""
+        weight = explanation.log_evidence + self.log_prior(explanation)
+        if not self._holds_law(explanation):
+            return weight
+        rival = self._rival_of_size.get(len(explanation.names))
+        occam = explanation.log_evidence - fit_and_plausibility(explanation)
+        return weight if rival is None else weight - max(0.0, occam - rival)
+
+    @cached_property
+    def _rival_of_size(self) -> dict[int, float]:
+        """Occam's factor of the best set of mechanisms of each size, in nats."""
+        best: dict[int, Explanation] = {}
+        for entry in self.explanations:
+            size = len(entry.names)
+            if size not in best or entry.log_evidence > best[size].log_evidence:
+                best[size] = entry
+        return {size: entry.log_evidence - fit_and_plausibility(entry) for size, entry in best.items()}
+
+    @staticmethod
+    def _holds_law(explanation: Explanation) -> bool:
+        known = explanation.best.hypothesis.lines.mechanisms
+        return any(name not in known.named for name in explanation.names)
+
+    def log_prior(self, explanation: Explanation) -> float:
+        """The logarithm of its prior; a law that nobody listed has its share of that of something undescribed."""
+        known = explanation.best.hypothesis.lines.mechanisms
+        laws = [known[name] for name in explanation.names if name not in known.named]
+        if not laws:
+            return log_prior(len(explanation.names), self.supported)
+        prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
+        return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+
+    def log_prior_beneath(self, explanation: Explanation) -> float:
+        """The logarithm of the prior of a law that nobody listed on top of a set."""
+        return log_prior_beneath(len(explanation.names), self.supported) + math.log(_OF_LAWS)
+
+    def shows(self, explanation: Explanation) -> bool:
+        """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
+        no more than the smaller one, which stands for both."""
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in (*self.explanations, *self.laws)}
+        whole = frozenset(explanation.names)
+        smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
+        return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
+
+    def shown_or_nothing(self, answer: Answer) -> Explanation:
+        """The explanation that an answer stands on: for `none_of_these` the best law that nobody listed, or else the
+        one beneath its best process."""
+        if answer.explanation is not None:
+            return answer.explanation
+        if self.law is not None:
+            return self.law
+        beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
+        return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
+
+    def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
+        prior = log_prior_beneath(len(explanation.names), self.supported) + math.log(1 - _OF_LAWS)
+        return process.log_evidence + prior
+
+    @cached_property
+    def processes_showing(self) -> list[tuple[Explanation, float]]:
+        """The set beneath each process that shows, and the logarithm of its prior times evidence."""
+        return [
+            (entry, self._log_weight_beneath(entry, process))
+            for entry, process in self.discrepancies
+            if process.log_evidence > entry.log_evidence + least_evidence(entry)
+        ]
+
+    @cached_property
+    def law(self) -> Explanation | None:
+        """The most probable set with a law that nobody listed, each member of which shows.
+
+        Of equals that over the order of the recordings, which times and load cycles follow.
+        """
+        showing = [entry for entry in self.laws if self.shows(entry)]
+        best = max(map(self.log_weight, showing), default=0.0)
+        equal = [entry for entry in showing if self.log_weight(entry) > best - _EQUAL]
+        return max(equal, key=lambda entry: (self._follows_order(entry), self.log_weight(entry)), default=None)
+
+    @staticmethod
+    def _follows_order(explanation: Explanation) -> bool:
+        known = explanation.best.hypothesis.lines.mechanisms
+        laws = [known[name] for name in explanation.names]
+        return any(isinstance(law, UnnamedLaw) and law.spoken.axis == "order" for law in laws)
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """The rivals, the most probable first; their probabilities sum to 1.
+
+        `none_of_these` is always one of them, with its evidence where a process shows, and at least with the share that
+        stays for what neither laws nor processes here can be.
+        """
+        kept = [entry for entry in self.explanations if self.shows(entry)]
+        weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
+        for entry, weight in self._possible_beside(kept, weights):
+            kept.append(entry)
+            weights.append(weight)
+        showing = [weight for _, weight in self.processes_showing]
+        showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
+        weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
+        probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        probabilities[-1] += _UNTHOUGHT
+        left = [self._left_to(entry) for entry in kept]
+        probabilities[-1] += ((1 - np.array(left)) * probabilities[:-1]).sum()
+        probabilities = self._beside_unlisted(kept, probabilities * [*left, 1.0])
+        rivals: list[Explanation | None] = [*kept, None]
+        answers = [
+            Answer(rivals[number], float(probabilities[number])) for number, share in enumerate([*left, 1.0]) if share
+        ]
+        return sorted(answers, key=lambda answer: -answer.probability)
+
+    def _possible_beside(
+        self, kept: Sequence[Explanation], weights: Sequence[float]
+    ) -> list[tuple[Explanation, float]]:
+        """Of indentations: the sets with one mechanism more than one of these that gain evidence, but less than shows.
+
+        So little is no evidence, as laws of contact idealise, but no reason against the mechanism either: beside the
+        smaller set each has the weight of its prior.
+        """
+        if self.explanations[0].best.hypothesis.lines.kind != "indentation":
+            return []
+        evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
+        own = {frozenset(entry.names): weight for entry, weight in zip(kept, weights, strict=True)}
+        possible = []
+        for entry in self.explanations:
+            whole = frozenset(entry.names)
+            smaller = [whole - {name} for name in whole if whole - {name} in own]
+            if whole in own or not smaller or any(evidence[less] >= entry.log_evidence for less in smaller):
+                continue
+            more = self.log_prior(entry) - log_prior(len(whole) - 1, self.supported)
+            possible.append((entry, max(own[less] for less in smaller) + more))
+        return possible
+
+    def _left_to(self, explanation: Explanation) -> float:
+        """The share that stays of a probability: all, unless the residual contradicts the explanation; of curves a
+        little even then, since laws of contact idealise and fits may miss."""
+        if explanation.names not in self.contradicted:
+            return 1.0
+        return _IDEALISED if explanation.names and explanation.best.hypothesis.lines.curves else 0.0
+
+    def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
+        """With at least the unlisted laws that the leading set imitates among `none_of_these`, the last: some of them
+        were fitted."""
+        leader = int(np.argmax(probabilities))
+        if leader == len(kept):
+            return probabilities
+        beside = probabilities.copy()
+        beside[-1] = max(beside[-1], self.imitating.get(kept[leader].names, 0.0) * probabilities[leader])
+        return np.asarray(beside / beside.sum())
