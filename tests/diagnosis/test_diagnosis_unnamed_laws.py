@@ -344,7 +344,7 @@ def test_every_law_of_the_grammar_can_be_put_into_words(warming: Campaign, table
     (nothing,) = problem.explain([Request(())])
     assert nothing is not None
     frequency = problem.lines.frequency
-    grammar = Grammar.of(problem.collapsed.campaign, frequency, table, tuple(CATALOGUE.values()))
+    grammar = Grammar.of(problem.collapsed.campaign, frequency, table, tuple(CATALOGUE.values()), CATALOGUE)
     for law in grammar.laws:
         values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
         assert LeadingLaw(law, values, nothing).form in get_args(Form), law.name

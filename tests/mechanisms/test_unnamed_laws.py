@@ -43,7 +43,7 @@ def campaign() -> Campaign:
 
 @pytest.fixture(scope="module")
 def grammar(campaign: Campaign, table: SigmaTable) -> Grammar:
-    return Grammar.of(campaign, lines_of(campaign), table, tuple(CATALOGUE.values()))
+    return Grammar.of(campaign, lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE)
 
 
 def lines_of(conditions: Conditions) -> Floats:
@@ -275,7 +275,9 @@ def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, ta
         replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
         for entry in frf_of(campaign)
     )
-    many = Grammar.of(Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()))
+    many = Grammar.of(
+        Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE
+    )
     shares = np.exp(many.log_shares)
     added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.spoken.axis)
     one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.spoken.axis == "order")

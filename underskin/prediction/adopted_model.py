@@ -198,7 +198,7 @@ def _law(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | None
     """The law of a report, and its parameters."""
     found = report["provenance"]["unnamed"]
     lines = np.concatenate([lines_of(entry).frequency for entry in frf_recordings(campaign)])
-    grammar = Grammar.of(campaign, lines, load_table() if table is None else table, tuple(CATALOGUE.values()))
+    grammar = Grammar.of(campaign, lines, load_table() if table is None else table, tuple(CATALOGUE.values()), ())
     law = next((entry for entry in grammar.laws if entry.name == found["law"]), None)
     if law is None or {entry.name for entry in law.parameters_bound} != set(found["parameters"]):
         raise InvalidInput("diagnosis_id", found["law"], "must be a law that this version knows")

@@ -7,7 +7,8 @@ which smooth misfit hardly reaches. A steep course, such as the flank of a reson
 reach it: where a law describes that, its prediction (`expected`) is taken off as well (see noise_refinement.py).
 log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
 (mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
-Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it.
+Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it. It may miss
+noise that an analyser adds after averaging, the same in all recordings, so that of a frequency counts once.
 Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
 much larger.
 """
@@ -67,6 +68,7 @@ def line_noise(
     weighed2 = size2 * uneven**2
     known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
     from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
+    certainty = 1 / (_COHERENCE_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
 
     def variance(p: Floats) -> Floats:
         return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
@@ -77,10 +79,10 @@ def line_noise(
         by_d2 = np.zeros(len(d2))
         cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
-            # Noisy, and with an unknown n: one loose Gaussian a line; p[-1] is log(1/2n).
+            # Noisy, and with an unknown n: one loose Gaussian a frequency; p[-1] is log(1/2n).
             gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
-            cost += 0.5 * np.sum(gap**2) / _COHERENCE_VARIANCE
-            by_d2[known] += gap / d2[known] / _COHERENCE_VARIANCE
+            cost += 0.5 * np.sum(certainty * gap**2)
+            by_d2[known] += certainty * gap / d2[known]
         bend = np.diff(p[:-2], 2) / _SMOOTH
         cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
         cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
@@ -90,7 +92,7 @@ def line_noise(
         )
         by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
         by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
-        by_p[-1] = (p[-1] + 3.5) - (gap.sum() / _COHERENCE_VARIANCE if from_coherence is not None else 0.0)
+        by_p[-1] = (p[-1] + 3.5) - (certainty @ gap if from_coherence is not None else 0.0)
         return float(cost), by_p
 
     level = np.log(max(float(np.median(rough)), 1e-14)) if len(middle) else np.log(_TYPICAL)

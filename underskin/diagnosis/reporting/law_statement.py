@@ -34,7 +34,7 @@ def statement(
     altered = [*_altered(law, document), *_order(law, document)]
     parts = [
         f"No known mechanism describes this (probability {in_percent(probability)}).",
-        f"What is missing{known} {_does(law)} {_axis_words(leading)}: {_size(leading)}; {worth}.",
+        f"What is missing{known} {_does(law)}{_follows(leading)}: {_size(leading)}; {worth}.",
         *altered,
     ]
     if document["rivals"]:
@@ -47,7 +47,7 @@ def statement(
     if outweighed:
         parts.append("More probable still is a course of no listed form: take this law as the nearest that has one.")
     turns = isinstance(law, CurveLaw) and law.shape.variant == TURN
-    told = "" if altered else hint(acts_on, TURNED if turns else axis)
+    told = "" if altered or leading.is_constant else hint(acts_on, TURNED if turns else axis)
     return " ".join([*parts, *([told] if told else [])])
 
 
@@ -90,18 +90,22 @@ def _held_out(law: UnnamedLaw) -> str:
 def _does(law: UnnamedLaw) -> str:
     acts_on = law.spoken.acts_on
     of_curves = {
-        "position": "moves the surface along the travel with",
-        "gain": "changes the gain of the cell with",
-        "force": "adds to the force that is read with",
+        "position": "moves the surface along the travel",
+        "gain": "changes the gain of the cell",
+        "force": "adds to the force that is read",
     }
     if isinstance(law, CurveLaw) and acts_on in of_curves:
         return of_curves[acts_on]
     return {
-        "position": "moves the place of the contact with",
-        "frequency_response": "changes the frequency response with",
-        "gain": "changes the gain with",
-        "force": "changes the force on the skin with",
-    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]} with")
+        "position": "moves the place of the contact",
+        "frequency_response": "changes the frequency response",
+        "gain": "changes the gain",
+        "force": "changes the force on the skin",
+    }.get(acts_on, f"changes the {ACTS_ON[acts_on][0]}")
+
+
+def _follows(leading: LeadingLaw) -> str:
+    return ", the same in all recordings" if leading.is_constant else f" with {_axis_words(leading)}"
 
 
 def _axis_words(leading: LeadingLaw) -> str:
@@ -117,25 +121,27 @@ def _size(leading: LeadingLaw) -> str:
     """−8 % (−10 to −6) at 14:00."""
     at, size, deviation = leading.largest()
     law = leading.law
-    where = _where(leading, at)
+    where = f" {place}" if (place := _where(leading, at)) else ""
     half = _QUANTILE * deviation
     if law.spoken.acts_on in ("force", "position"):
         unit = "N" if law.spoken.acts_on == "force" else "mm"
-        return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}) {where}"
+        return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}){where}"
     if isinstance(law, LagLaw) and law.kind == "corner":
         hz = [law.lowest_hz * (size + way * half) for way in (0, -1, 1)]
-        return f"lines below a corner of {hz[0]:.3g} Hz ({hz[1]:.3g} to {hz[2]:.3g}) fall off {where}"
+        return f"lines below a corner of {hz[0]:.3g} Hz ({hz[1]:.3g} to {hz[2]:.3g}) fall off{where}"
     if leading.is_phase or (isinstance(law, LagLaw) and law.kind != "power"):
         turned = np.degrees([size, size - half, size + half]) * (1 if leading.is_phase else -1)
         low, high = sorted(turned[1:])
-        return f"the phase by {turned[0]:+.3g}° ({low:+.3g} to {high:+.3g}) {where}"
+        return f"the phase by {turned[0]:+.3g}° ({low:+.3g} to {high:+.3g}){where}"
     if isinstance(law, LagLaw):
-        return f"by a power of frequency of {-size:+.3g} ({-size - half:+.3g} to {-size + half:+.3g}) {where}"
-    return f"{100 * size:+.3g} % ({100 * (size - half):+.3g} to {100 * (size + half):+.3g}) {where}"
+        return f"by a power of frequency of {-size:+.3g} ({-size - half:+.3g} to {-size + half:+.3g}){where}"
+    return f"{100 * size:+.3g} % ({100 * (size - half):+.3g} to {100 * (size + half):+.3g}){where}"
 
 
 def _where(leading: LeadingLaw, at: float) -> str:
     axis = leading.axis
+    if leading.is_constant:
+        return ""
     if isinstance(leading.law, CurveLaw) and leading.law.shape.variant == TURN:
         return "on the way back"
     if axis is None:

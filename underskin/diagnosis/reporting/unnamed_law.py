@@ -16,6 +16,7 @@ from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.axes import Axis
 from underskin.mechanisms.unnamed.curve_laws import CurveLaw
 from underskin.mechanisms.unnamed.expressions import course, expression, wave
+from underskin.mechanisms.unnamed.forms import EVERYWHERE
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.units import Floats
@@ -99,6 +100,11 @@ class LeadingLaw:
     def is_phase(self) -> bool:
         """Whether it turns the phase alone."""
         return isinstance(self.law, FrequencyLaw) and self.law.variant in ("phase", "delay")
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is the same along all of its axis."""
+        return isinstance(self.law, RecordingLaw) and self.law.shape.variant == EVERYWHERE
 
     def variance(self, x: Floats) -> Floats:
         """Of the change, from the quadratic of the law's own parameters."""

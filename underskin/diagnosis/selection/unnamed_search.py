@@ -27,6 +27,8 @@ _BEHIND, _BEHIND_SHARE = (
 )  # nats of the best by its score, or that share of what it gains, behind which none is
 _MAY_MATTER = 6.0  # nats behind the most probable answer by its score
 _ALONE_IN_COMPANY = 2  # laws that are tried beside every mechanism; of curves alone, whatever the mechanisms do
+_ALONE = 5  # laws on FRFs that are tried alone where no set of mechanisms comes near
+_FAR = 50.0  # nats that a law gains on top of the best set, where that took the wrong mechanisms for the law
 _SHOWS_ALONE = 5.0  # nats
 _OVER_SLOW = 25.0  # nats
 _INTEGRATED, _WITHIN = 4, 6.0
@@ -50,9 +52,11 @@ def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     candidates.sort(key=lambda entry: -entry[0])
     least = candidates[0][0] - max(_BEHIND, _BEHIND_SHARE * (candidates[0][0] - best))
     chosen = [entry for entry in candidates[:_FITTED] if entry[0] > max(least, best - _MAY_MATTER)]
+    alone = [entry for entry in candidates if entry[1] is nothing and entry[2].gain > _SHOWS_ALONE]
     if problem.lines.curves:  # of which many laws bend the force as named mechanisms do
-        alone = [entry for entry in candidates if entry[1] is nothing and entry[2].gain > _SHOWS_ALONE]
         chosen += [entry for entry in alone[:_ALONE_IN_COMPANY] if entry not in chosen]
+    elif candidates[0][0] > best + _FAR:
+        chosen += [entry for entry in alone[:_ALONE] if entry not in chosen]
     fitted = _fitted(problem, [(beneath, score) for _, beneath, score in chosen])
     if not problem.lines.curves:
         fitted += _beside_named(problem, search, fitted)
@@ -83,7 +87,9 @@ def _screening(problem: FittingProblem, nothing: Explanation, best: Explanation)
         return CurveScreening(problem, nothing, best)
     if problem.kind != "frf":
         return None
-    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, tuple(CATALOGUE.values()))
+    named = problem.lines.mechanisms.named
+    beside = tuple(CATALOGUE.values())
+    grammar = Grammar.of(problem.collapsed.campaign, problem.lines.frequency, problem.table, beside, named)
     return Screening(problem, grammar) if grammar.laws else None
 
 

@@ -8,6 +8,7 @@ import yaml
 
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.document import SCHEMA
+from underskin.mechanisms.unnamed.forms import EVERYWHERE
 from underskin.mechanisms.unnamed.laws import PREFIX
 from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
@@ -115,6 +116,8 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
 
 
 def _linear(x: str, low: float, high: float, variant: str) -> list[str]:
+    if variant == EVERYWHERE:
+        return ["1"]
     zero = (low + high) / 2 if variant == "middle" else low
     return [f"({x} - {zero:.6g}) / {high - low:.6g}"]
 

@@ -7,7 +7,7 @@ import numpy as np
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.unnamed.axes import Axis
 from underskin.mechanisms.unnamed.curve_laws import CurveLaw
-from underskin.mechanisms.unnamed.forms import reference
+from underskin.mechanisms.unnamed.forms import EVERYWHERE, Shape, reference
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES
@@ -89,8 +89,7 @@ def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitud
         return f"{sign} {size}·[{name} = {shape.variant}]"
     match shape.form:
         case "linear":
-            per = "" if axis.unit == "-" else f"/{axis.unit}"
-            return f"{sign} {number(abs(a) / axis.span)}{per}·{_less(axis, reference(axis, shape.variant))}"
+            return _linear_text(axis, shape, a)
         case "exponential":
             length = values["law_growth_length"]
             sign, size = _signed(a / np.expm1(axis.span / length))
@@ -117,7 +116,15 @@ def change_text(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitud
             width = _with_unit(values["law_width"], axis.unit)
             return f"{sign} {size}/(1 + ({_less(axis, values['law_centre'])}/{width})²)"
         case _:
-            return f"+ s({name}), a smooth course"
+            return f"+ s({name}), {f'a value for each {name}' if axis.words else 'a smooth course'}"
+
+
+def _linear_text(axis: Axis, shape: Shape, a: float) -> str:
+    sign, size = _signed(a if shape.variant == EVERYWHERE else a / axis.span)
+    if shape.variant == EVERYWHERE:
+        return f"{sign} {size}"
+    per = "" if axis.unit == "-" else f"/{axis.unit}"
+    return f"{sign} {size}{per}·{_less(axis, reference(axis, shape.variant))}"
 
 
 def wave(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: list[float]) -> tuple[float, float]:
@@ -135,13 +142,10 @@ def _of_recordings(law: RecordingLaw, values: Numbers) -> str:
         half = len(amplitudes) // 2
         if law.shape.form == "power":
             middle = _with_unit(float(np.sqrt(axis.low * axis.high)), axis.unit)
-            each = [f"{number(a)} mm·ln({symbol(axis)}/{middle})" for a in amplitudes]
+            each = [" ".join(_signed(a)) + f" mm·ln({symbol(axis)}/{middle})" for a in amplitudes]
         else:
-            each = [
-                change_text(law, values, part).removeprefix("+ ") + " mm"
-                for part in (amplitudes[:half], amplitudes[half:])
-            ]
-        return f"x = x0 + {each[0]}, y = y0 + {each[1]}"
+            each = [change_text(law, values, part) + " mm" for part in (amplitudes[:half], amplitudes[half:])]
+        return f"x = x0 {each[0]}, y = y0 {each[1]}"
     if law.shape.logarithmic:
         middle = _with_unit(float(np.sqrt(axis.low * axis.high)), axis.unit)
         return f"{quantity} = {quantity}0·({symbol(axis)}/{middle})^{number(values[law.amplitudes[0]])}"

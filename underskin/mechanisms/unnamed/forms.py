@@ -20,6 +20,7 @@ from underskin.mechanisms.unnamed.vocabulary import Form
 from underskin.units import Floats
 
 Feature = Differentiated | Floats
+EVERYWHERE = "everywhere"  # the variant of a linear law that does not change along its axis
 Features = Callable[[Floats, Values], Sequence[Feature]]
 
 FORMS: tuple[Form, ...] = get_args(Form)
@@ -85,6 +86,11 @@ def _linear(axis: Axis) -> list[Shape]:
         return Shape("linear", lambda x, _: [(x - zero) / axis.span], variant=variant, share=0.5)
 
     return [of(variant) for variant in variants]
+
+
+def constant(share: float) -> Shape:
+    """The same at all values of the axis."""
+    return Shape("linear", lambda x, _: [np.ones_like(x)], variant=EVERYWHERE, share=share)
 
 
 def _power(axis: Axis) -> Shape:
