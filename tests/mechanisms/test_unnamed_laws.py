@@ -12,7 +12,7 @@ from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
-from underskin.mechanisms.unnamed.expressions import expression
+from underskin.mechanisms.unnamed.expressions import course, expression
 from underskin.mechanisms.unnamed.forms import shapes
 from underskin.mechanisms.unnamed.frequency_laws import frequency_laws, phase_of_bump
 from underskin.mechanisms.unnamed.grammar import Grammar, combination
@@ -226,6 +226,26 @@ def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
         short = {name.removeprefix("law_"): value for name, value in values.items()}
         exact = law.factor(frequency, {name: differentiated(value) for name, value in values.items()}).value[0]
         assert kept.laws[0]({**short, "frequency_hz": frequency}) == pytest.approx(exact, abs=2e-3), law.name
+
+
+def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
+    for law in grammar.laws:
+        if not isinstance(law, RecordingLaw) or law.axis.words or law.spoken.form == "free":
+            continue
+        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
+        said = {"acts_on": law.spoken.acts_on, "axis": law.axis.name, "form": law.spoken.form}
+        stated = {**said, "expression": "E", "range": {law.axis.name: [law.axis.low, law.axis.high]}}
+        found = {"law": law.name, "parameters": values}
+        report = {"unnamed": stated, "provenance": {"unnamed": found}, "campaign": "c", "verdict": "unexplained"}
+        kept = parse(document(report, "kept").encode(), "kept.yaml")
+        short = {name.removeprefix("law_"): value for name, value in values.items()}
+        x = np.linspace(law.axis.low, law.axis.high, 7)
+        exact = course(law, values, x).reshape(len(x), -1)
+        axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
+        for place, expected in zip(kept.laws, exact.T, strict=True):
+            told = np.broadcast_to(place({**short, **axes}), x.shape)
+            change = told if law.spoken.acts_on in ("force", "position") else told - 1
+            assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 
 
 def differentiated(value: float):  # type: ignore[no-untyped-def]

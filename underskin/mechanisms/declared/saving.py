@@ -117,14 +117,16 @@ def _expressions(law: Mapping[str, Any], name: str, values: Mapping[str, float])
 
 def _linear(x: str, low: float, high: float, variant: str) -> list[str]:
     if variant == EVERYWHERE:
-        return ["1"]
+        raise InvalidInput(
+            "report", "linear", "what is the same in all recordings is a mechanism of the catalogue already"
+        )
     zero = (low + high) / 2 if variant == "middle" else low
     return [f"({x} - {zero:.6g}) / {high - low:.6g}"]
 
 
 def _threshold(x: str, low: float, high: float, variant: str) -> list[str]:
     if variant == "lost":
-        return ["(0 - 1)"]
+        return [f"(0 - {x} / {x})"]  # a constant, of a law that must hold its axis
     if variant == "above":
         return [f"max(0, {x} - onset) / ({high:.6g} - onset)"]
     return [f"max(0, onset - {x}) / (onset - {low:.6g})"]

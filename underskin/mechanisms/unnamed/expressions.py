@@ -58,7 +58,7 @@ def course(law: UnnamedLaw, values: Numbers, x: Floats) -> Array:
         sum(a * f for a, f in zip(amplitudes[part * len(features) :], features, strict=False)) + np.zeros(len(x))
         for part in range(parts)
     ]
-    if isinstance(law, RecordingLaw) and law.shape.logarithmic:
+    if isinstance(law, RecordingLaw) and law.shape.logarithmic and law.spoken.acts_on != "position":
         return np.exp(totals[0]) - 1
     return totals[0] if parts == 1 else np.stack(totals, axis=1)
 
