@@ -6,18 +6,22 @@ from typing import Annotated
 import typer
 
 from service.auth.keys import KeyStore, keys_missing
-from service.cli.shared import read_settings
+from service.cli.shared import read_settings, use_folder_of_lab
 from service.settings import make_data_folder
-from service.store import StoreError, database, key_requirement, migrate
+from service.store import Database, StorageFull, StoreError, database, key_requirement, migrate
 from service.store import backup as backups
+from service.usecases import mechanism_files
 from underskin import UnderskinError
 
 
 def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")]) -> None:
     """Write all that the store keeps into one file, read back to be sure, while servers run."""
     settings = read_settings()
+    use_folder_of_lab(settings)
     try:
-        backups.make(database(settings.database_url, settings.data), file)
+        store = database(settings.database_url, settings.data)
+        _remember_mechanisms(store)
+        backups.make(store, file)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
@@ -26,17 +30,40 @@ def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file 
 def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")]) -> None:
     """Put a backup in place of the store, while servers run; what was there is backed up first."""
     settings = read_settings()
+    use_folder_of_lab(settings)
     try:
         make_data_folder(settings.data)
         store = database(settings.database_url, settings.data)
         before = backups.place(store, settings.data, "before-restore")
+        store.make()
+        if migrate.version(store) is not None:
+            _remember_mechanisms(store)
         migrate.restore(store, file, before)
         needed = store.read(key_requirement.is_needed)
+        mechanisms = store.read(mechanism_files.put_back)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
+    _say_of_mechanisms(mechanisms)
     if needed:
         typer.echo(_of_keys(KeyStore(settings.data)))
+
+
+def _remember_mechanisms(store: Database) -> None:
+    """A full disk keeps nobody from a backup elsewhere."""
+    try:
+        store.write(mechanism_files.remember)
+    except StorageFull as error:
+        typer.echo(f"mechanisms of the lab's own are in the backup as they were at the last one: {error}", err=True)
+
+
+def _say_of_mechanisms(found: mechanism_files.PutBack) -> None:
+    for names, became in (
+        (found.written, "put back"),
+        (found.replaced, "put back; what the folder has in their place is set aside in discarded"),
+    ):
+        if names:
+            typer.echo(f"mechanisms of the lab's own {became}: {', '.join(names)}")
 
 
 def _of_keys(keys: KeyStore) -> str:

@@ -2,7 +2,6 @@
 
 import errno
 import ipaddress
-import os
 import socket
 import tempfile
 from pathlib import Path
@@ -15,13 +14,12 @@ from service.app import create_app
 from service.auth.access_control import LOOPBACK_NAMES, AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
-from service.cli.shared import STORE_ERRORS, fail, read_settings
+from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
 from service.log import configure_logging
 from service.middleware.http_protocol import LimitedHttpProtocol
 from service.settings import make_data_folder
 from service.store import open_store
 from underskin import ExtensionError, TableError
-from underskin.mechanisms.declared.document import FOLDER
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
@@ -43,7 +41,7 @@ def serve(
             where = f"as {settings.hosts}" if _is_loopback(host) else f"on {host}"
             fail(f"refusing to serve {where} without API keys: make one with `underskin key create NAME`")
         table = load_table(settings.tables / SIGMA_TABLE)
-        os.environ.setdefault(FOLDER, str(settings.data / "mechanisms"))  # of the lab's own
+        use_folder_of_lab(settings)
         CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
         formats_of_other_packages()
         store = open_store(settings.database_url, settings.data)

@@ -9,6 +9,7 @@ from sqlalchemy.exc import DBAPIError
 
 from service.settings import Settings
 from service.store import StorageFull, StoreError, StoreMoved
+from underskin.mechanisms.declared.document import FOLDER
 
 STORE_ERRORS = (StoreError, StoreMoved, StorageFull, DBAPIError)
 
@@ -28,3 +29,8 @@ def read_settings() -> Settings:
         first = error.errors()[0]
         reason = first["msg"].removeprefix("Value error, ")
         fail(f"UNDERSKIN_{str(first['loc'][0]).upper()} = {first['input']!r}: {reason[:1].lower()}{reason[1:]}")
+
+
+def use_folder_of_lab(settings: Settings) -> None:
+    """The folder of the lab's own mechanisms lies in the data folder where no other is set."""
+    os.environ.setdefault(FOLDER, str(settings.data / "mechanisms"))

@@ -196,6 +196,14 @@ key_requirement = Table(
     Column("lifted_at", String),  # by `underskin key open`; null while keys are needed
 )
 
+# Files of the lab's own mechanisms, as they were at the last backup: the folder of UNDERSKIN_MECHANISMS is what counts.
+own_mechanisms = Table(
+    "own_mechanisms",
+    metadata,
+    Column("file", String, primary_key=True),
+    Column("content", LargeBinary, nullable=False),
+)
+
 # What was answered to a POST that carried an Idempotency-Key.
 answers = Table(
     "answers",

@@ -1,27 +1,22 @@
 """The catalogue of mechanisms, and the lab's own in it: files (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
 
-import os
-import tempfile
 import threading
 from collections.abc import Mapping
-from pathlib import Path
 
 from sqlalchemy import Connection
 
-from service import durable
 from service.problems import Refusal
 from service.schemas.mechanisms import MechanismEntry, MechanismParameter
 from service.store import diagnoses, models
-from service.store.times import now
+from service.usecases import mechanism_files
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.contract import check_numbers
 from underskin.mechanisms.declared import saving
-from underskin.mechanisms.declared.document import FOLDER, digest, in_folder, parse
+from underskin.mechanisms.declared.document import digest, in_folder, parse
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.registry import CATALOGUE
 
-_DISCARDED = "discarded"  # a folder beside the files, from which none is read
 _lock = threading.Lock()  # of what this process has loaded
 _loaded = {"digest": digest()}
 
@@ -56,13 +51,13 @@ def keep(content: bytes) -> MechanismEntry:
 
     Raises FileError or InvalidInput where it cannot be used, and Refusal 409 where its name is taken.
     """
-    folder = _folder()
+    folder = mechanism_files.folder_of_lab()
     mechanism = parse(content, "mechanism")
     check_numbers(mechanism)
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
-        _write(folder, folder / f"{mechanism.name}.yaml", content)
+        mechanism_files.write(folder / f"{mechanism.name}.yaml", content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
     return _entry(catalogue()[mechanism.name])
@@ -97,33 +92,12 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         report = diagnoses.report_of(connection, row.number)
         if report is not None and name in {entry["name"] for entry in report["mechanisms"]}:
             raise Refusal(409, f"The model in force of skin {row.model_skin_id!r} needs {name!r}: withdraw it first.")
-    folder = _folder()
-    for file in folder.glob("*.yaml"):
+    for file in mechanism_files.folder_of_lab().glob("*.yaml"):
         if parse(file.read_bytes(), str(file)).name == name:
-            (folder / _DISCARDED).mkdir(exist_ok=True)
-            file.rename(folder / _DISCARDED / f"{file.stem} {now().replace(':', '')}.yaml")
-            durable.keep_entries(folder / _DISCARDED)
-            durable.keep_entries(folder)
+            mechanism_files.set_aside(file)
     discarded = _entry(mechanism)
     catalogue()
     return discarded
-
-
-def _folder() -> Path:
-    if not os.environ.get(FOLDER):
-        raise Refusal(409, f"This server has no folder for a lab's own mechanisms: set {FOLDER} and start it again.")
-    return Path(os.environ[FOLDER])
-
-
-def _write(folder: Path, file: Path, content: bytes) -> None:
-    """Whole or not at all; raises FileExistsError where there is one."""
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=folder, prefix=".new-") as new:
-        new.write(content)
-        new.flush()
-        os.fsync(new.fileno())
-        os.link(new.name, file)
-    durable.keep_entries(folder)
 
 
 def _entry(mechanism: Mechanism) -> MechanismEntry:

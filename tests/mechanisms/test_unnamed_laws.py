@@ -243,7 +243,7 @@ def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> 
         exact = course(law, values, x).reshape(len(x), -1)
         axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
         for place, expected in zip(kept.laws, exact.T, strict=True):
-            told = np.broadcast_to(place({**short, **axes}), x.shape)
+            told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)
             change = told if law.spoken.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 

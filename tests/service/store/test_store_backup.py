@@ -52,6 +52,30 @@ def test_what_the_service_writes_is_its_owners_alone_and_nothing_lies_beside_a_b
     assert {entry.name: entry.stat().st_mode & 0o077 for entry in ours if entry.stat().st_mode & 0o077} == {}
 
 
+def test_a_backup_holds_the_mechanisms_of_the_labs_own(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("UNDERSKIN_MECHANISMS", raising=False)
+    folder, file = place.folder / "mechanisms", tmp_path / "kept.backup"  # where a server has it by itself
+    folder.mkdir()
+    whole = Path("examples/mechanisms/warm_film.yaml").read_text()
+    contents = {f"{name}.yaml": whole.replace("warm_film", name) for name in ("gone", "changed", "renamed", "same")}
+    for name, content in contents.items():
+        (folder / name).write_text(content)
+    open_store(place.database_url, place.folder).close()
+    done = place.command("backup", str(file))
+    assert done.returncode == 0, done.stderr
+    (folder / "gone.yaml").unlink()
+    (folder / "changed.yaml").write_text(contents["changed.yaml"] + "# another\n")
+    (folder / "renamed.yaml").rename(folder / "other_name.yaml")
+    done = place.command("restore", str(file))
+    assert done.returncode == 0, done.stderr
+    assert {entry.name: entry.read_text() for entry in folder.glob("*.yaml")} == contents
+    assert "put back: gone.yaml" in done.stdout
+    assert "set aside in discarded: changed.yaml, renamed.yaml" in done.stdout
+    assert any("# another" in entry.read_text() for entry in (folder / "discarded").iterdir())
+
+
 def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> None:
     if server.place.database_url:
         return  # the other machine would be another database: the next line's restore is the same

@@ -1,0 +1,85 @@
+"""The files of the lab's own mechanisms (`mechanism/1`) in the folder of UNDERSKIN_MECHANISMS."""
+
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from sqlalchemy import Connection
+
+from service import durable
+from service.problems import Refusal
+from service.store import own_mechanisms
+from service.store.times import now
+from underskin.errors import FileError
+from underskin.mechanisms.declared.document import FOLDER, parse
+
+_SET_ASIDE = "discarded"  # a folder beside the files, from which none is read
+
+
+@dataclass(frozen=True)
+class PutBack:
+    """Files of a backup, by name, that the folder did not have, and those in place of others, which were set aside."""
+
+    written: tuple[str, ...]
+    replaced: tuple[str, ...]
+
+
+def folder_of_lab() -> Path:
+    """The folder; raises Refusal 409 where the server has none."""
+    if not os.environ.get(FOLDER):
+        raise Refusal(409, f"This server has no folder for a lab's own mechanisms: set {FOLDER} and start it again.")
+    return Path(os.environ[FOLDER])
+
+
+def write(file: Path, content: bytes) -> None:
+    """Whole or not at all; raises FileExistsError where there is one."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".new-") as new:
+        new.write(content)
+        new.flush()
+        os.fsync(new.fileno())
+        os.link(new.name, file)
+    durable.keep_entries(file.parent)
+
+
+def set_aside(file: Path) -> None:
+    """Move a file to where it is kept but not read."""
+    aside = file.parent / _SET_ASIDE
+    aside.mkdir(exist_ok=True)
+    file.rename(aside / f"{file.stem} {now().replace(':', '')}.yaml")
+    durable.keep_entries(aside)
+    durable.keep_entries(file.parent)
+
+
+def remember(connection: Connection) -> None:
+    """Keep the files as they are in the store, whose backups then hold them."""
+    files = {file.name: file.read_bytes() for file in sorted(folder_of_lab().glob("*.yaml"))}
+    own_mechanisms.replace(connection, files)
+
+
+def put_back(connection: Connection) -> PutBack:
+    """The files that the store keeps into the folder: one that differs, or bears the same mechanism, is set aside."""
+    kept, folder = own_mechanisms.found(connection), folder_of_lab()
+    written: list[str] = []
+    replaced: list[str] = []
+    for name, content in kept.items():
+        present = {file: file.read_bytes() for file in folder.glob("*.yaml")}
+        if present.get(folder / name) == content:
+            continue
+        rivals = [
+            file for file, other in present.items() if file.name == name or _mechanism(other) == _mechanism(content)
+        ]
+        for file in rivals:
+            set_aside(file)
+        write(folder / name, content)
+        (replaced if rivals else written).append(name)
+    return PutBack(tuple(written), tuple(replaced))
+
+
+def _mechanism(content: bytes) -> str | bytes:
+    """Its name; of what cannot be read its content, which is that of no other."""
+    try:
+        return parse(content, "").name
+    except FileError:
+        return content
