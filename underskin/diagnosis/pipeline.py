@@ -27,7 +27,7 @@ from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.search import search
-from underskin.diagnosis.selection.unnamed_search import law_of, with_laws
+from underskin.diagnosis.selection.unnamed_search import law_of, nearest_law, with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation, unseen
@@ -44,6 +44,7 @@ from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Mask
 
 _CURVES: tuple[Kind, ...] = ("indentation", "compression")
 _FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
@@ -154,6 +155,7 @@ def _work_out(
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
     undescribed = leader.explanation is None and result.law is None
     shape = describe(problem, shown) if undescribed else None
+    begun = begun.with_findings(*(_of_nearest_law(problem, result, nothing) if undescribed else ()))
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
@@ -192,15 +194,44 @@ def _held_out(
         )
     laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
     both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
+    return cross_validation.hold_out(problem, both, nothing, result.log_prior, _along(problem, law))
+
+
+def _along(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
+    """The rows of thirds along the axis of a law that nobody listed."""
     if problem.lines.curves:
-        parts = cross_validation.stretches(problem.lines)
-        return cross_validation.hold_out(problem, both, nothing, result.log_prior, parts)
+        return cross_validation.stretches(problem.lines)
     leading = law_of(problem, law)
     ids = [entry.id for entry in problem.lines.campaign.recordings]
     column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
-    return cross_validation.hold_out(
-        problem, both, nothing, result.log_prior, cross_validation.thirds(problem.lines, column)
-    )
+    return cross_validation.thirds(problem.lines, column)
+
+
+def _of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation) -> list[Finding]:
+    """What the nearest law that nobody listed is worth, where none is stated."""
+    nearest = nearest_law(problem, result)
+    if nearest is None:
+        return []
+    found = nearest.explanation
+    law = None if found is None else law_of(problem, found)
+    if found is None or law is None:
+        return [Finding(Reason.NO_SIMPLE_LAW, "", "", {"tried": nearest.tried})]
+
+    def the_law(entry: Explanation) -> float:
+        return 0.0 if entry.names == found.names else -np.inf
+
+    groups = cross_validation.hold_out(problem, [found], nothing, the_law, _along(problem, found))
+    before, after = cross_validation.total(groups)
+    if not (np.isfinite(before.rmse_percent) and np.isfinite(after.rmse_percent)):
+        return []
+    arguments = {
+        "tried": nearest.tried,
+        "law": law.spoken.words,
+        "part": "samples" if problem.lines.curves else "recordings",
+        "after_percent": after.rmse_percent,
+        "before_percent": before.rmse_percent,
+    }
+    return [Finding(Reason.NO_SIMPLE_LAW, "", "", arguments)]
 
 
 def _beside_unlisted(

@@ -177,6 +177,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
     "noise, is left that no mechanism here describes",
     Reason.HELD_OUT_NO_BETTER: sentences.held_out,
+    Reason.NO_SIMPLE_LAW: sentences.no_simple_law,
     Reason.IMITATED: sentences.imitated,
     Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
     "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",

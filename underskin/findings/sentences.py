@@ -208,6 +208,23 @@ def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: f
     )
 
 
+def no_simple_law(
+    tried: int, law: str = "", part: str = "", after_percent: float = 0.0, before_percent: float = 0.0
+) -> str:
+    """How well the nearest of the laws of one form over one axis predicts what was held out."""
+    if not law:
+        return f"none of {tried} simple laws of one quantity over one axis gains anything"
+    if after_percent >= before_percent:
+        return (
+            f"none of {tried} simple laws of one quantity over one axis predicts {part} held out better than without "
+            f"it: the nearest, {law}, predicts them to {after_percent:.2g} % instead of {before_percent:.2g} %"
+        )
+    return (
+        f"none of {tried} simple laws of one quantity over one axis stands out enough to be stated: the nearest, "
+        f"{law}, predicts {part} held out to {after_percent:.2g} % instead of {before_percent:.2g} %"
+    )
+
+
 def imitated(laws: int, imitated: int, mechanisms: Sequence[str]) -> str:
     """Unlisted laws that the leading set looks like."""
     named = " and ".join(mechanisms).replace("_", " ")

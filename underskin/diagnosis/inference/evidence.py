@@ -31,7 +31,7 @@ _GONE = 4.0  # nats below the greatest at which an integral ends
 _LONGEST_STRIDE = 0.3  # of scatter's logarithm: twice the deviation with which its prior falls off
 _GAIN_STRIDES = 8  # either way: 2.4 of the logarithm at most, and the prior's flat part is 1.6 wide
 _SETTLING = 5  # steps of the other noise levels at each positioning scatter
-_AT_ONCE = 4  # strides either way, before it is known whether more are needed
+_AT_ONCE = 2  # strides either way, before it is known whether more are needed
 
 
 def laplace(fitter: Fitter, at: Evaluated) -> Evidence:

@@ -8,7 +8,7 @@ reach it: where a law describes that, its prediction (`expected`) is taken off a
 log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
 (mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
 Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it. It may miss
-noise that an analyser adds after averaging, the same in all recordings, so that of a frequency counts once.
+noise that is not averaged, alike in all recordings: of many recordings it says little more than of a few.
 Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
 much larger.
 """
@@ -68,7 +68,7 @@ def line_noise(
     weighed2 = size2 * uneven**2
     known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
     from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
-    certainty = 1 / (_COHERENCE_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
+    certainty = 1 / (_COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
 
     def variance(p: Floats) -> Floats:
         return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
@@ -79,7 +79,7 @@ def line_noise(
         by_d2 = np.zeros(len(d2))
         cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
         if from_coherence is not None:
-            # Noisy, and with an unknown n: one loose Gaussian a frequency; p[-1] is log(1/2n).
+            # Noisy, and with an unknown n: loose Gaussians; p[-1] is log(1/2n).
             gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
             cost += 0.5 * np.sum(certainty * gap**2)
             by_d2[known] += certainty * gap / d2[known]
@@ -110,7 +110,8 @@ def line_noise(
     return LineNoise(scale * np.sqrt(d2), sd, float(scale * np.exp(p[-2] / 2)))
 
 
-_COHERENCE_VARIANCE = 0.5
+_COHERENCE_VARIANCE = 0.5  # of the logarithm of what one recording's says
+_OF_ALL_VARIANCE = 0.1  # and of what all have in common at a frequency
 
 
 def local_amplitude(value: Complexes, recording: Indices) -> Floats:

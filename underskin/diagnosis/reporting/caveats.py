@@ -10,7 +10,8 @@ _DECISIVE = (
     *(FindingCode.IMPOSSIBLE_NUMBER, FindingCode.SERIES_NOT_USABLE, FindingCode.CURVE_NOT_USABLE),
     *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
     *(FindingCode.IMPLAUSIBLE_D33, FindingCode.DUPLICATED_RECORDING),
-    *(FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED),
+    *(FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.NO_SIMPLE_LAW),
+    FindingCode.IMITATED,
 )
 _MOST = 6  # findings of one code that are quoted in full
 

@@ -6,6 +6,7 @@ they gain on top of nothing is then tried beside each named mechanism, of FRFs a
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -169,6 +170,31 @@ def _without_company(problem: FittingProblem, fitted: Sequence[Explanation]) -> 
     return [entry for entry in explained if entry is not None]
 
 
+@dataclass(frozen=True)
+class NearestLaw:
+    """Of so many laws `tried` the fitted one that gains most on top of the best set of mechanisms, or of nothing; None
+    where none gains anything."""
+
+    tried: int
+    explanation: Explanation | None
+
+
+def nearest_law(problem: FittingProblem, search: Search) -> NearestLaw | None:
+    """Of recordings that no law that shows describes; None where none could be."""
+    nothing = next(entry for entry in search.explanations if not entry.names)
+    best = max((entry for entry in search.explanations if search.shows(entry)), key=search.log_weight)
+    screening = _screening(problem, nothing, best)
+    if screening is None:
+        return None
+    chosen, tried = [], 0
+    for beneath in (nothing, best) if best.names else (nothing,):
+        scores = _of_combinations(screening.scores(beneath))
+        chosen.append((beneath, max(scores, key=lambda score: score.gain)))
+        tried = max(tried, len(scores))
+    fitted = [*_fitted(problem, chosen), *search.laws]
+    return NearestLaw(tried, max(fitted, key=lambda entry: entry.log_evidence, default=None))
+
+
 def law_of(problem: FittingProblem, explanation: Explanation) -> UnnamedLaw | None:
     """The law that an explanation holds."""
     for name in explanation.names:
@@ -178,4 +204,4 @@ def law_of(problem: FittingProblem, explanation: Explanation) -> UnnamedLaw | No
     return None
 
 
-__all__ = ["law_of", "least_evidence", "with_laws"]
+__all__ = ["NearestLaw", "law_of", "least_evidence", "nearest_law", "with_laws"]

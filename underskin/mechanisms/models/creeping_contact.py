@@ -89,12 +89,11 @@ def relaxing(sphere: Sphere, relaxation: Relaxation, adhesion: Adhesion | None, 
     stuck = np.zeros(depth.shape, dtype=bool)
     reached = (depth, time, depth_memory, slack, parting, force, force_memory, record, begins[..., 0])
     edge_rows(*map(contiguous, reached), *relaxation.of_points(len(depth)), edge, carried, kept, stuck)
-    answer, first = stiffer * growing, int(back.any(axis=(0, 1)).argmax())
-    late = np.s_[..., first:]
-    a = sphere.radius_at(edge[late], work, np.maximum(least, 1e-12))
+    answer, some = stiffer * growing, np.s_[..., np.flatnonzero(back.any(axis=(0, 1)))]
+    a = sphere.radius_at(contiguous(edge[some]), work, np.maximum(least, 1e-12))
     ring, stiffness, _, _, stiffer_ring = _elastic(sphere, a, adhesion)
-    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept[late] + stiffness * carried[late])
-    answer[late] = np.where(back[late], receding, answer[late])
+    receding = stiffer_ring * (relaxation.unrelaxed * ring + kept[some] + stiffness * carried[some])
+    answer[some] = np.where(back[some], receding, answer[some])
     held = np.where(back, stuck, held)
     touch = back & ~held
     if touch.any() and adhesion is not None:
