@@ -25,7 +25,9 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.kinds_together import Others
 from underskin.diagnosis.selection.noise_refinement import frf_problem
+from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.search import search
 from underskin.diagnosis.selection.unnamed_search import law_of, nearest_law, with_laws
 from underskin.diagnosis.validation import cross_validation
@@ -46,7 +48,7 @@ from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Mask
 
-_CURVES: tuple[Kind, ...] = ("indentation", "compression")
+_KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first that there is gives the verdict
 _FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
@@ -66,8 +68,9 @@ def diagnose(
 ) -> DiagnosisResult:
     """What recordings and model disagree about, and what physics was left out.
 
-    FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. From a
-    campaign that holds nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
+    FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. What the
+    other kinds tell of the same material counts with them (selection/kinds_together.py). From a campaign that holds
+    nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
     (`recordings/plausibility.py`). Mechanisms `without` which it is to be explained are left out of the catalogue.
 
     Raises InvalidInput where one of those is not in it.
@@ -85,34 +88,75 @@ def _diagnosed(
     if possible.findings and possible.lacking:
         return replace(begun, lacking=possible.lacking)
     campaign = possible.campaign
-    for kind in () if any(isinstance(entry, FrfRecording) for entry in campaign.recordings) else _CURVES:
-        if all(entry.kind != kind for entry in campaign.recordings):
+    kinds = [kind for kind in _KINDS if any(entry.kind == kind for entry in campaign.recordings)]
+    curves: dict[Kind, Campaign] = {}
+    for kind in kinds:
+        if kind == "frf":
             continue
         usable, unusable = without_unusable(campaign, kind)
-        curves = without_inconsistent(usable, kind)
-        begun = begun.with_findings(*unusable, *curves.findings)
-        if curves.findings and curves.lacking:
-            return replace(begun, lacking=curves.lacking)
-        mechanisms.bind(curves.campaign, table, kind)
-        rows = replace(curve_lines(curves.campaign, kind), mechanisms=mechanisms)
-        if rows.recordings:
-            problem = FittingProblem(rows, table)
-            result = search(problem)
-            seated = without_seating(curves.campaign, result.answers[0].names, table) if kind == "compression" else None
-            if seated is not None:
-                problem, seating = seated
-                begun, result = begun.with_findings(seating), search(problem)
-            result = replace(result, laws=tuple(with_laws(problem, result)))
-            return _work_out(replace(begun, curves=curves.campaign), problem, result, progress, limits)
+        consistent = without_inconsistent(usable, kind)
+        begun = begun.with_findings(*unusable, *consistent.findings)
+        if consistent.findings and consistent.lacking and kind == kinds[0]:
+            return replace(begun, lacking=consistent.lacking)
+        if curve_lines(consistent.campaign, kind).recordings:
+            curves[kind] = consistent.campaign
+    if "frf" in kinds or not curves:
+        return _of_frf(begun, campaign, table, mechanisms, Others(curves, table, mechanisms.without), progress, limits)
+    kind = next(iter(curves))
+    others = Others({other: own for other, own in curves.items() if other != kind}, table, mechanisms.without)
+    return _of_curves(begun, curves[kind], kind, table, mechanisms, others, progress, limits)
+
+
+def _of_frf(
+    begun: DiagnosisResult,
+    campaign: Campaign,
+    table: SigmaTable,
+    mechanisms: Known,
+    others: Others,
+    progress: Progress,
+    limits: RigLimits,
+) -> DiagnosisResult:
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
     begun = begun.with_findings(*inspected.findings)
     if inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
-    problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
-    result = search(problem, known)
+
+    def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
+        problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms, beside)
+        return problem, search(problem, known)
+
+    joined = others.joined(fitted)
+    problem, result = joined.problem, joined.search
     result = replace(result, laws=tuple(with_laws(problem, result)))
-    return _work_out(begun, problem, result, progress, limits)
+    return _work_out(replace(begun, joined=joined), problem, result, progress, limits)
+
+
+def _of_curves(
+    begun: DiagnosisResult,
+    campaign: Campaign,
+    kind: Kind,
+    table: SigmaTable,
+    mechanisms: Known,
+    others: Others,
+    progress: Progress,
+    limits: RigLimits,
+) -> DiagnosisResult:
+    mechanisms.bind(campaign, table, kind)
+    rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
+
+    def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
+        problem = FittingProblem(rows, table, beside)
+        return problem, search(problem)
+
+    joined = others.joined(fitted)
+    problem, result = joined.problem, joined.search
+    seated = without_seating(campaign, result.answers[0].names, table) if kind == "compression" else None
+    if seated is not None:
+        problem, seating = seated
+        begun, result = begun.with_findings(seating), search(problem)
+    result = replace(result, laws=tuple(with_laws(problem, result)))
+    return _work_out(replace(begun, curves=campaign, joined=joined), problem, result, progress, limits)
 
 
 def _work_out(

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from underskin.autodiff import Differentiated
+from underskin.autodiff import Differentiated, log
 from underskin.errors import UnderskinError
 from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.conditions import Conditions
@@ -103,6 +103,7 @@ class Mechanism:
     begins_at_guesses: ClassVar[bool] = False  # fits begin there alone, not at quantiles of its priors
     needs_history: ClassVar[bool] = False  # a curve without its beginning cannot be predicted
     imitated_by_seating: ClassVar[bool] = False  # a platen that seats bends the beginning of a compression alike
+    extrapolates_modulus: ClassVar[bool] = False  # the modulus at no strain is what its law makes of larger ones
     # Axes of its figure, keys of PANELS in docs/mechanisms/signatures.py; empty: the first two of `axes` with a panel.
     figure: ClassVar[tuple[str, ...]] = ()
 
@@ -130,6 +131,15 @@ class Mechanism:
     def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
         """Values of its parameters, in their order and units, that measured recordings suggest: where fits begin."""
         return ()
+
+    def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+        """What values of its parameters on recordings of one kind mean for those of another: fit coordinates there, by
+        the parameter's name."""
+        stated = {entry.name: entry for entry in self.parameters_stated}
+        return {
+            name: log(value) if name in stated and stated[name].scale == "log" else value
+            for name, value in values.items()
+        }
 
     def told(self, values: Mapping[str, float]) -> str:
         """What values of its parameters mean together, as a sentence; empty where they speak for themselves."""

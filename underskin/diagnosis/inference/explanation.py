@@ -4,7 +4,7 @@ Every set is fitted without positioning scatter and, where that could show, with
 two under their prior.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -15,6 +15,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis, own_places
+from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
@@ -97,12 +98,17 @@ class Request:
         return self.parent.best.cost - _LEAST_GAIN
 
 
+Beside = Callable[[Model, Lines], Knowledge | None]
+
+
 class FittingProblem:
     """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
-    def __init__(self, lines: Lines, table: SigmaTable) -> None:
-        """Collapse, and work out how σ bends; curves are not collapsed and have no place."""
+    def __init__(self, lines: Lines, table: SigmaTable, beside: Beside | None = None) -> None:
+        """Collapse, and work out how σ bends; curves are not collapsed and have no place. `beside` says what recordings
+        of other kinds know of a model's parameters."""
         self.lines = lines
+        self.beside = beside
         self.kind = kind = lines.kind
         self.table = table
         self.collapsed = lines.collapsed() if kind == "frf" else lines
@@ -119,7 +125,8 @@ class FittingProblem:
             if other is None:
                 lines = self.lines if whole else self.collapsed
                 model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
-                other = Hypothesis(model, lines, self.curvature, placed)
+                known = None if self.beside is None else self.beside(model, lines)
+                other = Hypothesis(model, lines, self.curvature, placed, knowledge=known)
             self._hypotheses[key] = replace(other, placed=placed)
         return self._hypotheses[key]
 

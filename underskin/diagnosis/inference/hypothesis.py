@@ -9,6 +9,7 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
 from underskin.diagnosis.inference.frf_products import FrfLines, frf_lines
+from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.pickup_rows import PickupRows, pickup_rows
 from underskin.diagnosis.noise.correlated_error import USUAL
@@ -45,6 +46,7 @@ class Hypothesis:
     gain: Plateau = GAIN_PRIOR
     position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
+    knowledge: Knowledge | None = None  # from recordings of other kinds
 
     @cached_property
     def mean_places(self) -> list[int]:

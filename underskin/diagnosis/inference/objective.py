@@ -13,6 +13,7 @@ import numpy as np
 from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.frf_products import FrfProducts
 from underskin.diagnosis.inference.hypothesis import FitPoint, Hypothesis
+from underskin.diagnosis.inference.knowledge import KnowledgeOfSeveral
 from underskin.diagnosis.inference.likelihood import Likelihoods, log_likelihoods, normal_equations
 from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.inference.products import Products, joined
@@ -55,6 +56,8 @@ class Evaluator:
             self._precision[number, places], self._centre[number, places], height = hypothesis.priors[:, places]
             self._log_prior_height[number] = height.sum()
         self._range = self.high - self.low
+        each = [entry.knowledge for entry in hypotheses]
+        self._known = KnowledgeOfSeveral(each, shape[1]) if any(one is not None for one in each) else None
         # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
         self.own = np.array(
             [
@@ -177,6 +180,8 @@ class Evaluator:
         each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend)
         bounds = self.free, self.low, self.high, self._precision, self._centre, self._log_prior_height
         log_priors(points.owner, contiguous(points.fit), *bounds, covariances, self._covariance_prior, each)
+        if self._known is not None:
+            each += self._known.log_densities(points)[:, None]
         return -each
 
     def costs(self, at: Evaluated, covariances: Floats) -> Floats:
@@ -193,6 +198,9 @@ class Evaluator:
         owner = at.points.owner
         free = self.free[owner]
         precision = self._precision[owner]
+        if self._known is not None:
+            of_others, towards = self._known.equations(at.points)
+            information, gradient = information + of_others, gradient + towards
         gradient = np.where(free, gradient - precision * (at.points.fit - self._centre[owner]), 0.0)
         information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
         diagonal = np.arange(free.shape[1])

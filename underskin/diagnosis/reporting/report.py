@@ -18,7 +18,7 @@ from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
-from underskin.diagnosis.reporting import next_experiment, statements
+from underskin.diagnosis.reporting import kinds, next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
@@ -26,7 +26,8 @@ from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
-from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
@@ -61,6 +62,7 @@ class DiagnosisResult:
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
+    joined: Joined | None = None  # with recordings of other kinds
 
     def with_findings(self, *further: Finding) -> "DiagnosisResult":
         """The same with further findings behind the others."""
@@ -88,8 +90,18 @@ def verdict(diagnosis: DiagnosisResult) -> str:
         return "no_mismatch"
     if leader.explanation is None:
         return "unexplained"
-    certain = leader.probability >= EXPLAINED and not without_effect(leader.explanation)
+    certain = leader.probability >= EXPLAINED and not _idle(diagnosis, leader.explanation)
     return "explained" if certain else "ambiguous"
+
+
+def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
+    """Its mechanisms that may as well have no effect, and show on no recordings of another kind."""
+    joined = diagnosis.joined
+    return [
+        name
+        for name in without_effect(explanation)
+        if joined is None or not joined.shows_on_curves(name, explanation.names)
+    ]
 
 
 def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
@@ -123,6 +135,11 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
     stated_set = named if leading is None else leading.explanation
     mechanisms = [] if stated_set is None else _mechanisms(search, problem, stated_set)
+    if named is not None:
+        mechanisms += _of_curves_alone(diagnosis, leader)
+    told_by_kind = [] if diagnosis.joined is None else kinds.by_kind(diagnosis.joined, shown.names)
+    contradictory = [] if diagnosis.joined is None else kinds.contradictions(diagnosis.joined)
+    of_kinds = "" if diagnosis.joined is None else kinds.statement(diagnosis.joined, told_by_kind)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
@@ -135,8 +152,12 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         fit,
         caveats=caveats(findings),
         power=diagnosis.power,
-        idle=without_effect(named) if named is not None else (),
-        told=_told(problem, mechanisms) if named is not None else (),
+        idle=_idle(diagnosis, named) if named is not None else (),
+        told=[
+            *(_told(problem, mechanisms) if named is not None else ()),
+            *(entry["statement"] for entry in contradictory),
+            *filter(None, [of_kinds]),
+        ],
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
@@ -147,6 +168,8 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
                 law_statement(leader.probability, leading, law, floor, outweighed=outweighed(search)),
                 caveats(findings),
                 statements.left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else "",
+                *(entry["statement"] for entry in contradictory),
+                of_kinds,
             )
             if part
         )
@@ -175,6 +198,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             for entry in diagnosis.power
         ],
         "d33": d33,
+        **({"by_kind": told_by_kind, "contradictions": contradictory} if told_by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
         "provenance": {
@@ -215,6 +239,14 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
         for name in explanation.names
         if name in problem.lines.mechanisms.named
     ]
+
+
+def _of_curves_alone(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
+    if diagnosis.joined is None or leader.explanation is None or diagnosis.search is None or diagnosis.problem is None:
+        return []
+    present = _presence(diagnosis.search, diagnosis.problem)
+    own = kinds.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
+    return [{**entry, "probability": round(present.get(entry["name"], 0.0), 3)} for entry in own]
 
 
 def _told(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:

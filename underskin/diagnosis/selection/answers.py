@@ -10,6 +10,7 @@ import numpy as np
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
+from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.priors import least_evidence, log_prior, log_prior_beneath
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
@@ -27,13 +28,14 @@ class Answer:
 
     explanation: Explanation | None  # None for none_of_these
     probability: float
+    alone: tuple[str, ...] = ()  # mechanisms that act on curves beside alone
 
     @property
     def names(self) -> tuple[str, ...]:
         """As a report names it."""
         if self.explanation is None:
             return (NONE_OF_THESE,)
-        return self.explanation.names or (NOTHING_MISSING,)
+        return (*self.explanation.names, *self.alone) or (NOTHING_MISSING,)
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class Search:
     imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
     laws: tuple[Explanation, ...] = ()  # sets with one law that nobody listed
     tried: int = 0  # sets, of which the explanations are those that were not left out early
+    beside: Beside | None = None  # curves of other kinds
 
     @property
     def supported(self) -> int:
@@ -168,7 +171,23 @@ class Search:
         answers = [
             Answer(rivals[number], float(probabilities[number])) for number, share in enumerate([*left, 1.0]) if share
         ]
+        if self.beside is not None:
+            answers = [one for answer in answers for one in self._with_own_of_curves(answer, self.beside)]
         return sorted(answers, key=lambda answer: -answer.probability)
+
+    @staticmethod
+    def _with_own_of_curves(answer: Answer, beside: Beside) -> list[Answer]:
+        """An answer with each set of mechanisms that act on the curves alone."""
+        if answer.explanation is None:
+            return [answer]
+        each = beside.alone(answer.explanation.names)
+        return [Answer(answer.explanation, answer.probability * share, alone) for alone, share in each if share > 1e-6]
+
+    @property
+    def log_total(self) -> float:
+        """The logarithm of the sum over all answers of prior times evidence."""
+        weights = [self.log_weight(entry) for entry in self.explanations if self.shows(entry)]
+        return float(np.logaddexp.reduce([*weights, *(weight for _, weight in self.processes_showing)]))
 
     def _possible_beside(
         self, kept: Sequence[Explanation], weights: Sequence[float]

@@ -175,7 +175,7 @@ def _without(
     log_prior: Callable[[Explanation], float],
 ) -> HeldOut | None:
     """Predict one group from the rest; None where the rest does not support the null hypothesis."""
-    smaller = FittingProblem(problem.lines.part(~rows), problem.table)
+    smaller = FittingProblem(problem.lines.part(~rows), problem.table, problem.beside)
     entries = {entry.names: entry for entry in (nothing, *rivals)}
     fits = {entry.names: entry for entry in smaller.refit(list(entries.values())) if entry is not None}
     if nothing.names not in fits:

@@ -1,8 +1,10 @@
 """The mechanism `strain_stiffening`."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from underskin.autodiff import chain
+from underskin.autodiff import Differentiated, chain, exp, log, where
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
@@ -12,6 +14,9 @@ from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a
 _NEWTON_STEPS = 8
+_COMPARED = 0.1  # the strain at which laws of curves and of FRFs are compared, as large as a contact's
+_LOCKED = 0.05  # of 1 + q c J, which is 0 where Gent's law locks
+_STRAIGHT = 1e-3  # of q, below which (1 + q c J)^(1/q) is taken there
 
 _COEFFICIENT = Parameter(
     name="stiffening",
@@ -107,11 +112,29 @@ class StrainStiffening(Mechanism):
     kinds = ("frf", "indentation", "compression")
     axes = ("preload_n", "indenter_radius_mm", "displacement_mm")
     imitated_by_seating = True
+    extrapolates_modulus = True
     figure = ("preload_n", "displacement_mm")
 
     def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
         """The stiffening coefficient, or for curves the law's constants."""
         return {"frf": (_COEFFICIENT,), "indentation": _SPHERE, "compression": _YEOH}[kind]
+
+    def common(self, kind: Kind, values: Values) -> Mapping[str, Differentiated]:
+        """s of 1 + s ε where the law of an indentation has strained ε = 0.1: how much stiffer than at no strain, over
+        that. A cylinder strains so much more that its law says nothing of so little."""
+        if kind == "frf":
+            return values
+        if kind == "compression":
+            return {}
+        shortened = 1.0 - _COMPARED
+        invariant = shortened**2 + 2.0 / shortened - 3.0
+        neo_hookean = (shortened**-2 - shortened) / (3.0 * _COMPARED)
+        coefficient, form, exponent = (values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
+        grown = coefficient * (3.0 * exp(exponent * (0.5 * np.log(invariant / 3.0))))
+        bend = where(np.abs(form.value) > _STRAIGHT, form, _STRAIGHT)
+        power = 1.0 + bend * grown
+        factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / bend)
+        return {"stiffening": (neo_hookean * factor - 1.0) / _COMPARED}
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Stiffen each contact by its own strain."""

@@ -1,0 +1,198 @@
+"""FRFs, a compressed block and indentations of one campaign: one data set, of one material, unless they contradict."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rig.description import parse as experiment
+from rig.elastomer import campaign_of_curves, record_curves
+from rig.recorded import campaign as campaign_of_lines
+from rig.recorded import record_lines
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.selection.other_kinds import OtherKind
+from underskin.recordings.campaign import parse
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
+LINES: dict[str, Any] = {
+    "schema": "experiment/1",
+    "name": "together",
+    "kind": "frf",
+    "skin": {**SKIN, "array": {"columns": 4, "rows": 2, "pitch_mm": 8}},
+    "design": {"indenters_mm": [4, 10], "preloads_n": [0.5, 1, 2, 3, 5], "dynamic_forces_n": [0.09]},
+    "lines": {"low_hz": 1, "high_hz": 130, "count": 20},
+    "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
+}
+BLOCK = {
+    "heights_mm": [12],
+    "diameters_mm": [20],
+    "largest_displacement_mm": 1.0,
+    "speeds_mm_per_s": [0.1],
+    "force_noise_n": 0.05,
+}
+SPHERE = {
+    "indenters_mm": [4],
+    "largest_displacement_mm": 0.25,
+    "speeds_mm_per_s": [0.05],
+    "samples": 300,
+    "force_noise_n": 0.002,
+}
+Effects = Mapping[str, Mapping[str, float]]
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def lines(modulus: float = 16.0, effects: Effects | None = None, seed: int = 5) -> dict[str, Any]:
+    """FRFs of a skin of this modulus [MPa], declared to have 16."""
+    described = {
+        **LINES,
+        "seed": seed,
+        "skin": {**LINES["skin"], "youngs_modulus_mpa": modulus},
+        "effects": effects or {},
+    }
+    document = campaign_of_lines(record_lines(experiment(described)))
+    document["skin"]["youngs_modulus_mpa"] = 16.0
+    return document
+
+
+def curves(kind: str, design: Mapping[str, Any], modulus: float = 16.0, effects: Effects | None = None) -> list[Any]:
+    """Curves of an elastomer of this modulus [MPa]."""
+    skin = {**LINES["skin"], "youngs_modulus_mpa": modulus}
+    described = {"schema": "experiment/1", "name": "c", "seed": 6, "kind": kind, "skin": skin, "curves": dict(design)}
+    made = experiment({**described, "effects": effects or {}})
+    recordings = campaign_of_curves(made, record_curves(made))["recordings"]
+    return [{**entry, "id": f"{kind}-{number}"} for number, entry in enumerate(recordings)]
+
+
+def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable) -> dict[str, Any]:
+    whole = deepcopy(dict(document))
+    whole["recordings"] = [*whole["recordings"], *further]
+    return diagnosis_report(parse(whole), table)
+
+
+def named(document: Mapping[str, Any]) -> list[str]:
+    return [entry["name"] for entry in document["mechanisms"]]
+
+
+def modulus_of(document: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    (entry,) = [
+        entry for entry in document["by_kind"] if (entry["kind"], entry["parameter"]) == (kind, "youngs_modulus")
+    ]
+    return dict(entry)
+
+
+@pytest.mark.parametrize(("kind", "design"), [("compression", BLOCK), ("indentation", SPHERE)])
+def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
+    kind: str, design: Mapping[str, Any], table: SigmaTable
+) -> None:
+    measured = lines(9.0)
+    alone = report(measured, [], table)
+    assert alone["verdict"] == "ambiguous"
+    assert "by_kind" not in alone
+    together = report(measured, curves(kind, design, 9.0), table)
+    assert (together["verdict"], named(together)) == ("explained", ["modulus_error"])
+    (factor,) = together["mechanisms"][0]["parameters"]
+    assert factor["low"] < 9 / 16 < factor["high"]
+    told = modulus_of(together, kind)
+    assert told["low"] < 9.0 < told["high"]
+    assert told["high"] / told["low"] < 1.2
+    assert "E from the " in together["statement"]
+    assert "declared 16" in together["statement"]
+    assert together["contradictions"] == []
+
+
+def test_curves_that_agree_rule_out_what_frfs_alone_leave_open(table: SigmaTable) -> None:
+    measured = lines(effects={"thickness_error": {"factor": 1.2}})
+    open_before = {tuple(entry["mechanisms"]) for entry in report(measured, [], table)["alternatives"]}
+    open_after = {
+        tuple(entry["mechanisms"])
+        for entry in report(measured, curves("compression", BLOCK), table)["alternatives"]
+        if entry["probability"] > 0.01
+    }
+    assert ("modulus_error",) in open_before
+    assert ("modulus_error",) not in open_after
+    assert ("thickness_error",) in open_after
+
+
+def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable) -> None:
+    blocks = {**BLOCK, "heights_mm": [4, 12], "diameters_mm": [20, 20]}
+    document = report(lines(), curves("compression", blocks, effects={"platen_friction": {"friction": 0.6}}), table)
+    assert (document["verdict"], named(document)) == ("explained", ["platen_friction"])
+    (friction,) = document["mechanisms"][0]["parameters"]
+    assert friction["low"] < 0.6 < friction["high"]
+    assert document["mechanisms"][0]["explains_percent"] > 50
+    assert modulus_of(document, "compression")["value"] == pytest.approx(16.0, rel=0.03)
+
+
+def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTable) -> None:
+    sticky = {"adhesion": {"work_j_per_m2": 2.0}}
+    measured = lines(effects=sticky)
+    assert report(measured, [], table)["verdict"] == "no_mismatch"
+    document = report(measured, curves("indentation", SPHERE, effects=sticky), table)
+    assert (document["verdict"], named(document)) == ("explained", ["adhesion"])
+    (work,) = document["mechanisms"][0]["parameters"]
+    assert work["low"] < 2.0 < work["high"]
+
+
+def test_stiffening_of_a_block_is_the_skins_although_its_frfs_do_not_show_it(table: SigmaTable) -> None:
+    deep = {**BLOCK, "largest_displacement_mm": 5.0}
+    stiff = {"strain_stiffening": {"coefficient": 3.0}}
+    document = report(lines(effects=stiff), curves("compression", deep, effects=stiff), table)
+    assert (document["verdict"], named(document)) == ("explained", ["strain_stiffening"])
+    told = modulus_of(document, "compression")
+    assert told["low"] < 16.0 < told["high"]
+
+
+def test_a_block_of_another_elastomer_contradicts(table: SigmaTable) -> None:
+    """FRFs that say E plainly, many and exact, and a block three times as stiff, beside a declaration that is right."""
+    exact = {"gain": 0.002, "line": 0.002, "coherence": True}
+    described = {**LINES, "noise": exact, "seed": 3, "design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}
+    measured = campaign_of_lines(record_lines(experiment(described)))
+    document = report(measured, curves("compression", BLOCK, 48.0), table)
+    (contradiction,) = document["contradictions"]
+    assert contradiction["kinds"] == ["frf", "compression"]
+    assert "contradict each other" in document["statement"]
+    assert document["verdict"] == "no_mismatch"
+    assert modulus_of(document, "compression")["value"] == pytest.approx(48.0, rel=0.05)
+
+
+def test_indentations_and_a_block_are_one_data_set_too(table: SigmaTable) -> None:
+    document = {"schema": "campaign/1", "name": "curves", "skin": {**lines()["skin"], "youngs_modulus_mpa": None}}
+    both = [*curves("indentation", SPHERE, 9.0), *curves("compression", BLOCK, 9.0)]
+    found = report({**document, "recordings": []}, both, table)
+    assert found["verdict"] == "no_mismatch"
+    assert {entry["kind"] for entry in found["by_kind"]} == {"indentation", "compression"}
+    for kind in ("indentation", "compression"):
+        told = modulus_of(found, kind)
+        assert told["low"] < 9.0 < told["high"]
+
+
+def test_the_likelihood_of_the_curves_has_their_evidence_under_their_prior(table: SigmaTable) -> None:
+    """∫ L(E) p(E) dE over the modulus' prior is the evidence of the curves with the modulus free."""
+    from underskin.diagnosis.data.dataset import lines as frf_lines
+    from underskin.diagnosis.inference.explanation import FittingProblem
+    from underskin.diagnosis.selection.other_kinds import Beside
+
+    document = lines()
+    document["recordings"] += curves("compression", BLOCK)
+    campaign = parse(document)
+    other = OtherKind(campaign, "compression", table, ())
+    problem = FittingProblem(frf_lines(campaign), table, Beside([other]))
+    hypothesis = problem.hypothesis(("modulus_error",), placed=False)
+    assert hypothesis.knowledge is not None
+    factor = [entry.name for entry in hypothesis.model.parameters].index("modulus_factor")
+    log_e = np.linspace(-1.0, 1.0, 4001)  # of the factor on the declared modulus
+    fits = np.zeros((len(log_e), len(hypothesis.model.parameters)))
+    fits[:, factor] = log_e
+    log_likelihood = np.array([hypothesis.knowledge.log_density(fit) for fit in fits])
+    told = other.told((), other.supported)
+    middle = told.mean[0] - np.log(16e6)
+    prior = np.exp(-0.5 * ((log_e - middle) / 1.5) ** 2) / (1.5 * np.sqrt(2 * np.pi))
+    integral = np.log(np.trapezoid(np.exp(log_likelihood - log_likelihood.max()) * prior, log_e)) + log_likelihood.max()
+    assert integral == pytest.approx(told.log_weight, abs=0.02)

@@ -1,0 +1,70 @@
+"""Several kinds of recordings in one campaign: explained together, unless they contradict each other.
+
+That curves and FRFs are of one material is a hypothesis like any other: its rival, that each kind has a modulus and
+strengths of its own, has the evidence of the kinds apart and a small prior.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.other_kinds import Beside, OtherKind
+from underskin.diagnosis.selection.priors import least_evidence
+from underskin.mechanisms.base import Kind
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import SigmaTable
+
+_APART = 0.03  # prior of kinds that are not of one material
+
+Fitted = Callable[[Beside | None], tuple[FittingProblem, Search]]
+
+
+@dataclass(frozen=True)
+class Joined:
+    """The recordings of the kind that gives the verdict, with what the others tell.
+
+    `search` on the `problem` that stands; `apart` is the search on these recordings alone, None where there is no
+    other kind; `contradictory` is the probability that the kinds are not of one material.
+    """
+
+    problem: FittingProblem
+    search: Search
+    beside: Beside | None = None
+    apart: Search | None = None
+    contradictory: float = 0.0
+
+    def shows_on_curves(self, name: str, names: Sequence[str]) -> bool:
+        """Whether a mechanism of a set shows on the recordings of another kind."""
+        beside = self.search.beside
+        if beside is None:
+            return False
+        others = [other for other in names if other != name]
+        both = [(beside.told(kind, names), beside.told(kind, others)) for kind in beside.kinds]
+        return any(whole.log_weight > smaller.log_weight + least_evidence(whole.best) for whole, smaller in both)
+
+
+class Others:
+    """The curves of other kinds than the one that gives the verdict."""
+
+    def __init__(self, campaigns: Mapping[Kind, Campaign], table: SigmaTable, without: Sequence[str]) -> None:
+        """By kind; mechanisms `without` which all is to be explained."""
+        self._campaigns, self._table, self._without = campaigns, table, without
+
+    def joined(self, fitted: Fitted) -> Joined:
+        """With the recordings that `fitted` explains, beside these or alone."""
+        if not self._campaigns:
+            return Joined(*fitted(None))
+        beside = Beside(
+            [OtherKind(campaign, kind, self._table, self._without) for kind, campaign in self._campaigns.items()]
+        )
+        problem, together = fitted(beside)
+        alone, apart = fitted(None)
+        log_apart = apart.log_total + sum(map(beside.log_evidence_apart, beside.kinds)) + np.log(_APART)
+        log_together = together.log_total + np.log1p(-_APART)
+        contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
+        if contradictory > 0.5:
+            return Joined(alone, apart, beside, apart, contradictory)
+        return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
