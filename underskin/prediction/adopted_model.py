@@ -178,15 +178,16 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     d33 = report["d33"]
     unsure = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
     model = AdoptedModel(campaign.skin, parameters, unsure)
-    return model if report["verdict"] == "explained" else replace(model, **_law(report, campaign, table))
+    return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
 
 
 def not_adopted(report: Mapping[str, Any]) -> str | None:
     """Why a diagnosis cannot serve as a model, by its verdict; None where it may.
 
-    A law that nobody listed may, where it is certain and its axis says something of other recordings.
+    A law that nobody listed may, where it is certain and its axis says something of other recordings; so may one of
+    several answers that predict the recordings alike.
     """
-    if report["verdict"] == "explained":
+    if report["verdict"] == "explained" or (report["verdict"] == "ambiguous" and report["provenance"].get("alike")):
         return None
     law = report.get("unnamed")
     if law is None or report["d33"] is None or law["axis"] in OF_ONE_CAMPAIGN:

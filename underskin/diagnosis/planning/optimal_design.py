@@ -31,6 +31,7 @@ _ENOUGH = 0.95
 _LEAST_GAIN = 0.01  # in the probability of deciding that a further recording must bring
 _SURVIVES = 0.02
 _RIVALS = 4
+_PROMISING = 0.3  # chance of deciding below which recordings are not proposed
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextReco
         within = inferred(problem.lines.campaign, limits)
         for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
             planned = _planned(problem, surviving, rig, bool(beyond))
-            if planned:
+            if planned and planned.probability >= _PROMISING:
                 return planned
     return None if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
 

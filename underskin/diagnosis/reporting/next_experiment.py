@@ -46,7 +46,7 @@ def _statement(plan: NextRecordings) -> str:
 
 
 def _why_none(plan: NextRecordings) -> str:
-    statement = f"No recording within these limits tells {_rivals(plan)} apart."
+    statement = f"No recordings within these limits are likely to tell {_rivals(plan)} apart."
     if plan.differ_on:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
         statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."

@@ -18,13 +18,13 @@ from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
-from underskin.diagnosis.reporting import kinds, next_experiment, statements
+from underskin.diagnosis.reporting import averaged, kinds, next_experiment, statements
 from underskin.diagnosis.reporting.caveats import caveats
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, without_effect
+from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
@@ -117,6 +117,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "statement": " ".join(part for part in said if part),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
+            "presence": [],
             "unnamed": None,
             "alternatives": [],
             "not_identifiable": [],
@@ -142,8 +143,10 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     of_kinds = "" if diagnosis.joined is None else kinds.statement(diagnosis.joined, told_by_kind)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
-    d33, implausible = _d33(problem, shown, fit) if stands else (None, [])
+    d33, implausible = _d33(search, problem, fit, stands=stands)
+    alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
+    present = averaged.presence(search, _presence(search, problem))
     statement = statements.answer_statement(
         search.answers,
         stated,
@@ -152,11 +155,12 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         fit,
         caveats=caveats(findings),
         power=diagnosis.power,
+        group=present[0] if present else None,
         idle=_idle(diagnosis, named) if named is not None else (),
         told=[
             *(_told(problem, mechanisms) if named is not None else ()),
             *(entry["statement"] for entry in contradictory),
-            *filter(None, [of_kinds]),
+            *filter(None, [of_kinds, averaged.alike_statement(alike) if alike is not None else ""]),
         ],
     )
     if leading is not None and law is not None:
@@ -179,6 +183,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "statement": statement,
         "location": _location(diagnosis, problem, stated == "no_mismatch"),
         "mechanisms": mechanisms,
+        "presence": present,
         "unnamed": law,
         "alternatives": _alternatives(search),
         "not_identifiable": [
@@ -204,25 +209,26 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "provenance": {
             **diagnosis.provenance,
             **({} if leading is None else {"unnamed": leading.as_fitted}),
+            **({} if alike is None else {"alike": alike}),
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
 
 
 def _d33(
-    problem: FittingProblem, shown: Explanation, fit: Mapping[str, Any]
+    search: Search, problem: FittingProblem, fit: Mapping[str, Any], *, stands: bool
 ) -> tuple[dict[str, Any] | None, list[Finding]]:
-    """The d33 under the one answer that stands, and a finding where no PVDF has it; None of curves.
+    """The d33 averaged over all answers, and a finding where no PVDF has it; None of curves.
 
-    `quotable`: it is plausible, and the answer fits the recordings to their noise.
+    `quotable`: one answer `stands`, d33 is plausible, and the answer fits the recordings to their noise.
     """
-    if problem.lines.curves:
+    d33 = None if problem.lines.curves else averaged.d33(search)
+    if d33 is None:
         return None, []
-    d33 = parameter(shown, place_of(shown, "d33"))
     implausible = plausibility.implausibility(d33["value"])
     reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
-    return {**d33, "quotable": reached and implausible is None}, [finding] if implausible else []
+    return {**d33, "quotable": stands and reached and implausible is None}, [finding] if implausible else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:

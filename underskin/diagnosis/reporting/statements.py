@@ -42,15 +42,19 @@ def answer_statement(
     power: Sequence[Power] = (),
     idle: Sequence[str] = (),
     told: Sequence[str] = (),
+    group: Mapping[str, Any] | None = None,
 ) -> str:
     """Some plain sentences: what is missing, what decides how far that can be trusted (`caveats`), the laws; of curves
     also the modulus under the stated answer, or what the base model leaves; where nothing is missing, what would have
     shown (`power`).
 
-    `fit` is the report's; `idle`: mechanisms of the leading answer that may as well have no effect; `told`: what the
+    `fit` is the report's, `group` the most probable of its `presence`; `idle`: mechanisms of the leading answer that may as well have no effect; `told`: what the
     values of the leading answer mean.
     """
     first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, all_used=not caveats)
+    if verdict == "ambiguous" and group is not None and len(group["mechanisms"]) > 1:
+        if group["probability"] >= EXPLAINED and not idle:
+            first, rest = _of_group(group, answers)
     if fit is not None and verdict in ("explained", "no_mismatch"):
         first = first.removesuffix(".") + _reserve(fit) + "."
     parts = [first, caveats, rest, *told]
@@ -120,6 +124,15 @@ def _answer(
     return f"Best explained by {names} ({percent}), but {', and '.join(but)}.", certain + _laws(tuple(mentioned))
 
 
+def _of_group(group: Mapping[str, Any], answers: Sequence[Answer]) -> tuple[str, str]:
+    """That one of several mechanisms is there which these recordings cannot tell apart, and how probable the sets are."""
+    named = " or ".join(in_words([name]) for name in group["mechanisms"])
+    first = f"{named[0].upper()}{named[1:]} ({in_percent(group['probability'])}): these recordings cannot tell which."
+    rivals = [answer for answer in answers[:4] if answer.probability > _WORTH_NAMING]
+    each = "; ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in rivals)
+    return first, f"By sets: {each}."
+
+
 def _modulus(after: Mapping[str, Any]) -> str:
     modulus = after["youngs_modulus"]
     interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
@@ -151,8 +164,8 @@ def power_statement(power: Sequence[Power], kind: Kind) -> str:
 
 
 def _laws(names: Sequence[str]) -> str:
-    """What each mechanism is, a sentence each."""
-    return " ".join(f"{in_words([name]).capitalize()}: {CATALOGUE[name].plain.rstrip('.')}." for name in names)
+    """What a mechanism is, in one sentence; of several nothing, since a page says it of each."""
+    return f"{in_words(names).capitalize()}: {CATALOGUE[names[0]].plain.rstrip('.')}." if len(names) == 1 else ""
 
 
 def shape_statement(shape: Shape | None) -> str:
