@@ -40,13 +40,13 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
 
 
 def _groups(search: Search) -> list[list[str]]:
-    standing = [answer for answer in search.answers if answer.explanation is not None and answer.probability > _COUNTS]
-    evidence = {
-        frozenset(answer.names): answer.explanation.log_evidence
-        for answer in standing
-        if answer.explanation is not None
-    }
-    names = sorted({name for answer in standing if answer.explanation is not None for name in answer.explanation.names})
+    standing = [
+        answer.explanation
+        for answer in search.answers
+        if answer.explanation is not None and answer.probability > _COUNTS
+    ]
+    evidence = {frozenset(entry.names): entry.log_evidence for entry in standing}
+    names = sorted({name for own in evidence for name in own})
     groups = [{name} for name in names]
     for one, two in _twins(evidence):
         first, second = (next(group for group in groups if name in group) for name in (one, two))

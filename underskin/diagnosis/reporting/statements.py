@@ -48,13 +48,13 @@ def answer_statement(
     also the modulus under the stated answer, or what the base model leaves; where nothing is missing, what would have
     shown (`power`).
 
-    `fit` is the report's, `group` the most probable of its `presence`; `idle`: mechanisms of the leading answer that may as well have no effect; `told`: what the
-    values of the leading answer mean.
+    `fit` is the report's, `group` the most probable of its `presence`; `idle`: mechanisms of the leading answer that
+    may as well have no effect; `told`: what the values of the leading answer mean.
     """
     first, rest = _answer(answers, verdict, shape, SIMPLEST[kind], idle, all_used=not caveats)
-    if verdict == "ambiguous" and group is not None and len(group["mechanisms"]) > 1:
-        if group["probability"] >= EXPLAINED and not idle:
-            first, rest = _of_group(group, answers)
+    alike = group is not None and len(group["mechanisms"]) > 1 and group["probability"] >= EXPLAINED
+    if group is not None and alike and verdict == "ambiguous" and not idle:
+        first, rest = _of_group(group, answers)
     if fit is not None and verdict in ("explained", "no_mismatch"):
         first = first.removesuffix(".") + _reserve(fit) + "."
     parts = [first, caveats, rest, *told]
@@ -125,7 +125,7 @@ def _answer(
 
 
 def _of_group(group: Mapping[str, Any], answers: Sequence[Answer]) -> tuple[str, str]:
-    """That one of several mechanisms is there which these recordings cannot tell apart, and how probable the sets are."""
+    """That one of several mechanisms is there that these recordings cannot tell apart, and how probable sets are."""
     named = " or ".join(in_words([name]) for name in group["mechanisms"])
     first = f"{named[0].upper()}{named[1:]} ({in_percent(group['probability'])}): these recordings cannot tell which."
     rivals = [answer for answer in answers[:4] if answer.probability > _WORTH_NAMING]

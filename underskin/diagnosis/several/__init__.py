@@ -1,0 +1,1 @@
+"""Several campaigns of one skin, or skins of one make, diagnosed together."""

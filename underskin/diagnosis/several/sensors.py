@@ -1,0 +1,157 @@
+"""The d33 of each sensor in each of several campaigns, the mechanisms found taken into account, and what changed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.reporting.numbers import rounded
+from underskin.errors import InvalidInput
+from underskin.inversion.invert import Inversion, invert
+from underskin.prediction.adopted_model import AdoptedModel
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf.estimation import lines_of
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, to_lab
+
+_STATED = 0.98  # probability of a change that is stated
+_PRIOR, _USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
+_FEWEST_COMMON = 3  # sensors, so that one can be told from the others
+_LEAST, _LEAST_OF_ALL = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
+
+
+@dataclass(frozen=True, eq=False)
+class SensorsOfCampaign:
+    """d33 [pC/N] of the sensors (sensors,) with a usable recording, and its standard uncertainty."""
+
+    name: str
+    ids: tuple[str, ...]
+    d33: Floats
+    uncertainty: Floats
+    low: Floats
+    high: Floats
+    unsure: float  # relative, of all alike: what the mechanisms leave
+
+    def in_report(self) -> list[dict[str, Any]]:
+        """Rows of `d33.per_sensor`."""
+        return [
+            {
+                "campaign": self.name,
+                "sensor": sensor,
+                "unit": "pC/N",
+                "value": rounded(float(self.d33[row])),
+                "low": rounded(float(self.low[row])),
+                "high": rounded(float(self.high[row])),
+            }
+            for row, sensor in enumerate(self.ids)
+        ]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A relative change of d33 from one campaign to the next: of one sensor beyond the others, or of all (None)."""
+
+    sensor: str | None
+    since: int  # number of the campaign from which on it is there
+    value: float
+    uncertainty: float  # of its logarithm
+    probability: float
+
+
+Values = Mapping[str, Mapping[str, float]]  # of mechanisms' parameters
+
+
+def sensors_of(campaign: Campaign, values: Values, unsure: float, table: SigmaTable) -> SensorsOfCampaign | None:
+    """With mechanisms at these values, which leave d33 `unsure` by so much for all sensors alike; None where no
+    recording can be inverted."""
+    model = AdoptedModel(campaign.skin, {name: found for name, found in values.items() if found}, 0.0)
+    try:
+        as_base, _ = model.as_base_model(campaign, table)
+        found: Inversion = invert(as_base, table)
+    except InvalidInput:
+        return None
+    seen = np.flatnonzero(np.isfinite(found.sensors.value))
+    value, uncertainty, low, high = (to_lab("d33_pc_per_n", part[seen]) for part in vars(found.sensors).values())
+    ids = tuple(found.sensor_ids[row] for row in seen)
+    return SensorsOfCampaign(campaign.name, ids, value, uncertainty, low, high, unsure)
+
+
+def corrected(campaign: Campaign, found: Sequence[Change], number: int) -> Campaign:
+    """The campaign of this number as it would be had no single sensor changed until then."""
+    factors: dict[str, float] = {}
+    for change in found:
+        if change.sensor is not None and change.since <= number:
+            factors[change.sensor] = factors.get(change.sensor, 1.0) / (1 + change.value)
+    if not factors:
+        return campaign
+    entries = [
+        _times(entry, factors[entry.sensor]) if isinstance(entry, FrfRecording) and entry.sensor in factors else entry
+        for entry in campaign.recordings
+    ]
+    return replace(campaign, recordings=tuple(entries))
+
+
+def _times(entry: FrfRecording, factor: float) -> FrfRecording:
+    measured = lines_of(entry)
+    return FrfRecording.of_lines(entry, measured.frequency, factor * measured.values, measured.coherence)
+
+
+def changes(each: Sequence[SensorsOfCampaign | None]) -> list[Change]:
+    """What changed from one campaign to the next: all sensors together, and single ones beyond that."""
+    found: list[Change] = []
+    for number in range(1, len(each)):
+        before, after = each[number - 1], each[number]
+        if before is None or after is None:
+            continue
+        common = [sensor for sensor in before.ids if sensor in after.ids]
+        if common:
+            found += _between(before, after, common, number)
+    return found
+
+
+def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequence[str], number: int) -> list[Change]:
+    rows = np.array([(before.ids.index(sensor), after.ids.index(sensor)) for sensor in common])
+    change = np.log(np.abs(after.d33[rows[:, 1]] / before.d33[rows[:, 0]]))
+    deviation = np.hypot(
+        before.uncertainty[rows[:, 0]] / np.abs(before.d33[rows[:, 0]]),
+        after.uncertainty[rows[:, 1]] / np.abs(after.d33[rows[:, 1]]),
+    )
+    middle = float(np.median(change))
+    around = change - middle
+    of_middle = float(1.25 * np.sqrt(np.mean(deviation**2) / len(change)))
+    beyond = np.array(
+        [_probability(x, sd, len(common)) for x, sd in zip(around, np.hypot(deviation, of_middle), strict=True)]
+    )
+    found = [
+        Change(sensor, number, float(np.expm1(change[place])), float(deviation[place]), float(beyond[place]))
+        for place, sensor in enumerate(common)
+        if len(common) >= _FEWEST_COMMON and beyond[place] > _STATED and abs(around[place]) > _LEAST
+    ]
+    of_all = float(np.hypot(of_middle, np.hypot(before.unsure, after.unsure)))
+    together = _probability(middle, of_all, 1)
+    if together > _STATED and abs(middle) > _LEAST_OF_ALL:
+        found.insert(0, Change(None, number, float(np.expm1(middle)), of_all, together))
+    return found
+
+
+def _probability(change: float, deviation: float, among: int) -> float:
+    """That one of so many changed at all: usual changes are of some 20 %, and one in twenty has any."""
+    both = (deviation**2 + _USUAL**2, deviation**2)
+    changed, same = (-0.5 * (change**2 / variance + np.log(variance)) for variance in both)
+    return float(1 / (1 + (1 - _PRIOR / among) / (_PRIOR / among) * np.exp(np.clip(same - changed, -700, 700))))
+
+
+def per_sensor(each: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]:
+    """Of all campaigns."""
+    return [row for one in each if one is not None for row in one.in_report()]
+
+
+def change_in_words(change: Change, names: Sequence[str], dates: Mapping[int, str]) -> str:
+    """d33 of one or of all sensors."""
+    whose = "of all sensors" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
+    way = "fell" if change.value < 0 else "rose"
+    since = dates.get(change.since, names[change.since])
+    low, high = (abs(100 * (change.value + way * 1.96 * change.uncertainty)) for way in (-1, 1))
+    low, high = sorted((low, high))
+    return f"d33 {whose} {way} by {abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g}) until {since}."
