@@ -123,11 +123,15 @@ def _step(
     candidates: Sequence[Candidate], number: int, sets: Sequence[frozenset[str]], here: int, there: int, supported: int
 ) -> float:
     """ln of the prior of the change, and of how well what stays agrees."""
-    changed = len(sets[here] ^ sets[there])
-    log_prior = changed * float(np.log(_CHANGES / max(supported, 1))) if changed else float(np.log(1 - _CHANGES))
+    log_prior = log_change(len(sets[here] ^ sets[there]), supported)
     before, after = candidates[number - 1].explained(sets[here]), candidates[number].explained(sets[there])
     if before is None or after is None:
         return -np.inf
     common = [name for name in before.names if name in after.names]
     agreement = log_agreement(Shared.of(before, common), Shared.of(after, common))
     return log_prior + float(np.logaddexp(np.log(_SAME_STRENGTH) + agreement, np.log(1 - _SAME_STRENGTH)))
+
+
+def log_change(mechanisms: int, supported: int) -> float:
+    """ln of the prior probability that a set differs from another by so many mechanisms."""
+    return mechanisms * float(np.log(_CHANGES / max(supported, 1))) if mechanisms else float(np.log(1 - _CHANGES))

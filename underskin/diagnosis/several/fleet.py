@@ -18,7 +18,9 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
 from underskin.diagnosis.several.campaigns import in_order
-from underskin.diagnosis.several.population import population
+from underskin.diagnosis.several.common_set import CommonSet, common_set
+from underskin.diagnosis.several.course import Candidate
+from underskin.diagnosis.several.population import STATED, without_departing
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign
@@ -26,7 +28,6 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
 _QUANTILE = float(ndtri(0.975))
-_STATED = 0.5  # probability of a departure that is listed
 _MODULUS_ERROR = "modulus_error"
 
 
@@ -59,12 +60,28 @@ def diagnose_fleet(
         results[skin] = [diagnose(campaign, table, without=without) for campaign in in_order(campaigns)]
         progress((number + 1) / (len(skins) + 1))
     usable = {skin: last for skin, own in results.items() if (last := _last(own)) is not None}
-    reports = {skin: report(result) for skin, result in usable.items()}
     lacking = [skin for skin in skins if skin not in usable]
+    candidates = {
+        skin: Candidate(result.problem, result.search)
+        for skin, result in usable.items()
+        if result.problem is not None and result.search is not None
+    }
+    if not candidates:
+        return {**report(next(iter(results.values()))[-1]), "campaign": name, "campaigns": _names(skins)}
+    found = common_set(list(candidates.values()), min(one.search.supported for one in candidates.values()))
+    fits = {
+        skin: fit
+        for (skin, candidate), names in zip(candidates.items(), found.sets, strict=True)
+        if (fit := candidate.explained(frozenset(names))) is not None
+    }
     populations = [
-        entry for entry in (_of_d33(results), _of_modulus(usable), *_of_strengths(usable)) if entry is not None
+        entry for entry in (_of_d33(fits), _of_modulus(candidates, fits), *_of_strengths(fits)) if entry is not None
     ]
-    return _document(name, skins, reports, lacking, populations, next(iter(results.values()))[-1])
+    return _document(name, skins, usable, found, lacking, populations)
+
+
+def _names(skins: Mapping[str, Sequence[Campaign]]) -> list[str]:
+    return [campaign.name for own in skins.values() for campaign in own]
 
 
 def _last(results: Sequence[DiagnosisResult]) -> DiagnosisResult | None:
@@ -72,31 +89,19 @@ def _last(results: Sequence[DiagnosisResult]) -> DiagnosisResult | None:
     return next((result for result in results[::-1] if result.search is not None), None)
 
 
-def _of_d33(results: Mapping[str, Sequence[DiagnosisResult]]) -> dict[str, Any] | None:
-    said = []
-    for skin, own in results.items():
-        each = [_leading(result) for result in own if result.search is not None]
-        values = [_logarithm(explanation, "d33") for explanation in each if explanation is not None]
-        if values:
-            weight = np.array([1 / deviation**2 for _, deviation in values])
-            mean = float(weight @ np.array([value for value, _ in values]) / weight.sum())
-            said.append(_Said(skin, mean, float(weight.sum() ** -0.5)))
+def _of_d33(fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
+    said = [_Said(skin, *_of_place(fit, place_of(fit, "d33"))) for skin, fit in fits.items()]
     return _population("d33", "pC/N", said)
 
 
-def _of_modulus(usable: Mapping[str, DiagnosisResult]) -> dict[str, Any] | None:
-    """E where the modulus is free beside the leading answer."""
+def _of_modulus(candidates: Mapping[str, Candidate], fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
+    """E where the modulus is free beside each skin's set."""
     said = []
-    for skin, result in usable.items():
-        explanation = _leading(result)
-        problem = result.problem
-        if explanation is None or problem is None or result.search is None:
-            continue
+    for skin, fit in fits.items():
+        problem = candidates[skin].problem
         declared = problem.lines.campaign.skin.youngs_modulus_mpa
-        if declared is None or _MODULUS_ERROR in result.search.unsupported:
-            continue
-        free = _with_modulus(problem, explanation)
-        if free is None:
+        free = None if declared is None else _with_modulus(problem, fit)
+        if declared is None or free is None or _MODULUS_ERROR in candidates[skin].search.unsupported:
             continue
         place = own_places(free.names, free.best.hypothesis.lines)[_MODULUS_ERROR].start
         value, deviation = _of_place(free, place)
@@ -115,32 +120,17 @@ def _with_modulus(problem: FittingProblem, explanation: Explanation) -> Explanat
     return found
 
 
-def _of_strengths(usable: Mapping[str, DiagnosisResult]) -> list[dict[str, Any] | None]:
+def _of_strengths(fits: Mapping[str, Explanation]) -> list[dict[str, Any] | None]:
     """Of the positive parameters of mechanisms that at least three skins have."""
     said: dict[tuple[str, str, str], list[_Said]] = {}
-    for skin, result in usable.items():
-        explanation = _leading(result)
-        if explanation is None:
-            continue
-        for mechanism, places in own_places(explanation.names, explanation.best.hypothesis.lines).items():
+    for skin, fit in fits.items():
+        for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
             for place in range(places.start, places.stop):
-                entry = explanation.model.parameters[place]
+                entry = fit.model.parameters[place]
                 if entry.scale == "log" and not entry.moves_covariance and mechanism != _MODULUS_ERROR:
                     key = (mechanism, entry.name, entry.unit)
-                    said.setdefault(key, []).append(_Said(skin, *_of_place(explanation, place)))
-    return [
-        _population(f"{mechanism}.{name}", unit, own)
-        for (mechanism, name, unit), own in said.items()
-        if len(own) >= _LEAST_SKINS
-    ]
-
-
-def _leading(result: DiagnosisResult) -> Explanation | None:
-    return None if result.search is None else result.search.answers[0].explanation
-
-
-def _logarithm(explanation: Explanation, name: str) -> tuple[float, float]:
-    return _of_place(explanation, place_of(explanation, name))
+                    said.setdefault(key, []).append(_Said(skin, *_of_place(fit, place)))
+    return [_population(f"{mechanism}.{name}", unit, own) for (mechanism, name, unit), own in said.items()]
 
 
 def _of_place(explanation: Explanation, place: int) -> tuple[float, float]:
@@ -152,7 +142,9 @@ def _of_place(explanation: Explanation, place: int) -> tuple[float, float]:
 def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] | None:
     if len(said) < _LEAST_SKINS:
         return None
-    found = population(np.array([one.log_value for one in said]), np.array([max(one.deviation, 1e-4) for one in said]))
+    values = np.array([one.log_value for one in said])
+    deviations = np.array([max(one.deviation, 1e-4) for one in said])
+    found = without_departing(values, deviations)
     mean = float(np.exp(found.mean))
     return {
         "parameter": name,
@@ -162,7 +154,7 @@ def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] |
         "departures": [
             {"skin": one.skin, "value": rounded(float(np.exp(one.log_value))), "probability": round(float(share), 3)}
             for one, share in zip(said, found.departs, strict=True)
-            if share > _STATED
+            if share > STATED
         ],
         "skins": [
             {
@@ -179,23 +171,26 @@ def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] |
 def _document(
     name: str,
     skins: Mapping[str, Sequence[Campaign]],
-    reports: Mapping[str, Mapping[str, Any]],
+    usable: Mapping[str, DiagnosisResult],
+    found: CommonSet,
     lacking: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
-    first: DiagnosisResult,
 ) -> dict[str, Any]:
+    reports = {skin: report(result) for skin, result in usable.items()}
     by_mechanism: dict[str, list[str]] = {}
-    for skin, own in reports.items():
-        for entry in own["mechanisms"]:
-            by_mechanism.setdefault(entry["name"], []).append(skin)
+    present: dict[str, list[float]] = {}
+    for skin, names, share in zip(usable, found.sets, found.each, strict=True):
+        for mechanism in names:
+            by_mechanism.setdefault(mechanism, []).append(skin)
+            present.setdefault(mechanism, []).append(share)
     departures = [(entry, one) for entry in populations for one in entry["departures"]]
     unexplained = [skin for skin, own in reports.items() if own["verdict"] == "unexplained"]
-    probability = float(np.prod([own["probability"] for own in reports.values()])) if reports else 1.0
-    verdict = _verdict(probability, bool(by_mechanism or departures), unexplained, bool(reports))
+    probability = found.probability
+    verdict = _verdict(probability, bool(by_mechanism or departures), unexplained)
     mechanisms: list[dict[str, Any]] = [
         {
             "name": mechanism,
-            "probability": round(float(np.mean([_present(reports[skin], mechanism) for skin in where])), 3),
+            "probability": round(float(np.mean(present[mechanism])), 3),
             "parameters": [],
             "explains_percent": None,
             "scope": {"skins": where},
@@ -206,10 +201,10 @@ def _document(
     return {
         "schema": SCHEMA,
         "campaign": name,
-        "campaigns": [campaign.name for own in skins.values() for campaign in own],
+        "campaigns": _names(skins),
         "verdict": verdict,
         "probability": round(probability, 3),
-        "statement": _statement(verdict, probability, by_mechanism, departures, unexplained, lacking, populations),
+        "statement": _statement(probability, by_mechanism, departures, unexplained, lacking, populations),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
         "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
@@ -229,7 +224,7 @@ def _document(
         else {"name": "d33", "unit": "pC/N", "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
         "next_experiment": None,
         "provenance": {
-            **first.provenance,
+            **next(iter(usable.values())).provenance,
             "each": [
                 {"skin": skin, "verdict": own["verdict"], "probability": own["probability"]}
                 for skin, own in reports.items()
@@ -238,13 +233,7 @@ def _document(
     }
 
 
-def _present(own: Mapping[str, Any], mechanism: str) -> float:
-    return float(next(entry["probability"] for entry in own["mechanisms"] if entry["name"] == mechanism))
-
-
-def _verdict(probability: float, anything: bool, unexplained: Sequence[str], usable: bool) -> str:
-    if not usable:
-        return "insufficient_data"
+def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
     if unexplained:
         return "unexplained"
     if probability < EXPLAINED:
@@ -253,7 +242,6 @@ def _verdict(probability: float, anything: bool, unexplained: Sequence[str], usa
 
 
 def _statement(
-    verdict: str,
     probability: float,
     by_mechanism: Mapping[str, Sequence[str]],
     departures: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
@@ -261,11 +249,9 @@ def _statement(
     lacking: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
 ) -> str:
-    if verdict == "insufficient_data":
-        return "The recordings cannot tell anything: none of these skins has recordings that can be used."
     each = [f"{in_words([name])} in {', '.join(where)}" for name, where in by_mechanism.items()]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
-    parts = [f"By skin: {missing} ({in_percent(probability)} that all of it is right)."]
+    parts = [f"By skin: {missing} ({in_percent(probability)} probability)."]
     if unexplained:
         parts[0] = (
             f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}."

@@ -5,7 +5,7 @@ to a usual spread and falls off beyond. Sums over a grid of τ; given τ all is 
 is better explained by N(μ, τ² + D²), D far larger than the spread, with μ and τ from the others alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from underskin.units import Floats
 
 _SPREADS = np.geomspace(2e-3, 1.0, 60)
 _USUAL = 0.1  # of a logarithm: the spread beyond which τ is less and less probable
+STATED = 0.5  # probability of a departure that is stated
 _DEPARTS = 0.05  # prior probability that a skin departs
 _FAR, _LEAST_FAR = 5.0, 0.2  # D in spreads of the others, and at least
 
@@ -43,6 +44,18 @@ def population(x: Floats, s: Floats) -> Population:
     deviation = np.sqrt(weights @ (within + (pooled - value) ** 2))
     departs = np.array([_departs(x, s, skin) for skin in range(len(x))])
     return Population(mean, float(np.sqrt(variance)), spread, value, deviation, departs)
+
+
+def without_departing(x: Floats, s: Floats) -> Population:
+    """The same where those that depart tell nothing of the others, nor the others of them."""
+    every = population(x, s)
+    kept = every.departs <= STATED
+    if kept.all() or kept.sum() < 2:
+        return every
+    others = population(x[kept], s[kept])
+    value, deviation = x.copy(), s.copy()
+    value[kept], deviation[kept] = others.value, others.deviation
+    return replace(others, value=value, deviation=deviation, departs=every.departs)
 
 
 def _mean_by_spread(x: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
