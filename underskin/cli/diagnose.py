@@ -12,10 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from underskin.cli.diagnose_several import of_several
+from underskin.cli.reports import write_page, write_report
 from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
@@ -67,6 +69,14 @@ def diagnose(
         list[str] | None,
         typer.Option(help="A mechanism to leave out of the catalogue: suppose that it is not that; repeatable."),
     ] = None,
+    together: Annotated[
+        str | None,
+        typer.Option(help="Diagnose these campaigns of one skin together, in one report of this name."),
+    ] = None,
+    fleet: Annotated[
+        str | None,
+        typer.Option(help="Diagnose the skins of these campaigns (skin.id) as a fleet, in one report of this name."),
+    ] = None,
     url: Url = LOCAL,
     key: KeyOption = None,
 ) -> None:
@@ -79,6 +89,9 @@ def diagnose(
     _refuse_overwriting(files, campaign, output_dir)
     description = None if rig is None else rig_description_in(rig)
     output_dir.mkdir(parents=True, exist_ok=True)
+    if together is not None or fleet is not None:
+        of_several(files, description, without or [], output_dir, html=html, together=together, fleet=fleet)
+        return
     # Absolute, since a cluster's workers have a working folder of their own
     one = partial(_one, rig=description, output_dir=output_dir.resolve(), html=html, without=without or [])
     failed = False
@@ -194,9 +207,8 @@ def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bo
     write_report(document, output_dir / f"{file.stem}.json")
     if html:
         from underskin.diagnosis.reporting.figures import figures
-        from underskin.diagnosis.reporting.html_report import page
 
-        _write(page(document, figures(diagnosis, document)), output_dir / f"{file.stem}.html")
+        write_page(document, output_dir / f"{file.stem}.html", figures(diagnosis, document))
     return _Outcome(str(file), verdict=str(document["verdict"]), notes=tuple(reading_notes(reading)))
 
 
@@ -239,21 +251,8 @@ def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, 
         return _Outcome(campaign, f"{campaign}: {finished['state']}: {finished['reason'] or 'no report'}")
     write_report(document, output_dir / f"{campaign}.json")
     if html:
-        from underskin.diagnosis.reporting.html_report import page
-
-        _write(page(document), output_dir / f"{campaign}.html")
+        write_page(document, output_dir / f"{campaign}.html")
     return _Outcome(campaign, verdict=str(document["verdict"]))
-
-
-def write_report(document: dict[str, Any], path: Path) -> None:
-    """Write a report as JSON, the same bytes for the same report."""
-    _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
-
-
-def _write(text: str, path: Path) -> None:
-    partial = path.with_name(f".{path.name}.part")
-    partial.write_text(text, encoding="utf-8")
-    partial.replace(path)
 
 
 def plan(

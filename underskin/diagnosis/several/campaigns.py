@@ -10,34 +10,16 @@ from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
-from underskin.diagnosis.several.course import Candidate, Course, Courses, courses
-from underskin.diagnosis.several.posteriors import Shared, combined
-from underskin.diagnosis.several.sensors import (
-    Change,
-    SensorsOfCampaign,
-    Values,
-    change_in_words,
-    changes,
-    corrected,
-    per_sensor,
-    sensors_of,
-)
+from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.several.posteriors import Shared, values
+from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
+from underskin.diagnosis.several.together_report import together_report
 from underskin.errors import InvalidInput
-from underskin.findings.formatting import in_percent
-from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
-
-_QUANTILE = float(ndtri(0.975))
-_ALTERNATIVES = 6
 
 
 def diagnose_together(
@@ -84,7 +66,8 @@ def diagnose_together(
     if len(usable) < 2:
         lacking = next(entry for number, entry in enumerate(reports) if number not in usable)
         return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
-    return _report(name, ordered, results, reports, usable, table)
+    dates = {place: date for place, number in enumerate(usable) if (date := date_of(ordered[number])) is not None}
+    return together_report(name, ordered, results, reports, usable, dates, table)
 
 
 def _with_changed_sensors(
@@ -102,21 +85,13 @@ def _with_changed_sensors(
 def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
     """The sensors under the answer of the campaign alone, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
-    values: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
-    return sensors_of(campaign, values, 0.0, table)
+    strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
+    return sensors_of(campaign, strengths, 0.0, table)
 
 
 def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
     shared = Shared.of(explanation, [name], skin=False)
-    return _values(shared.parameters, shared.mean)
-
-
-def _values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
-    values = {entry.name: entry.from_fit(float(at)) for entry, at in zip(parameters, fit, strict=True)}
-    return {
-        entry.name: values[entry.name] * (1.0 if entry.relative_to is None else values[entry.relative_to])
-        for entry in parameters
-    }
+    return values(shared.parameters, shared.mean)
 
 
 def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
@@ -150,228 +125,3 @@ def _check(campaigns: Sequence[Campaign]) -> None:
             if here != there and not (here and there and math.isclose(here, there, rel_tol=1e-9)):
                 allowed = f"must be {here:g}, as {campaigns[0].name} has it: they are to be of one skin"
                 raise InvalidInput(f"{campaign.name}: skin.{field}", there, allowed)
-
-
-def _report(
-    name: str,
-    campaigns: Sequence[Campaign],
-    results: Sequence[DiagnosisResult],
-    reports: Sequence[dict[str, Any]],
-    usable: Sequence[int],
-    table: SigmaTable,
-) -> dict[str, Any]:
-    candidates = [
-        Candidate(result.problem, result.search)
-        for result in (results[number] for number in usable)
-        if result.problem is not None and result.search is not None
-    ]
-    names = [campaigns[number].name for number in usable]
-    dates = {place: date for place, number in enumerate(usable) if (date := date_of(campaigns[number])) is not None}
-    found = courses(candidates, min(candidate.search.supported for candidate in candidates))
-    undescribed = [_undescribed(candidate) for candidate in candidates]
-    described = float(np.prod([1 - share for share in undescribed]))
-    leader = found.best[0]
-    strengths = _strengths(candidates, leader)
-    sensors = [
-        sensors_of(campaigns[number], {name: strengths[name] for name in own}, _unsure(candidate, own), table)
-        for number, candidate, own in zip(usable, candidates, leader.sets, strict=True)
-    ]
-    changed = changes(sensors)
-    mechanisms = [*_mechanisms(candidates, found, leader, names, dates), *_aged(changed, names, dates)]
-    verdict = _verdict(leader, described, changed)
-    probability = 1 - described if verdict == "unexplained" else leader.probability * described
-    last = reports[usable[-1]]
-    findings = [
-        {**finding, "statement": f"{campaign.name}: {finding['statement']}"}
-        for campaign, own in zip(campaigns, reports, strict=True)
-        for finding in own["findings"]
-    ]
-    return {
-        "schema": SCHEMA,
-        "campaign": name,
-        "campaigns": [campaign.name for campaign in campaigns],
-        "verdict": verdict,
-        "probability": round(probability, 3),
-        "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, names, dates),
-        "location": last["location"],
-        "mechanisms": mechanisms,
-        "presence": _presence(found, described),
-        "unnamed": None,
-        "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
-        "not_identifiable": last["not_identifiable"],
-        "findings": findings,
-        "fit": last["fit"],
-        "power": last["power"],
-        "d33": {**(last["d33"] or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
-        "next_experiment": last["next_experiment"],
-        "provenance": {
-            **results[usable[-1]].provenance,
-            "each": [
-                {"campaign": own["campaign"], "verdict": own["verdict"], "probability": own["probability"]}
-                for own in reports
-            ],
-        },
-    }
-
-
-def _strengths(candidates: Sequence[Candidate], leader: Course) -> dict[str, dict[str, float]]:
-    """The parameters of each mechanism, from all campaigns in which it acts."""
-    found = {}
-    for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
-        each = _each(candidates, leader, mechanism)
-        found[mechanism] = _values(each[0].parameters, combined(each)[0]) if each and len(each[0].mean) else {}
-    return found
-
-
-def _each(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[Shared]:
-    fits = [
-        candidate.explained(frozenset(own))
-        for candidate, own in zip(candidates, leader.sets, strict=True)
-        if mechanism in own
-    ]
-    return [Shared.of(fit, [mechanism], skin=False) for fit in fits if fit is not None and mechanism in fit.names]
-
-
-def _unsure(candidate: Candidate, names: Sequence[str]) -> float:
-    """By how much a d33 is unsure beyond what the base model leaves: what the mechanisms' strengths do to it."""
-    both = [candidate.explained(frozenset(own)) for own in (names, ())]
-    deviations = []
-    for fit in both:
-        assert fit is not None
-        stated = parameter(fit, place_of(fit, "d33"))
-        deviations.append(float(np.log(stated["high"] / stated["low"])) / (2 * _QUANTILE))
-    return float(np.sqrt(max(deviations[0] ** 2 - deviations[1] ** 2, 0.0)))
-
-
-def _undescribed(candidate: Candidate) -> float:
-    return sum(answer.probability for answer in candidate.search.answers if answer.explanation is None)
-
-
-def _verdict(leader: Course, described: float, changed: Sequence[Change]) -> str:
-    if described < 0.5:
-        return "unexplained"
-    if leader.probability * described < EXPLAINED:
-        return "ambiguous"
-    return "explained" if any(leader.sets) or changed else "no_mismatch"
-
-
-def _mechanisms(
-    candidates: Sequence[Candidate], found: Courses, leader: Course, names: Sequence[str], dates: dict[int, str]
-) -> list[dict[str, Any]]:
-    entries = []
-    for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
-        where = [number for number, own in enumerate(leader.sets) if mechanism in own]
-        each = _each(candidates, leader, mechanism)
-        if not each:
-            continue
-        mean, deviation = combined(each) if len(each[0].mean) else (each[0].mean, each[0].mean)
-        parameters = []
-        for entry, middle, sd in zip(each[0].parameters, mean, deviation, strict=True):
-            low, high = entry.bounds
-            ends = (middle, max(middle - _QUANTILE * sd, low), min(middle + _QUANTILE * sd, high))
-            value = dict(
-                zip(("value", "low", "high"), (rounded(entry.from_fit(float(at))) for at in ends), strict=True)
-            )
-            parameters.append({"name": entry.name, "unit": entry.unit, **value})
-        entries.append(
-            {
-                "name": mechanism,
-                "probability": round(float(np.min(found.present[mechanism][where])), 3),
-                "parameters": parameters,
-                "explains_percent": None,
-                "scope": _scope(where, names, dates),
-            }
-        )
-    return entries
-
-
-def _scope(where: Sequence[int], names: Sequence[str], dates: dict[int, str]) -> dict[str, Any]:
-    """In which campaigns; `since` where it is there from one on, and not before."""
-    from_on = where == list(range(where[0], len(names))) and where[0] > 0
-    since = dates.get(where[0], names[where[0]]) if from_on else None
-    return {"campaigns": [names[number] for number in where], **({"since": since} if since else {})}
-
-
-def _aged(changed: Sequence[Change], names: Sequence[str], dates: dict[int, str]) -> list[dict[str, Any]]:
-    """A d33 that fell from one campaign to the next is ageing, of one sensor or of all."""
-    entries = []
-    for change in changed:
-        if change.value > 0:
-            continue
-        half = _QUANTILE * change.uncertainty
-        ends = {"value": 100 * change.value, "low": 100 * (change.value - half), "high": 100 * (change.value + half)}
-        scope: dict[str, Any] = {
-            "campaigns": list(names[change.since :]),
-            "since": dates.get(change.since, names[change.since]),
-        }
-        if change.sensor is not None:
-            scope["sensors"] = [change.sensor]
-        entries.append(
-            {
-                "name": "ageing",
-                "probability": round(change.probability, 3),
-                "parameters": [
-                    {"name": "change_of_d33", "unit": "%", **{key: rounded(at, 3) for key, at in ends.items()}}
-                ],
-                "explains_percent": None,
-                "scope": scope,
-            }
-        )
-    return entries
-
-
-def _presence(found: Courses, described: float) -> list[dict[str, Any]]:
-    """The posterior that each mechanism acts in at least one campaign."""
-    once: dict[str, float] = {}
-    for course in found.best:
-        for name in {name for own in course.sets for name in own}:
-            once[name] = once.get(name, 0.0) + course.probability
-    ranked = sorted(once.items(), key=lambda entry: -entry[1])
-    return [
-        {"mechanisms": [name], "probability": round(described * share, 3)} for name, share in ranked if share > 0.005
-    ]
-
-
-def _alternative(course: Course, described: float, names: Sequence[str]) -> dict[str, Any]:
-    sets = list(dict.fromkeys(name for own in course.sets for name in own)) or [NOTHING_MISSING]
-    each = "; ".join(
-        f"{name}: {in_words(own or (NOTHING_MISSING,))}" for name, own in zip(names, course.sets, strict=True)
-    )
-    return {"mechanisms": sets, "probability": round(described * course.probability, 3), "why_not": each}
-
-
-def _statement(
-    verdict: str,
-    probability: float,
-    leader: Course,
-    undescribed: Sequence[float],
-    mechanisms: Sequence[dict[str, Any]],
-    changed: Sequence[Change],
-    names: Sequence[str],
-    dates: dict[int, str],
-) -> str:
-    percent = in_percent(probability)
-    said = [change_in_words(change, names, dates) for change in changed]
-    if verdict == "unexplained":
-        which = ", ".join(name for name, share in zip(names, undescribed, strict=True) if share > 0.5)
-        return " ".join([f"Something is missing in {which} that no known mechanism describes ({percent}).", *said])
-    if verdict == "no_mismatch":
-        agree = f"All {len(names)} campaigns and the paper's model agree within the noise"
-        return f"{agree}, with one d33 for each sensor ({percent})."
-    parts = [
-        _in_words(entry, names) for entry in mechanisms if entry["name"] in {n for own in leader.sets for n in own}
-    ]
-    if not any(leader.sets):
-        return " ".join([f"Within each campaign nothing is missing ({percent}).", *said])
-    begin = "Best explained so" if verdict == "ambiguous" else "The paper's model lacks"
-    return " ".join([f"{begin}: {'; '.join(parts)} ({percent}).", *said])
-
-
-def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:
-    scope = entry["scope"]
-    called = in_words([entry["name"]])
-    if "since" in scope:
-        return f"{called} since {scope['since']}"
-    if len(scope["campaigns"]) == len(names):
-        return f"{called} in all campaigns"
-    return f"{called} in {' and '.join(scope['campaigns'])} alone"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.selection.priors import least_evidence
+from underskin.diagnosis.selection.priors import SHOWS, least_evidence
 from underskin.diagnosis.several.course import Candidate, Names, log_change
 
 _HOPELESS = 40.0  # nats
@@ -17,8 +17,8 @@ _HOPELESS = 40.0  # nats
 
 @dataclass(frozen=True)
 class CommonSet:
-    """The most probable common set and set of each skin, with the probability of each of these; `probability` is that of
-    the common set and of the sets that differ from it."""
+    """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
+    of the common set and of the sets that differ from it."""
 
     common: Names
     sets: tuple[Names, ...]
@@ -41,7 +41,14 @@ def common_set(candidates: Sequence[Candidate], supported: int) -> CommonSet:
     weights = np.where(own, changes[None] + log_evidence[:, None], -np.inf)
     of_skins = np.logaddexp.reduce(weights, axis=2)  # (skins, common sets)
     prior = np.array([_log_prior(candidates[0], one) for one in sets])
-    log_common = prior + of_skins.sum(axis=0)
+    together = of_skins.sum(axis=0)
+    least = SHOWS + np.array(
+        [
+            max((together[sets.index(one - {name})] for name in one if one - {name} in sets), default=-np.inf)
+            for one in sets
+        ]
+    )
+    log_common = np.where(together > least, prior + together, -np.inf)  # what shows in no skin the smaller set says
     share = np.exp(log_common - np.logaddexp.reduce(log_common))
     best = int(share.argmax())
     # Of each skin the posterior of its set, all common sets averaged
@@ -54,8 +61,8 @@ def common_set(candidates: Sequence[Candidate], supported: int) -> CommonSet:
 
     each = tuple(float(posterior[number, place]) for number, place in enumerate(chosen))
     differing = [posterior[number, place] for number, place in enumerate(chosen) if place != best]
-    together = float(share[best] * np.prod(differing))
-    return CommonSet(named(best), tuple(named(int(place)) for place in chosen), each, together)
+    probability = float(share[best] * np.prod(differing))
+    return CommonSet(named(best), tuple(named(int(place)) for place in chosen), each, probability)
 
 
 def _shows(candidate: Candidate, names: frozenset[str]) -> bool:

@@ -1,7 +1,8 @@
 """Skins of one make: their moduli, d33 and the strengths of their mechanisms as populations, and which skin departs.
 
-Each skin is diagnosed from its own campaigns, together where there are several; what each says of a quantity is pooled
-(population.py), so that a skin of which little was recorded leans on its sisters.
+Each skin speaks by its latest campaign that can be used. The set of mechanisms that all have in common is found over
+all skins (common_set.py), and what each says of a quantity is pooled (population.py), so that a skin of which little
+was recorded leans on its sisters.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence

@@ -82,3 +82,12 @@ def combined(each: Sequence[Shared]) -> tuple[Floats, Floats]:
     mean = covariance @ (towards - (len(each) - 1) * prior @ each[0].prior_mean)
     low, high = (np.array([entry.bounds[end] for entry in each[0].parameters]) for end in (0, 1))
     return np.clip(mean, low, high), np.sqrt(np.diag(covariance))
+
+
+def values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
+    """Of parameters at these fit coordinates, in their units, by name."""
+    found = {entry.name: entry.from_fit(float(at)) for entry, at in zip(parameters, fit, strict=True)}
+    return {
+        entry.name: found[entry.name] * (1.0 if entry.relative_to is None else found[entry.relative_to])
+        for entry in parameters
+    }

@@ -1,0 +1,87 @@
+"""`diagnose --together` and `--fleet`: files of campaigns of one skin, or of skins of one make, in one report."""
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from underskin.cli.reports import write_page, write_report
+
+if TYPE_CHECKING:
+    from underskin.recordings.campaign import Campaign
+    from underskin.recordings.rig_description import RigDescription
+
+_NAME = re.compile(r"[\w.-][\w .-]*")
+
+
+def of_several(
+    files: Sequence[Path],
+    rig: "RigDescription | None",
+    without: Sequence[str],
+    output_dir: Path,
+    *,
+    html: bool,
+    together: str | None,
+    fleet: str | None,
+) -> None:
+    """Write NAME.json, and NAME.html with `html`."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from underskin.diagnosis.several.campaigns import diagnose_together
+    from underskin.diagnosis.several.fleet import diagnose_fleet
+    from underskin.surrogate.sigma_table import load_table
+
+    name = together if together is not None else fleet
+    if name is None or (together is not None and fleet is not None):
+        raise typer.BadParameter("one of --together and --fleet", param_hint="--fleet")
+    if not _NAME.fullmatch(name):
+        raise typer.BadParameter(
+            f"{name!r}: letters, digits, spaces, points and hyphens", param_hint="--together, --fleet"
+        )
+    target = output_dir / f"{name}.json"
+    if any(file.resolve() == target.resolve() for file in files):
+        raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
+    campaigns = _read(files, rig)
+    console = Console(stderr=True)
+    with Progress(console=console) as progress:
+        bar = progress.add_task("diagnosing", total=1.0)
+
+        def told(share: float) -> None:
+            progress.update(bar, completed=share)
+
+        if together is not None:
+            document = diagnose_together(campaigns, load_table(), name, without, told)
+        else:
+            document = diagnose_fleet(_by_skin(campaigns), load_table(), name, without, told)
+        told(1.0)
+    write_report(document, target)
+    if html:
+        write_page(document, target.with_suffix(".html"))
+    console.print(f"{name}: {document['verdict']}", markup=False, highlight=False)
+    console.print(document["statement"], markup=False, highlight=False, soft_wrap=True)
+
+
+def _read(files: Sequence[Path], rig: "RigDescription | None") -> list["Campaign"]:
+    from underskin.errors import UnderskinError
+    from underskin.recordings import read_file
+
+    campaigns = []
+    for file in files:
+        try:
+            campaigns.append(read_file(file, file.name, rig).campaign)
+        except UnderskinError as error:
+            raise UnderskinError(f"{file}: {error}") from error
+    return campaigns
+
+
+def _by_skin(campaigns: Sequence["Campaign"]) -> dict[str, list["Campaign"]]:
+    """By skin.id, which each must have."""
+    skins: dict[str, list[Campaign]] = {}
+    for campaign in campaigns:
+        if campaign.skin.id is None:
+            raise typer.BadParameter(f"{campaign.name} names no skin (skin.id)", param_hint="--fleet")
+        skins.setdefault(campaign.skin.id, []).append(campaign)
+    return skins
