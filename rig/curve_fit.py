@@ -15,6 +15,7 @@ _ROUNDS = 40
 _ENOUGH = 3e-4  # of χ², absolute and relative
 _DAMPING = 1e-3
 _MOST_DAMPING = 1e4
+_FARTHEST = 20.0  # of ln E from its start: beyond it a body has no stiffness that numbers hold
 _STEP = 1e-5  # of ln E
 
 Law = Callable[[int, float, float], Floats]  # force of a curve at ln E and a zero of displacement
@@ -99,6 +100,8 @@ class _Fit:
 
     def chi2(self, point: Floats) -> float:
         """χ² with the priors; infinite or NaN for a step that went far astray, which is then rejected."""
+        if abs(point[0] - self.priors.log_modulus) > _FARTHEST:
+            return np.inf
         with np.errstate(over="ignore", invalid="ignore"):
             pairs = zip(self.predictions(point), self.curves, strict=True)
             total = sum(float(np.sum(((curve.force - force) / curve.deviation) ** 2)) for force, curve in pairs)
