@@ -1,4 +1,4 @@
-"""Random curves of a skin's elastomer, described as experiments: a block between platens, a sphere on the skin itself."""
+"""Random curves of a skin's elastomer, described as experiments: a block between platens, a sphere on the skin."""
 
 import math
 from collections.abc import Mapping

@@ -58,8 +58,9 @@ def two_dates(random: np.random.Generator, name: str, skin: str) -> Joint:
     if np.any(factor != 1):
         ids = [sensor[0] for sensor in lines[0].response.experiment.skin.sensors]
         sensors = () if np.all(factor != 1) else tuple(ids[index] for index in np.flatnonzero(factor != 1))
-        values = {"factor": float(factor.min())}
-        hidden.append(Hidden("ageing", values, (1,), _floats(factor), sensors, later.isoformat()))
+        hidden.append(
+            Hidden("ageing", {"factor": float(factor.min())}, (1,), _floats(factor), sensors, later.isoformat())
+        )
     return Joint(name, "dates", tuple(JointDocument(one) for one in lines), tuple(hidden))
 
 

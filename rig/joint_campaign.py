@@ -21,7 +21,7 @@ class CurveSet:
 
 @dataclass(frozen=True)
 class JointDocument:
-    """One campaign: FRF lines of a skin and, of some, curves of its elastomer. The lines' experiment declares E and h."""
+    """One campaign: FRF lines of a skin, whose experiment declares E and h, and in some curves of its elastomer."""
 
     lines: RecordedLines
     curves: CurveSet | None = None

@@ -1,8 +1,8 @@
 """A curve of an elastomer as part of a joint analysis: what is expected of the truth, less what a model expects.
 
 Expected are forces without noise and without scatter, along the recorded displacement. The curve's gain, zero of force
-and linear drift are part of the covariance, as they are at the truth; its zero of displacement, and the gain of the cell
-that all curves share, are parameters.
+and linear drift are part of the covariance, as they are at the truth; its zero of displacement, and the gain of the
+cell that all curves share, are parameters.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from rig.visible_curves import force_deviation
 from rig.whitening import Whitener
 
 _SLOPE = 1e-4  # of the largest displacement
-_SAMPLES = 150  # of a curve: so many weigh as much as all
+_SAMPLES = 120  # of a curve: so many weigh as much as all
 _JUMP = 0.1  # of the largest force, between neighbours of these samples; samples beside a jump do not count
 _NO_WEIGHT = 1e6
 _BEYOND = 1.2  # of the largest displacement: how far the law of a body reaches

@@ -16,8 +16,10 @@ from rig.errors import RigError
 from rig.layer import Floats
 
 _STEP = 1e-4
-_TOLERANCE = 1e-6
-_EVALUATIONS = 60
+_TOLERANCE = 1e-4  # of χ²
+_EVALUATIONS = 40
+_SMALL = 0.1  # χ² that needs no second fit
+_HELD = 1e-4
 _ASTRAY = 1e6  # residuals beyond what the rig has solved: such a step is rejected
 
 
@@ -44,16 +46,25 @@ class Prior:
     sd: float = 3.0
 
 
-def least_chi2(parts: Sequence[Part], priors: Mapping[str, Prior]) -> float:
-    """The least χ², from the priors' means; infinite where the parts cannot be calculated there."""
+def least_chi2(parts: Sequence[Part], priors: Mapping[str, Prior], at_first: Sequence[str] = ()) -> float:
+    """The least χ², from the priors' means; infinite where the parts cannot be calculated there.
+
+    A first fit holds the parameters `at_first`, which keeps the second from far minima.
+    """
     problem = _Problem(parts, priors)
     start = problem.mean
-    if not np.all(problem.residuals(start) < _ASTRAY):
+    if not np.all(np.abs(problem.residuals(start)) < _ASTRAY):
         return np.inf
+    held = {name: Prior(problem.mean[problem.names.index(name)], _HELD) for name in at_first}
+    reached, nearby = _descend(_Problem(parts, {**priors, **held}), start)
+    return reached if reached < _SMALL else _descend(problem, nearby)[0]
+
+
+def _descend(problem: "_Problem", start: Floats) -> tuple[float, Floats]:
     fitted = least_squares(
         problem.residuals, start, problem.jacobian, method="lm", ftol=_TOLERANCE, max_nfev=_EVALUATIONS
     )
-    return float(2 * fitted.cost)
+    return float(2 * fitted.cost), np.asarray(fitted.x)
 
 
 def deviation(parts: Sequence[Part], priors: Mapping[str, Prior], name: str) -> float:

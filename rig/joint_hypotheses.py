@@ -43,7 +43,7 @@ class Tied:
 
 
 def hypothesis(
-    joint: Joint, documents: tuple[int, ...], *, without: Hidden | None, curves: bool, free: bool
+    joint: Joint, documents: tuple[int, ...], *, without: Hidden | None, curves: bool, declared: bool, free: bool
 ) -> Hypothesis:
     """Parts and priors of a model of some documents.
 
@@ -55,6 +55,8 @@ def hypothesis(
         What the model does not have; all else that is hidden is in it.
     curves : bool
         Whether the documents' curves count.
+    declared : bool
+        Whether the declared E is known within 2 % where no error of it is hidden, and where that is what is left out.
     free : bool
         Whether the parameters of what is hidden are free; otherwise they are known.
     """
@@ -70,7 +72,7 @@ def hypothesis(
             parts += [CurvePart(one, truth, model, document.skin, free=free) for one in document.curves.recorded]
             assert truth.curves is not None
             priors[f"{document.skin}/cell"] = Prior(0.0, max(truth.curves.cell_gain, 1e-6))
-        priors |= _priors(joint, document, lacking, free=free)
+        priors |= _priors(document, lacking, declared=declared, free=free)
     if joint.population is not None:
         if len(documents) > 1:
             parts += _ties(joint, joint.population, without)
@@ -94,21 +96,23 @@ def _lines(document: JointDocument, without: Hidden | None, *, free: bool) -> Li
     return LinesPart(document.lines, replace(response, experiment=experiment, sensor_gains=gains), free=free)
 
 
-def _priors(joint: Joint, document: JointDocument, without: Hidden | None, *, free: bool) -> dict[str, Prior]:
+def _priors(document: JointDocument, without: Hidden | None, *, declared: bool, free: bool) -> dict[str, Prior]:
     """Of E, h and the sensors' gains of one document's skin."""
-    skin, declared, effects = document.skin, document.experiment.skin, document.experiment.effects
+    skin, stated, effects = document.skin, document.experiment.skin, document.experiment.effects
     lacking = without.effect if without is not None else None
     result = {}
     if lacking == "modulus_error":
-        mean = float(np.log(declared.youngs_modulus_mpa / document.true_modulus_mpa))
+        mean = float(np.log(stated.youngs_modulus_mpa / document.true_modulus_mpa))
         result[f"{skin}/modulus"] = Prior(mean, _DECLARED_E)
+    elif declared and "modulus_error" not in effects:
+        result[f"{skin}/modulus"] = Prior(0.0, _DECLARED_E)
     if lacking == "thickness_error":
-        mean = float(np.log(declared.thickness_mm / document.true_thickness_mm))
+        mean = float(np.log(stated.thickness_mm / document.true_thickness_mm))
         result[f"{skin}/thickness"] = Prior(mean, _DECLARED_H)
     elif "thickness_error" not in effects:
         result[f"{skin}/thickness"] = Prior(0.0, _DECLARED_H)
     spread = float(effects.get("sensor_spread", {}).get("sd", 0.0)) if free else 0.0
-    for sensor in declared.sensors:
+    for sensor in stated.sensors:
         result[f"{skin}/gain {sensor[0]}"] = Prior(0.0, float(np.hypot(_SENSOR, spread)))
     return result
 

@@ -1,10 +1,11 @@
 """The truth about joint campaigns (`joint_truth/1`): what each hides, what changed or departs, and what shows.
 
 `chi2_gain_alone` is what a hidden thing gains in χ² over a model without it on the FRFs of the last campaign that it
-acts on, `chi2_gain_joint` on everything together; both are expected values, over the noise. E and d33 are free there,
-of skins of one make tied to their population; h is declared within 1 % unless thickness_error is hidden too, and where
-modulus_error is what is left out, E within 2 %. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by
-Fisher's information, with the parameters of what is hidden free.
+acts on, `chi2_gain_joint` on everything together; both are expected values. d33 is free there; E is known within 2 % of
+the declared one, h within 1 %, unless their error is hidden besides; E and d33 of skins of one make are tied to their
+population. `chi2_gain_modulus_free` is the joint gain where E is free in any case: whether the thing can be told from
+an error of E. `sd_ln_modulus_frf` and `sd_ln_modulus_joint` are standard deviations of ln E by Fisher's information,
+with the parameters of what is hidden free, and E too.
 """
 
 import math
@@ -68,6 +69,9 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
     everything = tuple(range(len(joint.documents)))
     alone = _gain(joint, hidden, hidden.documents[-1:], curves=False)
     together = _gain(joint, hidden, everything, curves=True)
+    modulus_free = together
+    if hidden.effect != "modulus_error":
+        modulus_free = _gain(joint, hidden, everything, curves=True, declared=False)
     return {
         "effect": hidden.effect,
         "parameters": dict(hidden.parameters),
@@ -77,12 +81,16 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
         "departs": joint.documents[hidden.documents[0]].skin if hidden.departs else None,
         "chi2_gain_alone": _rounded(alone),
         "chi2_gain_joint": _rounded(together),
+        "chi2_gain_modulus_free": _rounded(modulus_free),
         "identifiable": together > SHOWS,
     }
 
 
-def _gain(joint: Joint, hidden: Hidden, documents: tuple[int, ...], *, curves: bool) -> float:
-    return least_chi2(*hypothesis(joint, documents, without=hidden, curves=curves, free=False))
+def _gain(
+    joint: Joint, hidden: Hidden, documents: tuple[int, ...], *, curves: bool, declared: bool = True
+) -> float:  # fmt: skip
+    parts, priors = hypothesis(joint, documents, without=hidden, curves=curves, declared=declared, free=False)
+    return least_chi2(parts, priors, sorted({f"{joint.documents[number].skin}/modulus" for number in documents}))
 
 
 def _skin(joint: Joint, skin: str) -> dict[str, Any]:
@@ -92,7 +100,8 @@ def _skin(joint: Joint, skin: str) -> dict[str, Any]:
 
 
 def _deviation(joint: Joint, documents: tuple[int, ...], skin: str, *, curves: bool) -> float:
-    return deviation(*hypothesis(joint, documents, without=None, curves=curves, free=True), f"{skin}/modulus")
+    parts, priors = hypothesis(joint, documents, without=None, curves=curves, declared=False, free=True)
+    return deviation(parts, priors, f"{skin}/modulus")
 
 
 def _population(joint: Joint) -> list[dict[str, Any]] | None:

@@ -16,6 +16,7 @@ class Whitener:
         self._share = -1 / (root * (1 + root))
 
     def __call__(self, values: Floats) -> Floats:
+        """Of the shape of the values (rows, samples)."""
         plain = values / self._deviation
         onto = np.einsum("rab,arl,rl->rb", self._turn, self._along, plain)
         return plain + np.einsum("rb,rab,arl->rl", onto * self._share, self._turn, self._along)
