@@ -48,20 +48,23 @@ def two_dates(random: np.random.Generator, name: str, skin: str) -> Joint:
     if change in ("one_sensor", "all_sensors"):
         factor = _ageing(random, first, second, one=change == "one_sensor")
     lines = [record_lines(parse(first), gains), record_lines(parse(second), gains * factor)]
-    hidden = [Hidden(one, values, (0, 1), _floats(gains) if one == "sensor_spread" else ())
-              for one, values in lines[0].response.on.items()]  # fmt: skip
-    hidden += [
-        Hidden(one, values, (1,), since=later.isoformat())
-        for one, values in lines[1].response.on.items()
-        if one in _APPEARING
+    documents = tuple(JointDocument(one) for one in lines)
+    return Joint(name, "dates", documents, _hidden(documents, gains, factor, later.isoformat()))
+
+
+def _hidden(documents: tuple[JointDocument, ...], gains: Floats, factor: Floats, later: str) -> tuple[Hidden, ...]:
+    """What lasts, and what appears on the later date."""
+    before, after = (document.experiment.effects for document in documents)
+    hidden = [
+        Hidden(one, values, (0, 1), _floats(gains) if one == "sensor_spread" else ()) for one, values in before.items()
     ]
+    hidden += [Hidden(one, values, (1,), since=later) for one, values in after.items() if one not in before]
     if np.any(factor != 1):
-        ids = [sensor[0] for sensor in lines[0].response.experiment.skin.sensors]
-        sensors = () if np.all(factor != 1) else tuple(ids[index] for index in np.flatnonzero(factor != 1))
-        hidden.append(
-            Hidden("ageing", {"factor": float(factor.min())}, (1,), _floats(factor), sensors, later.isoformat())
-        )
-    return Joint(name, "dates", tuple(JointDocument(one) for one in lines), tuple(hidden))
+        ids = [sensor[0] for sensor in documents[0].experiment.skin.sensors]
+        aged = tuple(ids[index] for index in np.flatnonzero(factor != 1))
+        sensors = aged if len(aged) < len(ids) else ()
+        hidden.append(Hidden("ageing", {"factor": float(factor.min())}, (1,), _floats(factor), sensors, later))
+    return tuple(hidden)
 
 
 def _floats(values: Floats) -> tuple[float, ...]:

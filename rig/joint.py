@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from rig import checks
 from rig.draw_joint import beside_a_block, beside_indentations
 from rig.draw_joint_dates import two_dates
 from rig.draw_joint_skins import three_skins
@@ -27,9 +28,9 @@ _TRIES = 200
 
 
 def joint_campaigns(seed: int, number: int, what: str | None = None) -> Joint:
-    """Draw and record random joint campaigns `number` of a seed; which kind they are is drawn too if not given."""
+    """Draw and record random joint campaigns `number` of a seed; what they join is drawn too if not given."""
     random = np.random.default_rng([seed, number, 29])
-    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else what]
+    drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.one_of("what", what, WHAT)]
     for _ in range(_TRIES):
         try:
             return drawn(random, f"drawn joint {seed}/{number}", f"skin-{seed}-{number}")

@@ -70,7 +70,9 @@ def _descend(problem: "_Problem", start: Floats) -> tuple[float, Floats]:
 def deviation(parts: Sequence[Part], priors: Mapping[str, Prior], name: str) -> float:
     """Standard deviation of a parameter by the information where all of them are 0, which is the truth."""
     problem = _Problem(parts, priors)
-    derivative = problem.jacobian(np.zeros(len(problem.names)))
+    here = np.zeros(len(problem.names))
+    ahead, behind = problem.jacobian(here, _STEP), problem.jacobian(here, -_STEP)
+    derivative = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)  # the other may step over a jump of a curve
     covariance = np.linalg.inv(derivative.T @ derivative)
     at = problem.names.index(name)
     return float(np.sqrt(covariance[at, at]))
@@ -88,15 +90,15 @@ class _Problem:
         values = dict(zip(self.names, point.tolist(), strict=True))
         return np.concatenate([*(_reached(part, values) for part in self.parts), (point - self.mean) / self.sd])
 
-    def jacobian(self, point: Floats) -> Floats:
+    def jacobian(self, point: Floats, step: float = _STEP) -> Floats:
         """Derivative of `residuals` (residuals, parameters)."""
         values, blocks = dict(zip(self.names, point.tolist(), strict=True)), []
         for part in self.parts:
             here = _reached(part, values)
             block = np.zeros((len(here), len(self.names)))
             for name in part.parameters:
-                beside = _reached(part, values | {name: values[name] + _STEP})
-                block[:, self.names.index(name)] = (beside - here) / _STEP
+                beside = _reached(part, values | {name: values[name] + step})
+                block[:, self.names.index(name)] = (beside - here) / step
             blocks.append(block)
         return np.concatenate([*blocks, np.diag(1 / self.sd)])
 
