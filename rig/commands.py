@@ -38,15 +38,20 @@ def draw(
     count: Annotated[int, typer.Option(min=1, help="How many campaigns.")] = 10,
     seed: Annotated[int, typer.Option(min=0, help="The same seed gives the same campaigns.")] = 0,
     what: Annotated[
-        str | None, typer.Option(help="none, single, pair or unknown: what each hides; default: a mixture.")
+        str | None,
+        typer.Option(
+            help="none, single, pair or unknown: what each hides; of kind joint: compression or indentation beside "
+            "FRFs, dates or skins; default: a mixture."
+        ),
     ] = None,
-    kind: Annotated[str, typer.Option(help="frf, indentation (raw curves) or compression.")] = "frf",
+    kind: Annotated[
+        str, typer.Option(help="frf, indentation (raw curves), compression, or joint (NNNN-1.json, NNNN-2.json …).")
+    ] = "frf",
 ) -> None:
     """Random campaigns with hidden effects, to test a diagnosis on: campaigns/NNNN.json and truth.json."""
-    from rig.draw import SHARES
-    from rig.drawn_campaign import KINDS, document_and_truth
+    from rig.drawn_campaign import HIDES, JOINT, documents_and_truth
 
-    for option, value, allowed in (("--what", what, (None, *SHARES)), ("--kind", kind, KINDS)):
+    for option, value, allowed in (("--kind", kind, tuple(HIDES)), ("--what", what, (None, *HIDES.get(kind, ())))):
         if value not in allowed:
             names = ", ".join(name for name in allowed if name)
             raise typer.BadParameter(f"{value!r}: must be one of {names}", param_hint=option)
@@ -55,7 +60,9 @@ def draw(
     truths = {}
     for number in range(count):
         name = f"{number:04d}"
-        document, truths[name] = document_and_truth(seed, number, kind, what)
-        (folder / f"{name}.json").write_text(json.dumps(document) + "\n", encoding="utf-8")
+        documents, truths[name] = documents_and_truth(seed, number, kind, what)
+        for order, document in enumerate(documents, start=1):
+            file = f"{name}-{order}.json" if kind == JOINT else f"{name}.json"
+            (folder / file).write_text(json.dumps(document) + "\n", encoding="utf-8")
     (output_dir / "truth.json").write_text(json.dumps(truths, ensure_ascii=False) + "\n", encoding="utf-8")
     typer.echo(f"{count} campaigns in {folder}, what they hide in {output_dir / 'truth.json'}")

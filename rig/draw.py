@@ -50,7 +50,7 @@ def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
     for _ in range(200):
         names = _names(random, hidden)
         sought = set(names) if set(names) & set(CATALOGUED) else {*names, str(random.choice(CATALOGUED))}
-        description = _description(random, f"drawn {seed}/{number}", sought)
+        description = random_description(random, f"drawn {seed}/{number}", sought)
         ranges = of_frf(description)
         description["effects"] = {name: drawn_parameters(random, name, ranges) for name in names}
         if _feasible(description):
@@ -86,7 +86,8 @@ def _names(random: np.random.Generator, what: str) -> list[str]:
             return names
 
 
-def _description(random: np.random.Generator, name: str, effects: set[str]) -> dict[str, Any]:
+def random_description(random: np.random.Generator, name: str, effects: set[str]) -> dict[str, Any]:
+    """The description, as yet without effects, of a random experiment of kind frf that suits the named effects."""
     skin, spacing = _skin(random, effects)
     high = bool(effects & _NEEDS_HIGH_LINES) or random.random() < 0.4
     return {

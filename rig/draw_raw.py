@@ -62,7 +62,7 @@ def raw_description(random: np.random.Generator, name: str, names: list[str]) ->
         "modulus_declared": bool(random.random() < 0.5),
         "modulus_scatter": 0.015,
         "units_checked": small,
-        **_reading(random, depth, force, reach, seconds),
+        **reading(random, depth, force, reach, seconds),
     }
     skin = {"thickness_mm": min(contact / ratio, _THICKEST_MM), "youngs_modulus_mpa": modulus, "sensor_radius_mm": 1.0,
             "d33_pc_per_n": 10.0}  # fmt: skip
@@ -80,7 +80,7 @@ def _stage(random: np.random.Generator, small: bool, modulus: float, contact: fl
     return secant * _log(random, 2, 300)
 
 
-def _reading(
+def reading(
     random: np.random.Generator, depth: float, force: float, reach: float, seconds: float
 ) -> dict[str, float]:  # fmt: skip
     """Scatter, drift, noise and steps of the instrument."""

@@ -1,21 +1,32 @@
-"""A random experiment of any kind, carried out: its campaign, and the truth about it."""
+"""Random experiments of any kind, carried out: their campaigns, and the truth about them."""
 
 from typing import Any
 
-from rig.draw import drawn, record
+from rig.draw import SHARES, drawn, record
 from rig.draw_curves import drawn_curves
 from rig.effects import COMPRESSION, FRF, INDENTATION
 from rig.elastomer import campaign_of_curves
+from rig.joint import WHAT, drawn_joint
 from rig.recorded import campaign
 from rig.truth import truth_of_curves, truth_of_lines
 
-KINDS = (FRF, INDENTATION, COMPRESSION)
+JOINT = "joint"
+HIDES: dict[str, tuple[str, ...]] = {  # kinds, and what may be asked for of each
+    FRF: tuple(SHARES),
+    INDENTATION: tuple(SHARES),
+    COMPRESSION: tuple(SHARES),
+    JOINT: WHAT,
+}
+
+Documents = tuple[list[dict[str, Any]], dict[str, Any]]
 
 
-def document_and_truth(seed: int, number: int, kind: str, what: str | None) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The campaign (`campaign/1`) and the truth (`truth/1`) of random experiment `number` of a seed."""
+def documents_and_truth(seed: int, number: int, kind: str, what: str | None) -> Documents:
+    """The campaigns (`campaign/1`) of random experiment `number` of a seed, of kind joint several, and the truth."""
+    if kind == JOINT:
+        return drawn_joint(seed, number, what)
     if kind == FRF:
         lines = record(drawn(seed, number, what))
-        return campaign(lines), truth_of_lines(lines)
+        return [campaign(lines)], truth_of_lines(lines)
     experiment, curves = drawn_curves(seed, number, kind, what)
-    return campaign_of_curves(experiment, curves), truth_of_curves(experiment, curves)
+    return [campaign_of_curves(experiment, curves)], truth_of_curves(experiment, curves)

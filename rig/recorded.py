@@ -34,14 +34,15 @@ class RecordedLines:
     coherence: Floats | None
 
 
-def make_response(experiment: Experiment) -> TrueResponse:
-    """The true response of an experiment, with its scatter of positions and of sensors drawn."""
+def make_response(experiment: Experiment, sensor_gains: Floats | None = None) -> TrueResponse:
+    """The true response of an experiment, its scatter of positions drawn, and of sensors unless gains are given."""
     plan = recordings(experiment)
     random = np.random.default_rng([experiment.seed, 1])
     missed = experiment.noise.position_mm * random.normal(size=(len(plan.preload_n), 2))
-    spread = effects.of(experiment.effects, "sensor_spread", "sd")
-    gains = np.exp(spread * random.normal(size=len(experiment.skin.sensors)))
-    return TrueResponse(experiment, plan, missed, gains)
+    if sensor_gains is None:
+        spread = effects.of(experiment.effects, "sensor_spread", "sd")
+        sensor_gains = np.exp(spread * random.normal(size=len(experiment.skin.sensors)))
+    return TrueResponse(experiment, plan, missed, sensor_gains)
 
 
 def recording_gains(experiment: Experiment, rows: int) -> Floats:
@@ -49,10 +50,10 @@ def recording_gains(experiment: Experiment, rows: int) -> Floats:
     return np.exp(experiment.noise.gain * np.random.default_rng([experiment.seed, 2]).normal(size=rows))
 
 
-def record_lines(experiment: Experiment) -> RecordedLines:
-    """Carry out an experiment that records FRF lines."""
+def record_lines(experiment: Experiment, sensor_gains: Floats | None = None) -> RecordedLines:
+    """Carry out an experiment that records FRF lines, on sensors of given gains (sensors,) or of drawn ones."""
     assert experiment.lines is not None
-    response = make_response(experiment)
+    response = make_response(experiment, sensor_gains)
     grid = np.geomspace(experiment.lines.low_hz, experiment.lines.high_hz, experiment.lines.count)
     frequency = np.unique(np.round(grid, 4))
     exact = response.lines(frequency)

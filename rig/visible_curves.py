@@ -20,7 +20,7 @@ from rig.curve_fit import Curve, Law, Priors, least_chi2
 from rig.effects import INDENTATION, Values
 from rig.elastomer import RecordedCurve, frame_compliance, pressed_body, true_modulus
 from rig.errors import RigError
-from rig.experiment import Experiment
+from rig.experiment import CurveDesign, Experiment
 from rig.layer import Floats
 
 THRESHOLD = 30.0
@@ -74,6 +74,13 @@ def visibility(experiment: Experiment, recorded: list[RecordedCurve], known: tup
     return Visibility(chi2 - true, 100 * float(np.sqrt(left / sum(float(np.sum(force**2)) for force in exact))))
 
 
+def force_deviation(design: CurveDesign, slope: Floats, largest_n: float) -> Floats:
+    """Deviation of force [N] by noise and steps, those of displacement through the slope |dF/du| [N/mm] (samples,)."""
+    travel = np.hypot(design.displacement_noise_mm, design.displacement_step_mm / np.sqrt(12))
+    noise = np.sqrt(design.force_noise_n**2 + design.force_step_n**2 / 12 + (slope * travel) ** 2)
+    return np.maximum(noise, _LEAST_NOISE * largest_n + 1e-15)
+
+
 @dataclass(frozen=True)
 class _Base:
     """The base model of recorded curves, with the effects `on`."""
@@ -89,14 +96,12 @@ class _Base:
         assert design is not None
         step = _STEP * design.largest_displacement_mm
         slope = np.abs(self.law()(number, 0.0, -step) - self.law()(number, 0.0, step)) / (2 * step)
-        travel = np.hypot(design.displacement_noise_mm, design.displacement_step_mm / np.sqrt(12))
-        noise = np.sqrt(design.force_noise_n**2 + design.force_step_n**2 / 12 + (slope * travel) ** 2)
-        least = _LEAST_NOISE * np.abs(curve.exact_force_n).max() + 1e-15
+        noise = force_deviation(design, slope, float(np.abs(curve.exact_force_n).max()))
         columns = np.zeros((0, len(noise)))
         if self.experiment.kind == INDENTATION:
             along = curve.exact_displacement_mm if design.drift_n_per_mm else curve.time_s
             columns = np.stack([np.ones_like(along), (along - along[0]) / np.ptp(along)])
-        return Curve(np.array(curve.entry["force_n"]), np.maximum(noise, least), columns)
+        return Curve(np.array(curve.entry["force_n"]), noise, columns)
 
     def priors(self) -> Priors:
         """Of ln E over the true modulus, and of the gains."""
