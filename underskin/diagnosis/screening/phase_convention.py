@@ -19,8 +19,7 @@ from underskin.units import Complexes, Floats, Mask
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
-_GAIN, _COST = 30.0, 4.0  # of T, and per ln of the number of choices
-_SMALL, _SMALL_SHARE, _SURE = 0.35, 0.15, 5.0  # courses of no sign: most recordings that tell theirs must have one
+_GAIN, _COST = 15.0, 4.5  # of T, and per ln of the number of choices
 _PLAIN, _BETTER = 25.0, 0.5  # χ² by which the conjugated course is nearer to a causal one, and its share of the other
 
 
@@ -63,13 +62,7 @@ def _aligned(courses: PhaseCourses) -> Floats:
     gain = _explained(phase, weight, signs) - _explained(phase, weight, same)
     if fewer == 0 or gain < _GAIN + _COST * log(comb(int(telling.sum()), fewer)):
         return same
-    course = _mean(phase, weight, signs)
-    sureness = np.sqrt((weight * course**2).sum(axis=1))
-    size = np.abs(_along(phase, weight, course)) / np.maximum(sureness**2, 1e-300)
-    sure = telling & (sureness > _SURE)
-    usual = float(np.median(size[sure])) if sure.any() else 1.0
-    plain = not sure.any() or bool((size[sure] < _SMALL * usual).mean() < _SMALL_SHARE)
-    return signs if plain else same
+    return signs
 
 
 def _orientation(courses: PhaseCourses, signs: Floats) -> int:
@@ -98,7 +91,7 @@ def _mean_course(courses: PhaseCourses, signs: Floats) -> tuple[Complexes, Float
 
 def _phases(courses: PhaseCourses) -> tuple[Floats, Floats]:
     """Phase and weight (recordings, bands) [rad, rad⁻²], 0 where there is none."""
-    known = np.isfinite(courses.value) & np.isfinite(courses.deviation)
+    known = np.isfinite(courses.value) & np.isfinite(courses.deviation) & courses.followed
     phase = np.clip(np.where(known, courses.value, 0).imag, -_LARGEST, _LARGEST)
     return phase, np.where(known, courses.deviation, np.inf) ** -2.0
 

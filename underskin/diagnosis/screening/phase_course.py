@@ -19,6 +19,7 @@ from underskin.units import Complexes, Floats, Indices, Mask
 _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
 _MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 8.0  # pick-up has a phase of its own
+_STEP = 2.8  # rad: from a larger step on, the way round is not known
 _WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
 _SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
 _ENOUGH = 12  # second differences in a band, or in it and the two beside it on either side
@@ -33,6 +34,7 @@ class PhaseCourses:
     frequency: Floats  # (bands,)
     value: Complexes
     deviation: Floats
+    followed: Mask  # below the first large step of the phase, whose way round is not known
 
     @property
     def telling(self) -> Mask:
@@ -47,6 +49,7 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
     highest = max(float(own.frequency.max()) for own in measured)
     edges = np.geomspace(lowest * (1 - 1e-9), highest * (1 + 1e-9), _BANDS + 1)
     value = np.full((len(entries), _BANDS), np.nan + 0j)
+    followed = np.zeros(value.shape, dtype=bool)
     share, noises = np.full((len(entries), _BANDS), np.nan), np.full(len(entries), np.nan)
     rough: list[tuple[Indices, Floats]] = []
     for number, own in enumerate(measured):
@@ -60,6 +63,8 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
         rough += [(part, own_second / noise) for own_second in second for part in (band[:-2], band[1:-1], band[2:])]
+        steps = np.flatnonzero(np.abs(np.diff(logarithm.imag)) > _STEP)
+        followed[number] = np.arange(_BANDS) < (band[steps[0]] if len(steps) else _BANDS)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
             real, imaginary = (
@@ -70,7 +75,7 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
         noises[number] = noise
     if rough:
         noises = np.maximum(noises, np.nanmedian(noises))
-    return PhaseCourses(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough))
+    return PhaseCourses(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
 
 
 def _usable(measured: Frf) -> tuple[Floats, Complexes]:
