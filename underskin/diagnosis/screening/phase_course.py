@@ -19,7 +19,7 @@ from underskin.units import Complexes, Floats, Indices, Mask
 _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
 _MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 8.0  # pick-up has a phase of its own
-_STEP = 2.8  # rad: from a larger step on, the way round is not known
+_STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
 _WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
 _SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
 _ENOUGH = 12  # second differences in a band, or in it and the two beside it on either side
@@ -34,7 +34,7 @@ class PhaseCourses:
     frequency: Floats  # (bands,)
     value: Complexes
     deviation: Floats
-    followed: Mask  # below the first large step of the phase, whose way round is not known
+    followed: Mask  # below a zero of the response, where the way round of the phase is lost
 
     @property
     def telling(self) -> Mask:
@@ -63,8 +63,7 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
         rough += [(part, own_second / noise) for own_second in second for part in (band[:-2], band[1:-1], band[2:])]
-        steps = np.flatnonzero(np.abs(np.diff(logarithm.imag)) > _STEP)
-        followed[number] = np.arange(_BANDS) < (band[steps[0]] if len(steps) else _BANDS)
+        followed[number] = np.arange(_BANDS) < _lost(logarithm, band)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
             real, imaginary = (
@@ -84,6 +83,13 @@ def _usable(measured: Frf) -> tuple[Floats, Complexes]:
     kept = ~beside & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
     order = np.argsort(measured.frequency[kept], kind="stable")
     return measured.frequency[kept][order], measured.values[kept][order]
+
+
+def _lost(logarithm: Complexes, band: Indices) -> int:
+    """The band from which on the way round of the phase is not known: where it steps beside a zero of the response."""
+    near_zero = np.minimum(logarithm.real[1:], logarithm.real[:-1]) < np.median(logarithm.real) + np.log(_FAINT)
+    steps = np.flatnonzero(near_zero & (np.abs(np.diff(logarithm.imag)) > _STEP))
+    return int(band[steps[0]]) if len(steps) else _BANDS
 
 
 def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
