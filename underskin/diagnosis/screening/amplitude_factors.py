@@ -6,6 +6,7 @@ levels, each recording in turn taken for what it is nearer to. k of n such choic
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import comb, log
 
 import numpy as np
@@ -20,12 +21,14 @@ _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
 _MEANT = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
 _GAIN, _COST = 15.0, 1.0  # of ln evidence, and per ln of the number of choices
-_WELL = 0.8  # of the recordings at least lie within a quarter of ln c of one of the two levels
+_WELL = 0.8  # of the recordings at least lie within a third of ln c of one of the two levels
 _MOST = 0.5
+_EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
+_SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
 
 
 @dataclass(frozen=True)
-class _Step:
+class Step:
     """A factor, the recordings that have it, and by how much ln evidence gains on its cost."""
 
     factor: float
@@ -33,62 +36,58 @@ class _Step:
     gain: float
 
 
-def without_factors(
-    entries: Sequence[FrfRecording], levels: Levels
-) -> tuple[list[FrfRecording], list[Finding], Levels]:
-    """The recordings with such a factor taken out, the finding on it, and their levels."""
+def amplitude_step(levels: Levels) -> Step | None:
+    """The plainest such factor among the recordings, None where none is plain."""
     if len(levels.value) < _LEAST:
-        return list(entries), [], levels
-    steps = [step for step in (_step(levels, factor) for factor in _FACTORS) if step is not None]
+        return None
+    base = levels.fit(levels.value).evidence
+    steps = [step for step in (_step(levels, factor, base) for factor in _FACTORS) if step is not None]
     best = max(steps, key=lambda step: step.gain, default=None)
-    if best is None or best.gain < _GAIN:
-        return list(entries), [], levels
-    off = levels.number[best.off].tolist()
+    return best if best is not None and best.gain > _GAIN else None
+
+
+def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
+    """The recordings with the factor taken out, and the finding on it."""
+    off = levels.number[step.off].tolist()
     arguments = {
-        "factor": best.factor,
-        "meant": _MEANT[abs(log(best.factor)) > 0.5],
+        "factor": step.factor,
+        "meant": _MEANT[abs(log(step.factor)) > 0.5],
         "of": [entries[number].id for number in off],
         "recordings": len(entries),
     }
-    right = [_times(entry, 1 / best.factor) if number in off else entry for number, entry in enumerate(entries)]
-    finding = Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
-    return right, [finding], replace(levels, value=levels.value - log(best.factor) * best.off)
+    right = [_times(entry, 1 / step.factor) if number in off else entry for number, entry in enumerate(entries)]
+    return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
 
 
-def _step(levels: Levels, factor: float) -> _Step | None:
-    """The recordings that are off by a factor; None where there are none, or most."""
+def _step(levels: Levels, factor: float, base: float) -> Step | None:
+    """The recordings that are off by a factor; None where there are none, or most, or the factor is another."""
     size = log(factor)
-    off = _nearer(levels, size)
-    if not off.any() or off.mean() > _MOST:
-        return None
-    value = levels.value - size * off
-    left = np.abs(levels.residual(value, 0.05))
-    if (left < 0.25 * abs(size)).mean() < _WELL:
-        return None
-    choices = log(comb(len(off), int(off.sum())))
-    return _Step(factor, off, levels.evidence(value) - levels.evidence(levels.value) - _COST * choices)
+    found = []
+    for scatter, bend in product(_SEARCHED_SCATTER, _SEARCHED_BEND):
+        off = _chosen(levels.value, levels.precision(scatter, bend), size)
+        if not off.any() or any((off == one.off).all() for one in found):
+            continue
+        value = levels.value - size * off
+        fit = levels.fit(value)
+        away, deviation = fit.amplitude(value, off.astype(float))
+        exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
+        if exact and (np.abs(fit.residual(value)) < 0.35 * abs(size)).mean() > _WELL:
+            cost = _COST * log(comb(len(off), int(off.sum())))
+            found.append(Step(factor, off, fit.evidence - base - cost))
+    return max(found, key=lambda step: step.gain, default=None)
 
 
-def _nearer(levels: Levels, size: float) -> Mask:
-    """a, by taking in turn the recordings that gain most, then each for what it is nearer to."""
-    off: Mask = np.zeros(len(levels.value), dtype=bool)
-    start = levels.residual(levels.value, 0.2)
-    off = _two_levels(start, size)
-    for _ in range(12):
-        left = levels.residual(levels.value - size * off, 0.1) + size * off
-        better = left / size > 0.5
-        if (better == off).all():
+def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
+    """a that makes (y − a ln c)ᵀ C⁻¹ (y − a ln c) small, one recording after the other; of a and 1 − a the smaller."""
+    off: Mask = np.zeros(len(value), dtype=bool)
+    for _ in range(3 * len(value)):
+        pull = precision @ (value - size * off)
+        gain = np.where(off, -2.0, 2.0) * size * pull - size**2 * np.diag(precision)
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
             break
-        off = better
-    return off
-
-
-def _two_levels(value: Floats, size: float) -> Mask:
-    """Which values are nearer to the second of two levels, `size` apart, that lie nearest to all of them."""
-    places = value[:, None] - value[None, :]  # from each value taken as the first level
-    misses = np.minimum(np.abs(places), np.abs(places - size))
-    first = int(np.argmin(np.minimum(misses, 0.3 * abs(size)).sum(axis=0)))
-    return np.asarray(places[:, first] / size > 0.5)
+        off[best] = not off[best]
+    return ~off if off.mean() > _MOST else off
 
 
 def _times(entry: FrfRecording, factor: float) -> FrfRecording:

@@ -4,7 +4,7 @@ With y_i = ln |level_i / shape_i| of recording i, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
 where X holds a gain, one gain a sensor (of standard deviation t), and smooth functions of what physics may follow
 (sphere, preload, place, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter of
-positions. `evidence` is the largest ln N(y; 0, C), C = X P Xᵀ + diag(s² + g² p²), over s, t and p: a slip is believed
+positions. The evidence is the largest ln N(y; 0, C), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size of the smooth functions: a slip is believed
 where taking it out of y raises it by far more than its own description costs.
 """
 
@@ -26,7 +26,9 @@ _FLAT_HZ = 130.0  # the response is about flat below
 _LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
 _SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
 _SPREAD = (0.01, 0.06, 0.25)  # t
+_BENDS = (0.1, 0.4, 1.0)  # of all smooth functions together
 _PLACE_MM = (0.0, 0.1, 0.3)  # p
+_USUAL_SPREAD, _USUAL_PLACE_MM = 0.06, 0.1
 _OVERALL, _SMOOTH, _BEND = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
 
 
@@ -39,32 +41,57 @@ class Levels:
     sensor: Indices
     order: Floats  # 0, 1, … in time
     slope: Floats  # g [1/mm]
-    smooth: Floats  # (recordings, columns) times their prior standard deviation
+    smooth: Floats  # (recordings, columns) of X, times their prior standard deviation
     cycles: Floats | None
 
-    def evidence(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> float:
-        """The largest ln N(value; 0, C); `further` (recordings, columns) is added to X, scaled by its prior."""
-        own = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
-        fixed = self.smooth @ self.smooth.T
-        if further is not None:
-            fixed = fixed + further @ further.T
-        best = -np.inf
-        for spread, place in product(_SPREAD if own.shape[1] > 1 else _SPREAD[:1], self._places):
-            for scatter in _SCATTER:
-                covariance = fixed + spread**2 * own @ own.T + np.diag(scatter**2 + (self.slope * place) ** 2)
-                best = max(best, _log_density(value, covariance))
-        return best
+    def fit(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> "LevelFit":
+        """The best s, t, p and size of the smooth functions for `value` (recordings,).
 
-    def residual(self, value: Floats, scatter: float, spread: float = 0.06) -> Floats:
-        """What the smooth functions and the sensors' gains leave of a column, at given standard deviations."""
-        own = np.eye(int(self.sensor.max()) + 1)[self.sensor]
-        about = self.smooth @ self.smooth.T + spread**2 * own @ own.T
-        noise = scatter**2 + (0.1 * self.slope) ** 2
-        return np.asarray(value - about @ np.linalg.solve(about + np.diag(noise), value))
+        `further` (recordings, columns) is added to X, scaled by its prior; `sensor` stands for the recordings' sensors.
+        """
+        spreads = _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
+        added = 0.0 if further is None else further @ further.T
+        best, chosen = -np.inf, np.eye(len(value))
+        for spread, place, bend in product(spreads, self._places, _BENDS):
+            fixed = self._expected(spread, bend, sensor) + np.diag((self.slope * place) ** 2) + added
+            for scatter in _SCATTER:
+                covariance = fixed + np.diag(np.full(len(value), scatter**2))
+                density = _log_density(value, covariance)
+                if density > best:
+                    best, chosen = density, covariance
+        return LevelFit(best, np.linalg.inv(chosen))
+
+    def precision(self, scatter: float, bend: float) -> Floats:
+        """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
+        noise = scatter**2 + (_USUAL_PLACE_MM * self.slope) ** 2
+        return np.asarray(np.linalg.inv(self._expected(_USUAL_SPREAD, bend) + np.diag(noise)))
+
+    def _expected(self, spread: float, bend: float, sensor: Indices | None = None) -> Floats:
+        """X P Xᵀ."""
+        own = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
+        return np.asarray(_OVERALL**2 + bend**2 * self.smooth @ self.smooth.T + spread**2 * own @ own.T)
 
     @property
     def _places(self) -> tuple[float, ...]:
         return _PLACE_MM if self.slope.max(initial=0.0) > 0.05 else _PLACE_MM[:1]
+
+
+@dataclass(frozen=True, eq=False)
+class LevelFit:
+    """ln N(y; 0, C) but for its constant, at the best standard deviations, and C⁻¹ there."""
+
+    evidence: float
+    precision: Floats
+
+    def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
+        """That of a column in y by generalised least squares, and its standard deviation."""
+        weight = self.precision @ column
+        total = float(weight @ column)
+        return float(weight @ value) / total, total**-0.5
+
+    def residual(self, value: Floats) -> Floats:
+        """Each value less what all others let expect of it."""
+        return np.asarray((self.precision @ value) / np.diag(self.precision))
 
 
 def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable) -> Levels:
@@ -103,12 +130,12 @@ def _level(entry: FrfRecording) -> float:
 
 
 def _smooth(campaign: Campaign, entries: Sequence[FrfRecording], order: Floats) -> Floats:
-    """The columns of X but for the sensors' gains, times their prior standard deviations."""
+    """The smooth columns of X, times their prior standard deviations."""
     if not entries:
         return np.zeros((0, 0))
     preload = _standard(np.log([entry.preload_n for entry in entries]))
     sphere = np.array([entry.indenter_radius_mm for entry in entries])
-    columns = [np.full(len(entries), _OVERALL)]
+    columns = []
     for radius in np.unique(sphere):
         own = (sphere == radius).astype(float)
         columns += [_SMOOTH * own, _SMOOTH * own * preload, _BEND * own * preload**2, _BEND * own * preload**3]
@@ -119,7 +146,7 @@ def _smooth(campaign: Campaign, entries: Sequence[FrfRecording], order: Floats) 
     columns += [_SMOOTH * column * np.hypot(x, y) ** 2 for column in (x, y, x**2 + y**2)]
     columns += [_BEND * column * preload for column in (x, y, x**2 + y**2)]
     along = _standard(order)
-    columns += [_BEND * along, _BEND * along**2, _BEND * along**3]
+    columns += [_BEND * along, _BEND * along**2]
     for name in ("load_cycles", "dwell_s", "dynamic_force_n"):
         noted = [getattr(entry, name) for entry in entries]
         if all(value is not None and value > 0 for value in noted):

@@ -4,59 +4,74 @@ A fall that load cycles could have caused is `ageing` and none of this.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import Levels
+from underskin.diagnosis.screening.levels import LevelFit, Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
-from underskin.units import Floats, Mask
+from underskin.units import Floats
 
 _LEAST = 10
 _TIMES = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.25  # of the recordings: τ is a few of them
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN, _OVER_FIRST = 12.0, 2.0  # of ln evidence, and over the first recording alone being off
+_GAIN, _OVER_FIRST, _OVER_AGEING = 7.0, 2.0, 3.0  # of ln evidence, and over what else it may be
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
 
-def warm_up(entries: Sequence[FrfRecording], levels: Levels) -> tuple[Mask, list[Finding]]:
-    """Which recordings fall into it (entries,), and the finding on it."""
-    none: Mask = np.zeros(len(entries), dtype=bool)
+@dataclass(frozen=True)
+class WarmUp:
+    """Its τ [recordings], its amplitude A, and by how much ln evidence gains."""
+
+    time: float
+    amplitude: float
+    gain: float
+
+
+def warming(levels: Levels) -> WarmUp | None:
+    """The drift within the first recordings, None where none is plain."""
     times = [time for time in _TIMES if 2 * time <= _MOST_SHARE * len(levels.value)]
     if len(levels.value) < _LEAST or not times:
-        return none, []
-    base = levels.evidence(levels.value)
-    gains = [levels.evidence(levels.value, _AMPLITUDE * _drift(levels, time)) - base for time in times]
-    best = int(np.argmax(gains))
-    if gains[best] < _GAIN:
-        return none, []
+        return None
+    base = levels.fit(levels.value).evidence
+    fits = [levels.fit(levels.value, _AMPLITUDE * _drift(levels, time)[:, None]) for time in times]
+    best = int(np.argmax([fit.evidence for fit in fits]))
+    gain = fits[best].evidence - base
+    if gain < _GAIN:
+        return None
     drift = _drift(levels, times[best])
-    amplitude = _amplitude(levels, drift[:, 0])
+    amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
     first = (levels.order == levels.order.min()).astype(float)[:, None]
-    rivals = [levels.evidence(levels.value, _AMPLITUDE * first) - base + _OVER_FIRST]
+    rivals = [levels.fit(levels.value, _AMPLITUDE * first).evidence + _OVER_FIRST]
     if amplitude > 0 and levels.cycles is not None:
-        rivals += [levels.evidence(levels.value, _AMPLITUDE * one) - base + 3 for one in _ageing(levels.cycles)]
-    if gains[best] < max(rivals):
-        return none, []
-    last = times[best] * np.log(max(abs(amplitude) / _OVER, 1.0))
-    early = levels.order < max(1.0, min(last, _MOST_SHARE * len(entries)))
-    out = none.copy()
-    out[levels.number[early]] = True
-    arguments = {"percent": 100 * float(np.exp(-amplitude) - 1), "recordings": int(out.sum())}
-    return out, [Finding(Reason.WARM_UP, "", "recorded_at", arguments)]
+        rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
+    return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
+
+
+def without_first(
+    entries: Sequence[FrfRecording], levels: Levels, found: WarmUp
+) -> tuple[list[FrfRecording], Finding]:
+    """The recordings after the warm-up, and the finding on it."""
+    last = min(found.time * np.log(max(abs(found.amplitude) / _OVER, 1.0)), _MOST_SHARE * len(entries))
+    late = recording_order(entries) > last
+    arguments = {"percent": 100 * float(np.exp(-found.amplitude) - 1), "recordings": int((~late).sum())}
+    kept = [entry for entry, chosen in zip(entries, late, strict=True) if chosen]
+    return kept, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
+
+
+def _without(levels: Levels, drift: Floats) -> LevelFit:
+    """The fit of the levels without the drift at about its amplitude."""
+    amplitude, _ = levels.fit(levels.value, _AMPLITUDE * drift[:, None]).amplitude(levels.value, drift)
+    return levels.fit(levels.value - amplitude * drift)
 
 
 def _drift(levels: Levels, time: float) -> Floats:
-    return np.asarray(np.exp(-levels.order / time))[:, None]
-
-
-def _amplitude(levels: Levels, drift: Floats) -> float:
-    """A, by least squares of what the smooth functions leave of both."""
-    left = levels.residual(drift, 0.03)
-    return float(left @ levels.value / (left @ drift))
+    return np.asarray(np.exp(-levels.order / time))
 
 
 def _ageing(cycles: Floats) -> list[Floats]:
