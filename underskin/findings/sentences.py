@@ -81,11 +81,12 @@ def cables_exchanged(first: str, second: str, since: str, recordings: int, put_r
     return f"{text}: their cables look exchanged; {done} ({recordings} recordings)"
 
 
-def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int) -> str:
+def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:
     """Some recordings a fixed factor beside the others."""
+    untold = f"; {left_out} that do not tell were left out" if left_out else ""
     return (
         f"the response of {len(of)} of {recordings} recordings is {factor:.3g} times the others': is their dynamic "
-        f"force or charge given as {meant} instead of peak? Put right by this factor ({listed(of, 'recordings')})"
+        f"force or charge given as {meant} instead of peak? Put right by this factor ({listed(of, 'recordings')}){untold}"
     )
 
 

@@ -20,8 +20,8 @@ from underskin.units import Floats, Mask
 _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
 _MEANT = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
-_GAIN, _COST = 15.0, 1.0  # of ln evidence, and per ln of the number of choices
-_WELL = 0.8  # of the recordings at least lie within a third of ln c of one of the two levels
+_GAIN, _GAIN_ALONE, _COST = 10.0, 18.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
+_WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
 _MOST = 0.5
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
 _SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
@@ -42,20 +42,24 @@ def amplitude_step(levels: Levels) -> Step | None:
         return None
     base = levels.fit(levels.value).evidence
     steps = [step for step in (_step(levels, factor, base) for factor in _FACTORS) if step is not None]
-    best = max(steps, key=lambda step: step.gain, default=None)
-    return best if best is not None and best.gain > _GAIN else None
+    plain = [step for step in steps if step.gain > (_GAIN if step.off.sum() > 1 else _GAIN_ALONE)]
+    return max(plain, key=lambda step: step.gain, default=None)
 
 
 def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with the factor taken out, and the finding on it."""
+    """The recordings with the factor taken out, those without a level left out, and the finding on it."""
     off = levels.number[step.off].tolist()
     arguments = {
         "factor": step.factor,
         "meant": _MEANT[abs(log(step.factor)) > 0.5],
         "of": [entries[number].id for number in off],
         "recordings": len(entries),
+        "left_out": len(entries) - len(levels.number),
     }
-    right = [_times(entry, 1 / step.factor) if number in off else entry for number, entry in enumerate(entries)]
+    right = [
+        _times(entries[number], 1 / step.factor) if number in off else entries[number]
+        for number in levels.number.tolist()
+    ]
     return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
 
 

@@ -1,13 +1,15 @@
-"""Slips that show in the levels of recordings only: a weak sensor, amplitudes of another kind, a warm-up.
+"""Slips that show in the levels of recordings only: a weak sensor, amplitudes of another kind, a warm-up,
+cables exchanged.
 
 The plainest is put right first, since each looks a little like the others.
 """
 
 from collections.abc import Sequence
 
-from underskin.diagnosis.screening.amplitude_factors import amplitude_step, without_step
+from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
+from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
 from underskin.diagnosis.screening.levels import levels
-from underskin.diagnosis.screening.warm_up import warming, without_first
+from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
 from underskin.diagnosis.screening.weak_sensors import weak_sensors
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -41,7 +43,11 @@ def _plainest(
     if len(entries) < _LEAST:
         return None
     own = levels(campaign, entries, table)
-    step, drift = amplitude_step(own), warming(own)
-    if step is not None and (drift is None or step.gain > drift.gain):
-        return without_step(entries, own, step)
-    return None if drift is None else without_first(entries, own, drift)
+    step, drift, cables = amplitude_step(own), warming(own), exchanged_cables(own)
+    found = [one for one in (step, drift, cables) if one is not None]
+    best = max(found, key=lambda one: one.gain, default=None)
+    if isinstance(best, Step):
+        return without_step(entries, own, best)
+    if isinstance(best, WarmUp):
+        return without_first(entries, own, best)
+    return None if best is None else with_right_sensors(entries, own, best)

@@ -51,15 +51,21 @@ class Levels:
         """
         spreads = _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
         added = 0.0 if further is None else further @ further.T
-        best, chosen = -np.inf, np.eye(len(value))
+        best, chosen, size = -np.inf, np.eye(len(value)), 1.0
         for spread, place, bend in product(spreads, self._places, _BENDS):
             fixed = self._expected(spread, bend, sensor) + np.diag((self.slope * place) ** 2) + added
             for scatter in _SCATTER:
                 covariance = fixed + np.diag(np.full(len(value), scatter**2))
                 density = _log_density(value, covariance)
                 if density > best:
-                    best, chosen = density, covariance
-        return LevelFit(best, np.linalg.inv(chosen))
+                    best, chosen, size = density, covariance, bend
+        return LevelFit(best, np.linalg.inv(chosen), size)
+
+    def without_smooth(self, fit: "LevelFit") -> Floats:
+        """y less the smooth functions as fitted (recordings,)."""
+        return np.asarray(
+            self.value - fit.bend**2 * self.smooth @ (self.smooth.T @ (fit.precision @ self.value))
+        )
 
     def precision(self, scatter: float, bend: float) -> Floats:
         """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
@@ -78,10 +84,11 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """ln N(y; 0, C) but for its constant, at the best standard deviations, and C⁻¹ there."""
+    """ln N(y; 0, C) but for its constant, at the best standard deviations; C⁻¹, and the size of the smooth functions."""
 
     evidence: float
     precision: Floats
+    bend: float
 
     def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
         """That of a column in y by generalised least squares, and its standard deviation."""
@@ -100,7 +107,7 @@ def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTabl
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     first = np.searchsorted(model.recording, np.arange(len(entries)))
     shape = np.abs(prediction.value[first].real)
-    level = np.array([_level(entry) for entry in entries])
+    level = np.array([flat_level(entry) for entry in entries])
     chosen = np.flatnonzero(
         model.valid[first] & (shape > _LEAST_RESPONSE * shape.max(initial=0.0)) & (level > 0) & np.isfinite(level)
     )
@@ -121,7 +128,7 @@ def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTabl
     )
 
 
-def _level(entry: FrfRecording) -> float:
+def flat_level(entry: FrfRecording) -> float:
     """|FRF| in the flat zone [C/N]."""
     measured = lines_of(entry)
     flat: Mask = measured.frequency <= _FLAT_HZ
