@@ -191,7 +191,7 @@ def factor(value: float) -> Make:
 # Each slip, and the reasons of findings that name it.
 SLIPS: Mapping[str, tuple[Make, tuple[Reason, ...]]] = {
     "labels exchanged": (labels, (Reason.LABELS_EXCHANGED,)),
-    "cables exchanged": (cables, (Reason.CABLES_EXCHANGED,)),
+    "cables exchanged": (cables, (Reason.CABLES_EXCHANGED, Reason.LABELS_EXCHANGED)),
     "all conjugated": (conjugated(1.0), (Reason.ALL_CONJUGATED,)),
     "a third conjugated": (conjugated(1 / 3), (Reason.RECORDINGS_CONJUGATED,)),
     "polarity at random": (

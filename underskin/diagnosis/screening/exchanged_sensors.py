@@ -21,10 +21,10 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
 
 _LEAST_SHAPE = 0.3  # of the largest: a smaller one is measured by it
-_CONTRADICTS, _AGREES = 0.5, 0.3  # m
+_CONTRADICTS, _AGREES, _AGREED = 0.6, 0.2, 0.3  # m since and m' since, and m before, in the mean
+_AGREES_ALONE = 0.1  # m' of a single recording
+_FEWEST = 4  # recordings, for one of them to contradict the others
 _MOST_SENSORS = 8  # that contradict their places, among which pairs are sought
-_LEAST = 3  # recordings since the exchange
-_ALL = 0.9  # of the recordings at least behave as the exchange says
 
 
 @dataclass(frozen=True)
@@ -41,20 +41,29 @@ def without_exchanges(
     campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], list[Finding]]:
     """The recordings of exchanged sensors with the right sensor, or left out where that one is silent; the findings."""
-    if len(campaign.skin.sensors) < 2 or len(entries) <= _LEAST:
+    if len(campaign.skin.sensors) < 2 or len(entries) < _FEWEST:
         return list(entries), []
     level = np.array([flat_level(entry) for entry in entries])
     shape = _shape(campaign, entries, table)
     d33 = _usual(level, shape)
-    suspects = _suspects(entries, level, d33 * shape)
-    right, findings = list(entries), list[Finding]()
-    for pair in combinations(suspects, 2):
+    unit = np.maximum(np.maximum(level / d33, shape), _LEAST_SHAPE * shape.max())
+    contradicting = np.abs(level / d33 - shape) > _CONTRADICTS * unit
+    if not contradicting.any():
+        return list(entries), []
+    odd = [entry for entry, wrong in zip(entries, contradicting, strict=True) if wrong]
+    suspects = _suspects(entries, contradicting)
+    right, findings, settled = list(entries), list[Finding](), set[str]()
+    nearest = [tuple(sorted((name, _pressed(campaign, odd, name)))) for name in suspects]
+    for pair in dict.fromkeys((*(tuple(sorted(two)) for two in combinations(suspects, 2)), *nearest)):
+        if pair[0] == pair[1] or settled & set(pair):
+            continue
         found = _exchange(campaign, entries, table, pair, level / d33, shape)
         if found is None:
             continue
         for number in found.since.tolist():
             right[number] = _at_place(campaign, entries[number], *pair)
         findings.append(_finding(found, entries))
+        settled |= set(pair)
         if not found.answered:
             left_out = set(found.since.tolist())
             return [entry for number, entry in enumerate(right) if number not in left_out], findings
@@ -79,15 +88,15 @@ def _exchange(
     since = np.concatenate([[0.0], np.cumsum(np.minimum(exchanged, 1) ** 2)])
     k = int(np.argmin(before + since[-1] - since))
     late = np.arange(len(own)) >= k
-    of_both = {entries[number].sensor for number in own[late]} == set(pair)
-    plain = (as_given[late] > _CONTRADICTS) & (exchanged[late] < _AGREES)
-    tells = np.maximum(shape[own], other)[late] > _LEAST_SHAPE * shape.max()
-    if late.sum() < _LEAST or not of_both or not tells.any() or plain[tells].mean() < _ALL:
+    tells = late & (np.maximum(shape[own], other) > _LEAST_SHAPE * shape.max())
+    agrees = _AGREES if tells.sum() > 1 else _AGREES_ALONE
+    if not tells.any() or as_given[tells].mean() < _CONTRADICTS or exchanged[tells].mean() > agrees:
         return None
-    if k and (as_given[:k] < _AGREES).mean() < _ALL:
+    if k and as_given[:k].mean() > _AGREED:
         return None
     answered = bool((level[own][late] > _LEAST_SHAPE * shape.max()).any())
-    if not answered and (k == 0 or {entries[number].sensor for number in own[:k]} != set(pair)):
+    both = [{entries[number].sensor for number in part} == set(pair) for part in (own[:k], own[k:])]
+    if not answered and not all(both):
         return None
     return _Exchange(pair, own[late], own[:k], answered)
 
@@ -101,12 +110,21 @@ def _finding(found: _Exchange, entries: Sequence[FrfRecording]) -> Finding:
     return Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**arguments, "put_right": found.answered})
 
 
-def _suspects(entries: Sequence[FrfRecording], level: Floats, expected: Floats) -> list[str]:
-    """The sensors with most recordings that contradict what is expected [C/N]."""
-    unit = np.maximum(np.maximum(level, expected), _LEAST_SHAPE * expected.max())
-    contradicting: Mask = np.abs(level - expected) > _CONTRADICTS * unit
+def _suspects(entries: Sequence[FrfRecording], contradicting: Mask) -> list[str]:
+    """The sensors with most recordings that contradict what is expected."""
     sensors = [entry.sensor for entry, wrong in zip(entries, contradicting, strict=True) if wrong]
     return sorted(sorted(set(sensors)), key=sensors.count, reverse=True)[:_MOST_SENSORS]
+
+
+def _pressed(campaign: Campaign, entries: Sequence[FrfRecording], name: str) -> str:
+    """The sensor that is nearest to where most of these recordings of the one of that name were pressed."""
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    pressed = [
+        min(places, key=lambda other: float(np.hypot(*np.subtract(places[other], entry.position_mm or places[name]))))
+        for entry in entries
+        if entry.sensor == name
+    ]
+    return max(sorted(set(pressed)), key=pressed.count)
 
 
 def _usual(level: Floats, shape: Floats) -> float:
