@@ -20,7 +20,7 @@ from underskin.units import Floats, Mask
 _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
 _MEANT = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
-_GAIN, _GAIN_ALONE, _COST = 12.0, 18.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
+_GAIN, _GAIN_ALONE, _COST = 7.5, 14.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
 _WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
 _MOST = 0.5
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another

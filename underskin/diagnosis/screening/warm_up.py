@@ -19,7 +19,7 @@ _LEAST = 10
 _TIMES = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN, _OVER_FIRST, _OVER_AGEING = 5.5, 2.0, 3.0  # of ln evidence, and over what else it may be
+_GAIN, _OVER_FIRST, _OVER_AGEING = 4.2, 2.0, 3.0  # of ln evidence, and over what else it may be
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
