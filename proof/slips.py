@@ -14,11 +14,11 @@ import numpy as np
 from proof.markdown import table
 from proof.slip_kinds import SLIPS, Case
 from rig.draw import drawn, record
-from rig.recorded import campaign
+from rig.recorded import RecordedLines, campaign
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.levels import levels
 from underskin.findings.codes import Reason
-from underskin.recordings.campaign import Campaign, from_dict, frf_recordings
+from underskin.recordings.campaign import Campaign, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 VISIBLE = 20.0
@@ -70,16 +70,14 @@ def _named(made: Campaign, sigma: SigmaTable) -> set[Reason]:
     return {finding.reason for finding in inspect(made, sigma).findings}
 
 
-def _case(made: Campaign, recorded: object, sigma: SigmaTable) -> Case:
+def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
     """With the scatter of each recording's level: gain, position where the response is steep, and lines."""
     noise = recorded.response.experiment.noise
     own = levels(made, frf_recordings(made), sigma)
     relative = recorded.line_variance / np.maximum(np.abs(recorded.exact) ** 2, 1e-300)
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
-    scatter[own.number] = np.sqrt(
-        noise.gain**2 + (noise.position_mm * own.slope) ** 2 + lines[own.number]
-    )
+    scatter[own.number] = np.sqrt(noise.gain**2 + (noise.position_mm * own.slope) ** 2 + lines[own.number])
     return Case(made, recorded, scatter)
 
 

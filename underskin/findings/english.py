@@ -145,12 +145,12 @@ ENGLISH: Mapping[Reason, Words] = {
         f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
         f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"
     ),
-    Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, or "
-    "their places, look exchanged; put right",
+    Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
+    "or their places, look exchanged; put right",
     Reason.CABLES_EXCHANGED: sentences.cables_exchanged,
     Reason.AMPLITUDE_FACTOR: sentences.amplitude_factor,
-    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later ones: "
-    "warm-up of amplifier or sensor? The first {recordings} were left out",
+    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
+    "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
     Reason.FORCE_CONTRADICTS_PRELOAD: "force_n is {mean_n:.3g} N in the mean, but preload_n is {preload_n:g}: is one "
     "in another unit?",

@@ -86,7 +86,8 @@ def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: i
     untold = f"; {left_out} that do not tell were left out" if left_out else ""
     return (
         f"the response of {len(of)} of {recordings} recordings is {factor:.3g} times the others': is their dynamic "
-        f"force or charge given as {meant} instead of peak? Put right by this factor ({listed(of, 'recordings')}){untold}"
+        f"force or charge given as {meant} instead of peak? Put right by this factor ({listed(of, 'recordings')})"
+        f"{untold}"
     )
 
 

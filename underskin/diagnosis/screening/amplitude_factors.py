@@ -66,7 +66,7 @@ def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) ->
 def _step(levels: Levels, factor: float, base: float) -> Step | None:
     """The recordings that are off by a factor; None where there are none, or most, or the factor is another."""
     size = log(factor)
-    found = []
+    found: list[Step] = []
     for scatter, bend in product(_SEARCHED_SCATTER, _SEARCHED_BEND):
         off = _chosen(levels.value, levels.precision(scatter, bend), size)
         if not off.any() or any((off == one.off).all() for one in found):

@@ -1,7 +1,8 @@
-"""Two sensors that answer where the other one was pressed: their labels exchanged, or their cables since some recording.
+"""Two sensors that answer where the other one was pressed: labels exchanged, or cables since some recording.
 
 With d shape_i the response expected of recording i and d shape'_i that of the other sensor to the same contact,
-    m_i = |level_i − d shape_i| / u_i,  m'_i = |level_i − d shape'_i| / u_i,  u_i = d max(shape_i, shape'_i, 0.3 max shape),
+    m_i = |level_i − d shape_i| / u_i,  m'_i = |level_i − d shape'_i| / u_i,
+    u_i = d max(shape_i, shape'_i, 0.3 max shape),
 the sensors are exchanged from recording k on, in the order of time, where m is small before k, and m' but not m since.
 """
 
@@ -45,6 +46,8 @@ def without_exchanges(
         return list(entries), []
     level = np.array([flat_level(entry) for entry in entries])
     shape = _shape(campaign, entries, table)
+    if not shape.max() > 0:
+        return list(entries), []
     d33 = _usual(level, shape)
     unit = np.maximum(np.maximum(level / d33, shape), _LEAST_SHAPE * shape.max())
     contradicting = np.abs(level / d33 - shape) > _CONTRADICTS * unit
@@ -53,9 +56,10 @@ def without_exchanges(
     odd = [entry for entry, wrong in zip(entries, contradicting, strict=True) if wrong]
     suspects = _suspects(entries, contradicting)
     right, findings, settled = list(entries), list[Finding](), set[str]()
-    nearest = [tuple(sorted((name, _pressed(campaign, odd, name)))) for name in suspects]
-    for pair in dict.fromkeys((*(tuple(sorted(two)) for two in combinations(suspects, 2)), *nearest)):
-        if pair[0] == pair[1] or settled & set(pair):
+    nearest = [(name, _pressed(campaign, odd, name)) for name in suspects]
+    for first, second in (*combinations(suspects, 2), *nearest):
+        pair = (min(first, second), max(first, second))
+        if first == second or settled & set(pair):
             continue
         found = _exchange(campaign, entries, table, pair, level / d33, shape)
         if found is None:
@@ -138,7 +142,8 @@ def _shape(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTabl
     """Magnitude of the base model's prediction (recordings,)."""
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
     value = model.predict(np.array([parameter.start for parameter in model.parameters])).value
-    return np.abs(value[np.searchsorted(model.recording, np.arange(len(entries)))].real)
+    own = value[np.searchsorted(model.recording, np.arange(len(entries)))]
+    return np.nan_to_num(np.abs(own.real))
 
 
 def _at_place(campaign: Campaign, entry: FrfRecording, first: str, second: str) -> FrfRecording:

@@ -16,6 +16,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST = 4  # recordings
+_MOST = 300  # recordings: the covariance of more costs minutes
 _MOST_SLIPS = 3
 
 
@@ -43,11 +44,13 @@ def _plainest(
     if len(entries) < _LEAST:
         return None
     own = levels(campaign, entries, table)
+    if not _LEAST <= len(own.value) <= _MOST:
+        return None
     step, drift, cables = amplitude_step(own), warming(own), exchanged_cables(own)
     found = [one for one in (step, drift, cables) if one is not None]
     best = max(found, key=lambda one: one.gain, default=None)
     if isinstance(best, Step):
         return without_step(entries, own, best)
     if isinstance(best, WarmUp):
-        return without_first(entries, own, best)
+        return without_first(entries, best)
     return None if best is None else with_right_sensors(entries, own, best)

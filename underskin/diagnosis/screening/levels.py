@@ -4,8 +4,8 @@ With y_i = ln |level_i / shape_i| of recording i, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
 where X holds a gain, one gain a sensor (of standard deviation t), and smooth functions of what physics may follow
 (sphere, preload, place, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter of
-positions. The evidence is the largest ln N(y; 0, C), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size of the smooth functions: a slip is believed
-where taking it out of y raises it by far more than its own description costs.
+positions. The evidence is the largest ln N(y; 0, C), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size of the
+smooth functions: a slip is believed where taking it out of y raises it by far more than its own description costs.
 """
 
 from collections.abc import Sequence
@@ -59,13 +59,11 @@ class Levels:
                 density = _log_density(value, covariance)
                 if density > best:
                     best, chosen, size = density, covariance, bend
-        return LevelFit(best, np.linalg.inv(chosen), size)
+        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), size)
 
     def without_smooth(self, fit: "LevelFit") -> Floats:
         """y less the smooth functions as fitted (recordings,)."""
-        return np.asarray(
-            self.value - fit.bend**2 * self.smooth @ (self.smooth.T @ (fit.precision @ self.value))
-        )
+        return np.asarray(self.value - fit.bend**2 * self.smooth @ (self.smooth.T @ (fit.precision @ self.value)))
 
     def precision(self, scatter: float, bend: float) -> Floats:
         """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
@@ -84,7 +82,7 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """ln N(y; 0, C) but for its constant, at the best standard deviations; C⁻¹, and the size of the smooth functions."""
+    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the size of the smooth functions."""
 
     evidence: float
     precision: Floats
@@ -120,10 +118,10 @@ def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTabl
     return Levels(
         number=chosen,
         value=np.log(level[chosen] / shape[chosen]),
-        sensor=np.array([ids.index(entries[number].sensor) for number in chosen], dtype=np.intp),
+        sensor=np.array([ids.index(entries[number].sensor) for number in chosen.tolist()], dtype=np.intp),
         order=recording_order(entries)[chosen],
         slope=slope[chosen],
-        smooth=_smooth(campaign, [entries[number] for number in chosen], recording_order(entries)[chosen]),
+        smooth=_smooth(campaign, [entries[number] for number in chosen.tolist()], recording_order(entries)[chosen]),
         cycles=counted,
     )
 

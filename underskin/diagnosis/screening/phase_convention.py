@@ -1,8 +1,8 @@
 """FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
 Of some: the courses φ_i of phase over frequency are ±1 times one course φ. The signs q_i that align them are those that
-maximise T(q) = |Σ q_i w_i φ_i|²/Σ w_i, in units of noise, and are believed where T(q) − T(1) exceeds what choosing k of
-n signs costs. Of all: the mean course, as it is, is far from every causal one (`phase_course`), and conjugated it is not.
+maximise T(q) = |Σ q_i w_i φ_i|²/Σ w_i, in units of noise, and are believed where T(q) − T(1) exceeds what choosing k
+of n signs costs. Of all: the mean course is far from every causal one (`phase_course`), and conjugated it is not.
 """
 
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ from underskin.diagnosis.screening.phase_course import PhaseCourses, misfit, pha
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.units import Complexes, Floats, Mask
+from underskin.units import Complexes, Floats
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
-_GAIN, _COST = 15.0, 4.5  # of T, and per ln of the number of choices
+_GAIN, _COST = 20.0, 5.5  # of T, and per ln of the number of choices
 _PLAIN, _BETTER = 25.0, 0.5  # χ² by which the conjugated course is nearer to a causal one, and its share of the other
 
 

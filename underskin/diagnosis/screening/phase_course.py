@@ -39,7 +39,7 @@ class PhaseCourses:
     @property
     def telling(self) -> Mask:
         """Whether a recording has a course at all (recordings,)."""
-        return np.isfinite(self.value).any(axis=1)
+        return np.asarray(np.isfinite(self.value).any(axis=1))
 
 
 def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:

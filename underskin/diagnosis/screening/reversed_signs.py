@@ -49,7 +49,7 @@ def signs_of(entries: Sequence[FrfRecording], turned: Floats, usable: Mask) -> S
     if not negative.any() or not (few or _plain(turned, negative, positive)):
         return Signs(signs, findings)
     signs[negative] *= -1.0
-    ids = [entries[number].id for number in np.flatnonzero(negative)]
+    ids = [entries[number].id for number in np.flatnonzero(negative).tolist()]
     if len(ids) <= _LISTED:
         findings += [Finding(Reason.RECORDING_REVERSED, name, "frf_re_pc_per_n") for name in ids]
         return Signs(signs, findings)

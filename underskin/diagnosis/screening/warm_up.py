@@ -19,7 +19,7 @@ _LEAST = 10
 _TIMES = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN, _OVER_FIRST, _OVER_AGEING = 4.2, 2.0, 3.0  # of ln evidence, and over what else it may be
+_GAIN, _OVER_AGEING = 3.6, 3.0  # of ln evidence, and over ageing
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
@@ -47,15 +47,13 @@ def warming(levels: Levels) -> WarmUp | None:
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
     first = (levels.order == levels.order.min()).astype(float)[:, None]
-    rivals = [levels.fit(levels.value, _AMPLITUDE * first).evidence + _OVER_FIRST]
+    rivals = [levels.fit(levels.value, _AMPLITUDE * first).evidence]
     if amplitude > 0 and levels.cycles is not None:
         rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
     return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
 
 
-def without_first(
-    entries: Sequence[FrfRecording], levels: Levels, found: WarmUp
-) -> tuple[list[FrfRecording], Finding]:
+def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:
     """The recordings after the warm-up, and the finding on it."""
     last = min(found.time * np.log(max(abs(found.amplitude) / _OVER, 1.0)), _MOST_SHARE * len(entries))
     late = recording_order(entries) > last
