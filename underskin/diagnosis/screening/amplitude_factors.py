@@ -11,6 +11,7 @@ from math import comb, log
 
 import numpy as np
 
+from underskin.diagnosis.screening.along_axes import follows_an_axis
 from underskin.diagnosis.screening.levels import Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -24,6 +25,7 @@ _GAIN, _GAIN_ALONE, _COST = 7.5, 14.0, 1.0  # of ln evidence, if one recording i
 _WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
 _MOST = 0.5
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
+_PLAIN_SIZE, _PLAIN_WITHIN = 0.5, 0.03  # of ln c, where a law along an axis may be at work as well: twice is no law
 _SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
 
 
@@ -75,6 +77,8 @@ def _step(levels: Levels, factor: float, base: float) -> Step | None:
         fit = levels.fit(value)
         away, deviation = fit.amplitude(value, off.astype(float))
         exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
+        if exact and follows_an_axis(off, levels.axes):
+            exact = abs(size) > _PLAIN_SIZE and abs(away) < _PLAIN_WITHIN
         if exact and (np.abs(fit.residual(value)) < 0.35 * abs(size)).mean() > _WELL:
             cost = _COST * log(comb(len(off), int(off.sum())))
             found.append(Step(factor, off, fit.evidence - base - cost))

@@ -9,14 +9,14 @@ smooth functions: a slip is believed where taking it out of y raises it by far m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from underskin.mechanisms.models.composed import compose
-from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.mechanisms.unnamed.axes import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
@@ -43,6 +43,7 @@ class Levels:
     slope: Floats  # g [1/mm]
     smooth: Floats  # (recordings, columns) of X, times their prior standard deviation
     cycles: Floats | None
+    axes: tuple[Floats, ...]  # what else may move the level: each axis on which the recordings differ (recordings,)
 
     def fit(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> "LevelFit":
         """The best s, t, p and size of the smooth functions for `value` (recordings,).
@@ -101,7 +102,8 @@ class LevelFit:
 
 def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable) -> Levels:
     """Those of a campaign's recordings, signs put right."""
-    model = compose((), _with(campaign, entries), table, "frf")
+    whole = replace(campaign, recordings=tuple(entries))
+    model = compose((), whole, table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     first = np.searchsorted(model.recording, np.arange(len(entries)))
     shape = np.abs(prediction.value[first].real)
@@ -123,6 +125,7 @@ def levels(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTabl
         slope=slope[chosen],
         smooth=_smooth(campaign, [entries[number] for number in chosen.tolist()], recording_order(entries)[chosen]),
         cycles=counted,
+        axes=tuple(axis.of([entries[number].id for number in chosen.tolist()]) for axis in axes_of(whole)),
     )
 
 
@@ -171,6 +174,3 @@ def _log_density(value: Floats, covariance: Floats) -> float:
     white = solve_triangular(root, value, lower=True, check_finite=False)
     return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
 
-
-def _with(campaign: Campaign, entries: Sequence[FrfRecording]) -> Campaign:
-    return Campaign(campaign.name, campaign.skin, tuple(entries))

@@ -1,6 +1,7 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
-A fall that load cycles could have caused is `ageing` and none of this.
+A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis, or a
+step after the first recordings, explains as well.
 """
 
 from collections.abc import Sequence
@@ -8,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from underskin.diagnosis.screening.along_axes import smooth_along
 from underskin.diagnosis.screening.levels import LevelFit, Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -18,6 +20,7 @@ from underskin.units import Floats
 _LEAST = 10
 _TIMES = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
+_LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
 _AMPLITUDE = 0.5  # prior standard deviation of A
 _GAIN, _OVER_AGEING = 3.6, 3.0  # of ln evidence, and over ageing
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
@@ -46,8 +49,8 @@ def warming(levels: Levels) -> WarmUp | None:
         return None
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
-    first = (levels.order == levels.order.min()).astype(float)[:, None]
-    rivals = [levels.fit(levels.value, _AMPLITUDE * first).evidence]
+    rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
+    rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in _steps(levels)]
     if amplitude > 0 and levels.cycles is not None:
         rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
     return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
@@ -66,6 +69,11 @@ def _without(levels: Levels, drift: Floats) -> LevelFit:
     """The fit of the levels without the drift at about its amplitude."""
     amplitude, _ = levels.fit(levels.value, _AMPLITUDE * drift[:, None]).amplitude(levels.value, drift)
     return levels.fit(levels.value - amplitude * drift)
+
+
+def _steps(levels: Levels) -> list[Floats]:
+    """1 in the first recordings, as many as a warm-up may last."""
+    return [(levels.order < last).astype(float)[:, None] for last in range(1, _LONGEST_STEP + 1)]
 
 
 def _drift(levels: Levels, time: float) -> Floats:
