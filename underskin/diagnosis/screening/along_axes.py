@@ -7,7 +7,7 @@ import numpy as np
 from underskin.units import Floats, Mask
 
 _LEAST = 2  # recordings: a single one is extreme along some axis
-_BESIDE = 0.04  # of the recordings may lie on the other side
+_BESIDE = 0.25  # of them, as many may be lacking or too many
 _TERMS, _SIZE = 4, 0.3  # cosines over the rank along an axis, and the prior standard deviation of each
 
 
@@ -15,7 +15,7 @@ def follows_an_axis(chosen: Mask, axes: Sequence[Floats]) -> bool:
     """Whether some recordings are, but for few, those on one side of an axis, or on one level of it."""
     if chosen.sum() < _LEAST:
         return False
-    allowed = _BESIDE * len(chosen)
+    allowed = _BESIDE * chosen.sum()
     for axis in axes:
         for level in np.unique(axis):
             for part in (axis >= level, axis == level):

@@ -173,4 +173,3 @@ def _log_density(value: Floats, covariance: Floats) -> float:
     root = np.linalg.cholesky(covariance)
     white = solve_triangular(root, value, lower=True, check_finite=False)
     return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
-

@@ -20,6 +20,7 @@ from underskin.units import Floats
 _LEAST = 10
 _TIMES = (0.7, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
+_SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
 _LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
 _AMPLITUDE = 0.5  # prior standard deviation of A
 _GAIN, _OVER_AGEING = 3.6, 3.0  # of ln evidence, and over ageing
@@ -50,7 +51,8 @@ def warming(levels: Levels) -> WarmUp | None:
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
     rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
-    rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in _steps(levels)]
+    slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
+    rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in (*_steps(levels), *slower)]
     if amplitude > 0 and levels.cycles is not None:
         rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
     return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
