@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from underskin.diagnosis.screening.levels import flat_level
+from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
@@ -25,6 +26,7 @@ _LEAST_SHAPE = 0.3  # of the largest: a smaller one is measured by it
 _CONTRADICTS, _AGREES, _AGREED = 0.6, 0.2, 0.3  # m since and m' since, and m before, in the mean
 _AGREES_ALONE = 0.1  # m' of a single recording
 _FEWEST = 4  # recordings, for one of them to contradict the others
+_FAR_OFF = 30.0  # times the usual response
 _MOST_SENSORS = 8  # that contradict their places, among which pairs are sought
 
 
@@ -48,7 +50,10 @@ def without_exchanges(
     shape = _shape(campaign, entries, table)
     if not shape.max() > 0:
         return list(entries), []
-    d33 = _usual(level, shape)
+    silent, _ = no_response(entries)
+    d33 = _usual(level, np.where(silent, 0.0, shape))
+    if d33 is None:
+        return list(entries), []
     unit = np.maximum(np.maximum(level / d33, shape), _LEAST_SHAPE * shape.max())
     contradicting = np.abs(level / d33 - shape) > _CONTRADICTS * unit
     if not contradicting.any():
@@ -131,10 +136,15 @@ def _pressed(campaign: Campaign, entries: Sequence[FrfRecording], name: str) -> 
     return max(sorted(set(pressed)), key=pressed.count)
 
 
-def _usual(level: Floats, shape: Floats) -> float:
-    """d: the level over the shape in recordings that are neither silent nor far from their sensor."""
-    telling = shape > _LEAST_SHAPE * shape.max()
+def _usual(level: Floats, shape: Floats) -> float | None:
+    """d: the level over the shape in recordings that are neither silent nor far from their sensor; None where one of
+    them is off by far, which is a slip of units."""
+    telling = shape > _LEAST_SHAPE * shape.max(initial=0.0)
+    if not telling.any():
+        return None
     ratio = level[telling] / shape[telling]
+    if ratio.max() > _FAR_OFF * np.median(ratio):
+        return None
     return float(np.median(ratio[ratio > _LEAST_SHAPE * np.quantile(ratio, 0.9)]))
 
 
