@@ -135,6 +135,22 @@ ENGLISH: Mapping[Reason, Words] = {
     "inverts)",
     Reason.SENSOR_REVERSED: "sensor {sensor!r} answers with the opposite sign of the others: reversed",
     Reason.RECORDING_REVERSED: "its sign is the opposite of the others': reversed",
+    Reason.RECORDINGS_REVERSED: lambda reversed_recordings, recordings: (
+        f"the sign of {len(reversed_recordings)} of {recordings} recordings is the opposite of the others', with no "
+        f"order in it: reversed ({sentences.listed(reversed_recordings, 'recordings')})"
+    ),
+    Reason.ALL_CONJUGATED: "the phase over frequency is one that no sensor or amplifier can have unless it is turned: "
+    "the FRFs look conjugated, in the convention e^(-iωt); all were conjugated back (if not, the force channel lags)",
+    Reason.RECORDINGS_CONJUGATED: lambda conjugated, recordings: (
+        f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
+        f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"
+    ),
+    Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
+    "or their places, look exchanged; put right",
+    Reason.CABLES_EXCHANGED: sentences.cables_exchanged,
+    Reason.AMPLITUDE_FACTOR: sentences.amplitude_factor,
+    Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
+    "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
     Reason.FORCE_CONTRADICTS_PRELOAD: "force_n is {mean_n:.3g} N in the mean, but preload_n is {preload_n:g}: is one "
     "in another unit?",
@@ -188,6 +204,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.DEAD: f"dead: no charge beyond noise ({_OF_ARRAY})",
     Reason.INVERTED: f"inverted polarity: {_OF_ARRAY}",
     Reason.WEAK: f"weak: {_OF_ARRAY}",
+    Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
+    "cable or its range, beyond any spread; left out ({recordings} recordings)",
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",

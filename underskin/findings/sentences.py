@@ -7,6 +7,7 @@ from underskin.findings.arguments import DefectKind, ImplausibleD33, UnitGuess
 from underskin.findings.formatting import in_digits, significant
 
 _MOST_SENSORS = 3  # named one by one
+_MOST_LISTED = 6
 
 IMPLAUSIBLE_D33: Mapping[ImplausibleD33, str] = {
     ImplausibleD33.TOO_LARGE: "more than sensors have: was mV/pC meant, not mV/nC, or N, not mN, or fC, not pC?",
@@ -64,6 +65,30 @@ def listed_sensors(ids: Sequence[str]) -> str:
     if len(ids) > _MOST_SENSORS:
         return f"sensors {', '.join(ids[:_MOST_SENSORS])} and {len(ids) - _MOST_SENSORS} more"
     return f"sensors {', '.join(ids[:-1])} and {ids[-1]}"
+
+
+def listed(ids: Sequence[str], noun: str) -> str:
+    """Some things by their ids, the first ones and how many more."""
+    if len(ids) > _MOST_LISTED:
+        return f"{noun} {', '.join(ids[:_MOST_LISTED])} and {len(ids) - _MOST_LISTED} more"
+    return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
+
+
+def cables_exchanged(first: str, second: str, since: str, recordings: int, put_right: bool) -> str:
+    """Two sensors' cables exchanged from some recording on."""
+    done = "put right" if put_right else "left out"
+    text = f"from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} answer as each other"
+    return f"{text}: their cables look exchanged; {done} ({recordings} recordings)"
+
+
+def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:
+    """Some recordings a fixed factor beside the others."""
+    untold = f"; {left_out} that do not tell were left out" if left_out else ""
+    return (
+        f"the response of {len(of)} of {recordings} recordings is {factor:.3g} times the others': is their dynamic "
+        f"force or charge given as {meant} instead of peak? Put right by this factor ({listed(of, 'recordings')})"
+        f"{untold}"
+    )
 
 
 def unusual(value: float, unit: str, guess: UnitGuess, more: int) -> str:

@@ -8,6 +8,8 @@ from underskin.findings.codes import FindingCode
 _DECISIVE = (
     *(FindingCode.NO_RESPONSE, FindingCode.IMPOSSIBLE_GEOMETRY, FindingCode.NO_FINITE_LINE, FindingCode.REFUSED),
     *(FindingCode.IMPOSSIBLE_NUMBER, FindingCode.SERIES_NOT_USABLE, FindingCode.CURVE_NOT_USABLE),
+    *(FindingCode.SENSORS_EXCHANGED, FindingCode.WEAK, FindingCode.CONJUGATED, FindingCode.GAIN_STEPS),
+    FindingCode.WARM_UP,
     *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
     *(FindingCode.IMPLAUSIBLE_D33, FindingCode.DUPLICATED_RECORDING),
     *(FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.NO_SIMPLE_LAW),

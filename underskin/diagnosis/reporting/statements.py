@@ -57,12 +57,21 @@ def answer_statement(
         first, rest = _of_group(group, answers)
     if fit is not None and verdict in ("explained", "no_mismatch"):
         first = first.removesuffix(".") + _reserve(fit) + "."
+    if verdict == "no_mismatch" and caveats:
+        first, caveats = _after_caveat(first, caveats)
     parts = [first, caveats, rest, *told]
     if verdict == "no_mismatch":
         parts.append(power_statement(power, kind))
     if fit is not None and "youngs_modulus" in fit["before"]:
         parts.append(left_by(fit, SIMPLEST[kind]) if verdict == "unexplained" else _modulus(fit["after"]))
     return " ".join(part for part in parts if part)
+
+
+def _after_caveat(first: str, caveats: str) -> tuple[str, str]:
+    """The first of the caveats and then the verdict as one sentence, and the other caveats: what was left out must not
+    come after the words that nothing needs to be added."""
+    leading, _, others = caveats.partition(". ")
+    return f"{leading.removesuffix('.')}; apart from that, {first[0].lower()}{first[1:]}", others
 
 
 def _reserve(fit: Mapping[str, Any]) -> str:

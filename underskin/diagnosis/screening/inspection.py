@@ -12,7 +12,10 @@ import numpy as np
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.diagnosis.screening.declared_values import unlikely
+from underskin.diagnosis.screening.exchanged_sensors import without_exchanges
+from underskin.diagnosis.screening.level_slips import without_level_slips
 from underskin.diagnosis.screening.model_consistency import against_model
+from underskin.diagnosis.screening.phase_convention import in_one_convention
 from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
 from underskin.diagnosis.screening.time_series import as_given, as_lines
 from underskin.diagnosis.screening.unit_errors import faint_oscillation, loose_sphere, single_unit_errors
@@ -57,8 +60,14 @@ def _inspect_lines(campaign: Campaign, recorded: Sequence[FrfRecording], table: 
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)
         return _inspected(campaign, [], findings, lacking)
     findings += [*_constant_axes(entries), *faint_oscillation(entries)]
+    entries, of_phase = in_one_convention(entries)
+    entries, of_sensors = without_exchanges(campaign, entries, table)
     consistent = against_model(campaign, entries, table)
-    return _inspected(campaign, consistent.entries, [*findings, *consistent.findings], consistent.lacking)
+    findings += [*of_phase, *of_sensors, *consistent.findings]
+    if consistent.lacking is not None:
+        return _inspected(campaign, consistent.entries, findings, consistent.lacking)
+    entries, of_levels = without_level_slips(campaign, consistent.entries, table)
+    return _inspected(campaign, entries, [*findings, *of_levels])
 
 
 def _inspected(

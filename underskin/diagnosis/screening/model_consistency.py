@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from underskin.diagnosis.screening.no_response import dead, no_response
+from underskin.diagnosis.screening.reversed_signs import signs_of
 from underskin.diagnosis.screening.table_domain import within_tables
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -58,9 +59,10 @@ def against_model(campaign: Campaign, entries: list[FrfRecording], table: SigmaT
     ratio, turned = np.where(usable, ratio, np.nan), np.where(usable, turned, np.nan)
     off, off_findings = _off_by_1000(entries, ratio)
     usable &= ~off
-    signs, sign_findings = _signs(entries, turned, usable)
-    findings += [*off_findings, *_of_all(ratio, campaign.skin.d33_pc_per_n), *sign_findings]
-    entries = [entry if sign > 0 else _reversed(entry) for entry, sign in zip(entries, signs, strict=True)]
+    found = signs_of(entries, turned, usable)
+    findings += [*off_findings, *_of_all(ratio, campaign.skin.d33_pc_per_n), *found.findings]
+    usable &= found.signs != 0
+    entries = [_reversed(entry) if sign < 0 else entry for entry, sign in zip(entries, found.signs, strict=True)]
     return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings)
 
 
@@ -131,31 +133,6 @@ def _of_all(ratio: Floats, declared: float | None) -> list[Finding]:
         return []
     arguments = {"d33_pc_per_n": d33, "declared_pc_per_n": declared, "too_large": bool(d33 > high)}
     return [Finding(Reason.D33_NEEDED, "", "frf_re_pc_per_n", arguments)]
-
-
-def _signs(entries: list[FrfRecording], turned: Floats, usable: Mask) -> tuple[Floats, list[Finding]]:
-    """Of each recording −1 where its sensor's polarity is reversed, or its own alone, else 1; and the findings."""
-    negative = np.isfinite(turned) & (turned < 0) & usable
-    positive = np.isfinite(turned) & (turned > 0) & usable
-    signs = np.ones(len(entries))
-    findings = []
-    if negative.sum() > positive.sum():
-        findings.append(Finding(Reason.ALL_REVERSED, "", "frf_re_pc_per_n"))
-        signs[:] = -1.0
-        negative, positive = positive, negative
-    sensors = np.array([entry.sensor for entry in entries])
-    for name in dict.fromkeys(sensors.tolist()):
-        own = sensors == name
-        if (negative & own).sum() > max(1, (positive & own).sum()):
-            first = entries[int(np.flatnonzero(own)[0])]
-            findings.append(Finding(Reason.SENSOR_REVERSED, first.id, "frf_re_pc_per_n", {"sensor": name}))
-            signs[own] *= -1.0
-            negative = negative & ~own
-    if negative.sum() <= max(0.2 * positive.sum(), 1) and positive.sum() > 1:
-        for number in np.flatnonzero(negative):
-            findings.append(Finding(Reason.RECORDING_REVERSED, entries[number].id, "frf_re_pc_per_n"))
-            signs[number] *= -1.0
-    return signs, findings
 
 
 def _reversed(entry: FrfRecording) -> FrfRecording:

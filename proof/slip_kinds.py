@@ -1,0 +1,211 @@
+"""Slips that a lab makes, applied to a campaign of the rig: what the recordings say then, and by how much χ² changes.
+
+χ² counts what the slip adds to the recordings' levels over gain, position and line scatter, or to their phases over
+line scatter. Where a slip changes nothing that a campaign can show, it is 0.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rig.recorded import RecordedLines
+from underskin.findings.codes import Reason
+from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign of the rig, what is known of it, and the scatter of each recording's level (recordings,)."""
+
+    campaign: Campaign
+    recorded: RecordedLines
+    scatter: Floats
+
+    @property
+    def entries(self) -> list[FrfRecording]:
+        """Its recordings."""
+        return list(frf_recordings(self.campaign))
+
+    def with_entries(self, entries: Sequence[FrfRecording]) -> Campaign:
+        """The campaign with other recordings."""
+        return replace(self.campaign, recordings=tuple(entries))
+
+
+@dataclass(frozen=True)
+class Slip:
+    """The campaign with a slip, and the χ² that it adds."""
+
+    campaign: Campaign
+    chi2: float
+
+
+Make = Callable[[Case, np.random.Generator], Slip | None]
+
+
+def _scaled(case: Case, logarithm: Floats) -> Slip:
+    """Levels times e^`logarithm` (recordings,)."""
+    weight = case.scatter**-2.0
+    weight = np.where(np.isfinite(weight), weight, 0.0)
+    mean = float((weight * logarithm).sum() / weight.sum())
+    factors = np.exp(logarithm)
+    entries = [_times(entry, float(factor)) for entry, factor in zip(case.entries, factors, strict=True)]
+    return Slip(case.with_entries(entries), float((weight * (logarithm - mean) ** 2).sum()))
+
+
+def _times(entry: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
+    assert entry.frf_re_pc_per_n is not None
+    assert entry.frf_im_pc_per_n is not None
+    real, imaginary = factor * entry.frf_re_pc_per_n, factor * conjugate * entry.frf_im_pc_per_n
+    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+
+
+def _some(case: Case, random: np.random.Generator, share: float) -> Mask:
+    return random.random(len(case.entries)) < share
+
+
+def _sensors(case: Case) -> list[str]:
+    return list(dict.fromkeys(entry.sensor for entry in case.entries))
+
+
+def labels(case: Case, random: np.random.Generator) -> Slip | None:
+    """Two sensors' labels exchanged in all recordings; the places stay."""
+    return _exchanged(case, random, 0.0)
+
+
+def cables(case: Case, random: np.random.Generator) -> Slip | None:
+    """Two sensors' labels exchanged from some recording on."""
+    return _exchanged(case, random, float(random.uniform(0.2, 0.8)))
+
+
+def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | None:
+    names = _sensors(case)
+    if len(names) < 2:
+        return None
+    first, second = random.choice(names, 2, replace=False).tolist()
+    late = recording_order(case.entries) >= since * len(case.entries)
+    turned = np.array([entry.sensor in (first, second) for entry in case.entries]) & late
+    if not turned.any():
+        return None
+    entries = [
+        replace(entry, sensor=second if entry.sensor == first else first) if wrong else entry
+        for entry, wrong in zip(case.entries, turned, strict=True)
+    ]
+    placed = case.entries[0].position_mm is not None
+    return Slip(
+        case.with_entries(entries),
+        _of_places(case, turned) if placed else _of_gains(case, turned, first, second) if since else 0.0,
+    )
+
+
+def _of_places(case: Case, turned: Mask) -> float:
+    """Σ |FRF|² over its scatter: the wrong sensor would show next to nothing."""
+    return float((np.minimum(case.scatter, 1.0)[turned] ** -2.0).sum())
+
+
+def _of_gains(case: Case, turned: Mask, first: str, second: str) -> float:
+    """What two sensors of unequal gains scatter about their means more than they did."""
+    gains = case.recorded.response.sensor_gains
+    ids = [sensor.id for sensor in case.campaign.skin.sensors]
+    step = float(np.log(gains[ids.index(first)] / gains[ids.index(second)]))
+    total = 0.0
+    for name in (first, second):
+        own = np.array([entry.sensor == name for entry in case.entries])
+        both = turned[own].astype(float)
+        total += float((((both - both.mean()) * step / case.scatter[own]) ** 2).sum()) if own.any() else 0.0
+    return total
+
+
+def conjugated(share: float) -> Make:
+    """FRFs in the other sign convention."""
+
+    def make(case: Case, random: np.random.Generator) -> Slip | None:
+        turned = _some(case, random, share)
+        if not turned.any() or (share < 1 and 2 * turned.sum() >= len(turned)):
+            return None
+        entries = [
+            _times(entry, 1.0, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)
+        ]
+        phase = 4 * case.recorded.exact.imag**2 / case.recorded.line_variance
+        return Slip(case.with_entries(entries), float(phase[turned].sum()))
+
+    return make
+
+
+def polarity(case: Case, random: np.random.Generator) -> Slip | None:
+    """Reversed at random in about a third of the recordings."""
+    turned = _some(case, random, 1 / 3)
+    entries = [_times(entry, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)]
+    return Slip(case.with_entries(entries), _of_places(case, turned)) if turned.any() else None
+
+
+def weak(case: Case, random: np.random.Generator) -> Slip | None:
+    """One sensor at a tenth of its gain."""
+    names = _sensors(case)
+    if len(names) < 2:
+        return None
+    name = str(random.choice(names))
+    return _scaled(case, np.array([np.log(0.1) * (entry.sensor == name) for entry in case.entries]))
+
+
+def dead(case: Case, random: np.random.Generator) -> Slip | None:
+    """One sensor that gives noise only."""
+    names = _sensors(case)
+    if len(names) < 2:
+        return None
+    name = str(random.choice(names))
+    floor = case.recorded.response.experiment.noise.floor_pc_per_n
+    entries, own = [], np.array([entry.sensor == name for entry in case.entries])
+    for entry, off in zip(case.entries, own, strict=True):
+        size = len(np.asarray(entry.frequency_hz))
+        noise = floor * random.normal(size=(2, size))
+        entries.append(replace(entry, frf_re_pc_per_n=noise[0], frf_im_pc_per_n=noise[1]) if off else entry)
+    return Slip(case.with_entries(entries), _of_places(case, own))
+
+
+def warm_up(amplitude: float) -> Make:
+    """The first recordings' gain 1 + A e^(−j/τ); a fall only where no load cycles are noted."""
+
+    def make(case: Case, random: np.random.Generator) -> Slip | None:
+        if amplitude > 0 and all(entry.load_cycles is not None for entry in case.entries):
+            return None  # `ageing` explains it as well
+        order = recording_order(case.entries)
+        return _scaled(case, np.log(1 + amplitude * np.exp(-order / float(random.uniform(1.0, 4.0)))))
+
+    return make
+
+
+def factor(value: float) -> Make:
+    """A third of the recordings at a factor: peak-to-peak or rms for peak."""
+
+    def make(case: Case, random: np.random.Generator) -> Slip | None:
+        off = _some(case, random, 1 / 3)
+        return None if 2 * off.sum() >= len(off) else _scaled(case, np.log(value) * off)
+
+    return make
+
+
+# Each slip, and the reasons of findings that name it.
+SLIPS: Mapping[str, tuple[Make, tuple[Reason, ...]]] = {
+    "labels exchanged": (labels, (Reason.LABELS_EXCHANGED,)),
+    "cables exchanged": (cables, (Reason.CABLES_EXCHANGED, Reason.LABELS_EXCHANGED)),
+    "all conjugated": (conjugated(1.0), (Reason.ALL_CONJUGATED,)),
+    "a third conjugated": (conjugated(1 / 3), (Reason.RECORDINGS_CONJUGATED,)),
+    "polarity at random": (
+        polarity,
+        (Reason.RECORDINGS_REVERSED, Reason.RECORDING_REVERSED, Reason.SENSOR_REVERSED, Reason.ALL_REVERSED),
+    ),
+    "sensor at a tenth": (weak, (Reason.WEAK_SENSOR,)),
+    "dead sensor": (dead, (Reason.SILENT_SENSOR, Reason.SILENT_RECORDING)),
+    "warm-up, rising": (warm_up(-0.2), (Reason.WARM_UP,)),
+    "warm-up, falling": (warm_up(0.3), (Reason.WARM_UP,)),
+    "charge peak-to-peak": (factor(2.0), (Reason.AMPLITUDE_FACTOR,)),
+    "force peak-to-peak": (factor(0.5), (Reason.AMPLITUDE_FACTOR,)),
+    "force rms": (factor(2.0**0.5), (Reason.AMPLITUDE_FACTOR,)),
+    "charge rms": (factor(0.5**0.5), (Reason.AMPLITUDE_FACTOR,)),
+}

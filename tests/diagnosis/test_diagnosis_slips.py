@@ -1,0 +1,230 @@
+"""Slips of a lab in whole campaigns: named, put right or left out, and never seen in what physics does."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.draw import drawn, record
+from rig.recorded import campaign as recorded_campaign
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.inspected import Inspected
+from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.screening.inspection import inspect
+from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+MADE = Made(sensors=3, repeats=2, lines=20)
+SLIPS = {
+    *(FindingCode.CONJUGATED, FindingCode.SENSORS_EXCHANGED, FindingCode.GAIN_STEPS, FindingCode.WARM_UP),
+    *(FindingCode.WEAK, FindingCode.SIGN_FLIPPED),
+}
+Change = Callable[[FrfRecording, int], FrfRecording]
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+@pytest.fixture(scope="module")
+def good(table: SigmaTable) -> Campaign:
+    return campaign(MADE, table)
+
+
+def times(entry: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
+    assert entry.frf_re_pc_per_n is not None
+    assert entry.frf_im_pc_per_n is not None
+    other = real if imaginary is None else imaginary
+    return replace(entry, frf_re_pc_per_n=real * entry.frf_re_pc_per_n, frf_im_pc_per_n=other * entry.frf_im_pc_per_n)
+
+
+def changed(made: Campaign, change: Change) -> Campaign:
+    entries = frf_recordings(made)
+    return replace(made, recordings=tuple(change(entry, number) for number, entry in enumerate(entries)))
+
+
+def named(inspected: Inspected) -> list[Reason]:
+    return [entry.reason for entry in inspected.findings if entry.code in SLIPS]
+
+
+def lines(made: Campaign) -> dict[str, np.ndarray]:
+    return {
+        entry.id: np.asarray(entry.frf_re_pc_per_n) + 1j * np.asarray(entry.frf_im_pc_per_n)
+        for entry in frf_recordings(made)
+    }
+
+
+def same(one: Campaign, other: Campaign) -> bool:
+    """Whether the recordings of the first are those of the other."""
+    known = lines(other)
+    return all(np.allclose(values, known[name]) for name, values in lines(one).items())
+
+
+PHASES = [
+    ("amplifier_high_pass", (1.0,)),
+    ("timing_delay", (200.0,)),
+    ("sensor_relaxation", (0.03, 0.0)),
+    ("contact_resonance", (30.0, 0.05)),
+]
+
+
+@pytest.mark.parametrize(("mechanism", "parameters"), PHASES)
+def test_conjugated_recordings_contradict_the_others(
+    mechanism: str, parameters: tuple[float, ...], table: SigmaTable
+) -> None:
+    made = campaign(replace(MADE, mechanisms=(mechanism,), parameters=parameters), table)
+    assert named(inspect(made, table)) == []
+    inspected = inspect(changed(made, lambda entry, n: times(entry, 1.0, -1.0 if n % 4 == 1 else 1.0)), table)
+    assert named(inspected) == [Reason.RECORDINGS_CONJUGATED]
+    assert same(inspected.campaign, made)
+
+
+@pytest.mark.parametrize(("mechanism", "parameters"), PHASES)
+def test_a_campaign_that_is_conjugated_has_a_phase_that_nothing_has(
+    mechanism: str, parameters: tuple[float, ...], table: SigmaTable
+) -> None:
+    made = campaign(replace(MADE, mechanisms=(mechanism,), parameters=parameters), table)
+    inspected = inspect(changed(made, lambda entry, _: times(entry, 1.0, -1.0)), table)
+    assert named(inspected) == [Reason.ALL_CONJUGATED]
+    assert same(inspected.campaign, made)
+
+
+def test_where_there_is_no_phase_nothing_is_said_of_it(good: Campaign, table: SigmaTable) -> None:
+    assert named(inspect(changed(good, lambda entry, _: times(entry, 1.0, -1.0)), table)) == []
+
+
+def test_polarity_at_random_is_put_right(good: Campaign, table: SigmaTable) -> None:
+    turned = np.random.default_rng(4).random(len(good.recordings)) < 1 / 3
+    inspected = inspect(changed(good, lambda entry, n: times(entry, -1.0 if turned[n] else 1.0)), table)
+    assert named(inspected) == [Reason.RECORDINGS_REVERSED]
+    assert same(inspected.campaign, good)
+    assert len(inspected.campaign.recordings) == len(good.recordings)
+
+
+def test_a_sensor_at_a_tenth_is_left_out_and_a_spread_of_sensors_is_not(good: Campaign, table: SigmaTable) -> None:
+    inspected = inspect(changed(good, lambda entry, _: times(entry, 0.1 if entry.sensor == "s1" else 1.0)), table)
+    assert named(inspected) == [Reason.WEAK_SENSOR]
+    assert {entry.sensor for entry in frf_recordings(inspected.campaign)} == {"s0", "s2"}
+    assert "'s1' answers with 0.1 " in next(entry for entry in inspected.findings if entry.code == "weak").statement
+    spread = {"s0": 0.6, "s1": 1.4, "s2": 1.0}
+    assert named(inspect(changed(good, lambda entry, _: times(entry, spread[entry.sensor])), table)) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "meant"), [(2.0, "peak-to-peak"), (0.5, "peak-to-peak"), (2**0.5, "rms"), (0.5**0.5, "rms")]
+)
+def test_amplitudes_of_another_kind_are_put_right(factor: float, meant: str, good: Campaign, table: SigmaTable) -> None:
+    off = np.random.default_rng(8).random(len(good.recordings)) < 1 / 3
+    inspected = inspect(changed(good, lambda entry, n: times(entry, factor if off[n] else 1.0)), table)
+    assert named(inspected) == [Reason.AMPLITUDE_FACTOR]
+    assert meant in next(entry for entry in inspected.findings if entry.code == "gain_steps").statement
+    assert same(inspected.campaign, good)
+
+
+def test_a_factor_that_all_recordings_share_and_one_of_no_meaning_are_no_slips(
+    good: Campaign, table: SigmaTable
+) -> None:
+    assert named(inspect(changed(good, lambda entry, _: times(entry, 2.0)), table)) == []
+    off = np.random.default_rng(8).random(len(good.recordings)) < 1 / 3
+    assert named(inspect(changed(good, lambda entry, n: times(entry, 1.65 if off[n] else 1.0)), table)) == []
+
+
+def shuffled(made: Campaign) -> Campaign:
+    """Recorded in another order than listed, by `recorded_at`; without load cycles, which may age a sensor."""
+    order = np.random.default_rng(3).permutation(len(made.recordings))
+
+    def at(entry: FrfRecording, n: int) -> FrfRecording:
+        minutes = int(order[n])
+        return replace(
+            entry, load_cycles=None, recorded_at=f"2020-01-01T{10 + minutes // 60:02d}:{minutes % 60:02d}:00Z"
+        )
+
+    return changed(made, at)
+
+
+def minute(entry: FrfRecording) -> int:
+    assert entry.recorded_at is not None
+    return 60 * (int(entry.recorded_at[11:13]) - 10) + int(entry.recorded_at[14:16])
+
+
+@pytest.mark.parametrize("amplitude", [0.3, -0.2])
+def test_a_warm_up_is_left_out(amplitude: float, good: Campaign, table: SigmaTable) -> None:
+    made = shuffled(good)
+    cold = changed(made, lambda entry, _: times(entry, 1 + amplitude * float(np.exp(-minute(entry) / 2))))
+    inspected = inspect(cold, table)
+    assert named(inspected) == [Reason.WARM_UP]
+    left = sorted(minute(entry) for entry in frf_recordings(inspected.campaign))
+    assert 3 <= left[0] <= 12
+    assert left == list(range(left[0], len(good.recordings)))
+
+
+def test_a_fall_that_load_cycles_explain_is_ageing(good: Campaign, table: SigmaTable) -> None:
+    aged = changed(good, lambda entry, n: times(entry, 1 + 0.3 * float(np.exp(-n / 2))))
+    assert named(inspect(aged, table)) == []
+
+
+def exchanged(first: str, second: str, since: int = 0) -> Change:
+    other = {first: second, second: first}
+    return lambda entry, n: replace(entry, sensor=other.get(entry.sensor, entry.sensor)) if n >= since else entry
+
+
+def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTable) -> None:
+    inspected = inspect(changed(good, exchanged("s0", "s2")), table)
+    assert named(inspected) == [Reason.LABELS_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(good)
+    ]
+
+
+def test_an_exchange_shows_nowhere_where_each_contact_is_on_its_own_sensor(good: Campaign, table: SigmaTable) -> None:
+    centred = changed(good, lambda entry, _: replace(entry, position_mm=None))
+    assert named(inspect(changed(centred, exchanged("s0", "s2")), table)) == []
+
+
+def test_cables_exchanged_from_some_recording_on(good: Campaign, table: SigmaTable) -> None:
+    """Told by the places; without them by the sensors' gains; and by two sensors that are silent since."""
+    since = 26
+    inspected = inspect(changed(good, exchanged("s0", "s2", since)), table)
+    assert named(inspected) == [Reason.CABLES_EXCHANGED]
+    told = next(entry for entry in inspected.findings if entry.reason == Reason.CABLES_EXCHANGED)
+    assert told.arguments["since"] == "r26"
+    gains = {"s0": 0.8, "s1": 1.0, "s2": 1.2}
+    unequal = changed(good, lambda entry, _: replace(times(entry, gains[entry.sensor]), position_mm=None))
+    by_gains = inspect(changed(unequal, exchanged("s0", "s2", since)), table)
+    assert named(by_gains) == [Reason.CABLES_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(by_gains.campaign)] == [
+        entry.sensor for entry in frf_recordings(good)
+    ]
+
+
+def test_two_sensors_that_fall_silent_together_have_their_cables_exchanged(good: Campaign, table: SigmaTable) -> None:
+    random = np.random.default_rng(6)
+
+    def unheard(entry: FrfRecording, n: int) -> FrfRecording:
+        if n < 26 or entry.sensor == "s1":
+            return replace(entry, position_mm=None)
+        real, imaginary = 0.02 * random.normal(size=(2, MADE.lines))
+        return replace(entry, position_mm=None, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+
+    inspected = inspect(changed(good, unheard), table)
+    assert named(inspected) == [Reason.CABLES_EXCHANGED]
+    assert len(inspected.campaign.recordings) == 26 + 8
+
+
+@pytest.mark.parametrize("hidden", ["none", "single"])
+def test_physics_is_no_slip(hidden: str, table: SigmaTable) -> None:
+    """The rig's own effects, from subtle to strong, on 40 campaigns."""
+    for number in range(40):
+        made, _ = from_dict(recorded_campaign(record(drawn(77, number, hidden))))
+        assert named(inspect(made, table)) == [], number
+
+
+def test_slips_lead_the_caveats_and_a_dead_sensor_leads_them_all() -> None:
+    weak = Finding(Reason.WEAK_SENSOR, "r8", "frf_re_pc_per_n", {"sensor": "s1", "share": 0.1, "recordings": 8})
+    dead = Finding(Reason.SILENT_SENSOR, "r4", "frf_re_pc_per_n", {"sensor": "s0", "recordings": 4})
+    text = caveats([weak.in_report(), dead.in_report()])
+    assert text.index("'s0' shows no response") < text.index("'s1' answers with 0.1")

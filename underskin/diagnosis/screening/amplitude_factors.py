@@ -1,0 +1,105 @@
+"""Recordings whose level is 2 or √2 times the others', or 1/2 or 1/√2: peak-to-peak or rms given for peak.
+
+Which recordings are off, a ∈ {0, 1}ⁿ, is sought for each factor c so that y − a ln c is best explained by the model of
+levels, each recording in turn taken for what it is nearer to. k of n such choices cost ln C(n, k).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import comb, log
+
+import numpy as np
+
+from underskin.diagnosis.screening.along_axes import follows_an_axis
+from underskin.diagnosis.screening.levels import Levels
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Floats, Mask
+
+_FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
+_MEANT = {True: "peak-to-peak", False: "rms"}
+_LEAST = 6
+_GAIN, _GAIN_ALONE, _COST = 7.5, 14.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
+_WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
+_MOST = 0.5
+_EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
+_PLAIN_SIZE, _PLAIN_WITHIN = 0.5, 0.03  # of ln c, where a law along an axis may be at work as well: twice is no law
+_SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A factor, the recordings that have it, and by how much ln evidence gains on its cost."""
+
+    factor: float
+    off: Mask
+    gain: float
+
+
+def amplitude_step(levels: Levels) -> Step | None:
+    """The plainest such factor among the recordings, None where none is plain."""
+    if len(levels.value) < _LEAST:
+        return None
+    base = levels.fit(levels.value).evidence
+    steps = [step for step in (_step(levels, factor, base) for factor in _FACTORS) if step is not None]
+    plain = [step for step in steps if step.gain > (_GAIN if step.off.sum() > 1 else _GAIN_ALONE)]
+    return max(plain, key=lambda step: step.gain, default=None)
+
+
+def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
+    """The recordings with the factor taken out, those without a level left out, and the finding on it."""
+    off = levels.number[step.off].tolist()
+    arguments = {
+        "factor": step.factor,
+        "meant": _MEANT[abs(log(step.factor)) > 0.5],
+        "of": [entries[number].id for number in off],
+        "recordings": len(entries),
+        "left_out": len(entries) - len(levels.number),
+    }
+    right = [
+        _times(entries[number], 1 / step.factor) if number in off else entries[number]
+        for number in levels.number.tolist()
+    ]
+    return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
+
+
+def _step(levels: Levels, factor: float, base: float) -> Step | None:
+    """The recordings that are off by a factor; None where there are none, or most, or the factor is another."""
+    size = log(factor)
+    found: list[Step] = []
+    for scatter, bend in product(_SEARCHED_SCATTER, _SEARCHED_BEND):
+        off = _chosen(levels.value, levels.precision(scatter, bend), size)
+        if not off.any() or any((off == one.off).all() for one in found):
+            continue
+        value = levels.value - size * off
+        fit = levels.fit(value)
+        away, deviation = fit.amplitude(value, off.astype(float))
+        exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
+        if exact and follows_an_axis(off, levels.axes):
+            exact = abs(size) > _PLAIN_SIZE and abs(away) < _PLAIN_WITHIN
+        if exact and (np.abs(fit.residual(value)) < 0.35 * abs(size)).mean() > _WELL:
+            cost = _COST * log(comb(len(off), int(off.sum())))
+            found.append(Step(factor, off, fit.evidence - base - cost))
+    return max(found, key=lambda step: step.gain, default=None)
+
+
+def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
+    """a that makes (y − a ln c)ᵀ C⁻¹ (y − a ln c) small, one recording after the other; of a and 1 − a the smaller."""
+    off: Mask = np.zeros(len(value), dtype=bool)
+    for _ in range(3 * len(value)):
+        pull = precision @ (value - size * off)
+        gain = np.where(off, -2.0, 2.0) * size * pull - size**2 * np.diag(precision)
+        best = int(np.argmax(gain))
+        if gain[best] <= 0:
+            break
+        off[best] = not off[best]
+    return ~off if off.mean() > _MOST else off
+
+
+def _times(entry: FrfRecording, factor: float) -> FrfRecording:
+    assert entry.frf_re_pc_per_n is not None
+    assert entry.frf_im_pc_per_n is not None
+    real, imaginary = factor * entry.frf_re_pc_per_n, factor * entry.frf_im_pc_per_n
+    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)

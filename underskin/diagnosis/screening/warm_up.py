@@ -1,0 +1,88 @@
+"""A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
+
+A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis, or a
+step after the first recordings, explains as well.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.diagnosis.screening.along_axes import smooth_along
+from underskin.diagnosis.screening.levels import LevelFit, Levels
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Floats
+
+_LEAST = 10
+_TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
+_MOST_SHARE = 0.35  # of the recordings: τ is a few of them
+_SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
+_LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
+_AMPLITUDE = 0.5  # prior standard deviation of A
+_GAIN, _OVER_AGEING = 3.6, 3.0  # of ln evidence, and over ageing
+_ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
+_OVER = 0.01  # of the level: what is left of the drift in recordings that are used
+
+
+@dataclass(frozen=True)
+class WarmUp:
+    """Its τ [recordings], its amplitude A, and by how much ln evidence gains."""
+
+    time: float
+    amplitude: float
+    gain: float
+
+
+def warming(levels: Levels) -> WarmUp | None:
+    """The drift within the first recordings, None where none is plain."""
+    times = [time for time in _TIMES if 2 * time <= _MOST_SHARE * len(levels.value)]
+    if len(levels.value) < _LEAST or not times:
+        return None
+    base = levels.fit(levels.value).evidence
+    fits = [levels.fit(levels.value, _AMPLITUDE * _drift(levels, time)[:, None]) for time in times]
+    best = int(np.argmax([fit.evidence for fit in fits]))
+    gain = fits[best].evidence - base
+    if gain < _GAIN:
+        return None
+    drift = _drift(levels, times[best])
+    amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
+    rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
+    slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
+    rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in (*_steps(levels), *slower)]
+    if amplitude > 0 and levels.cycles is not None:
+        rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
+    return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
+
+
+def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:
+    """The recordings after the warm-up, and the finding on it."""
+    last = min(found.time * np.log(max(abs(found.amplitude) / _OVER, 1.0)), _MOST_SHARE * len(entries))
+    late = recording_order(entries) > last
+    arguments = {"percent": 100 * float(np.exp(-found.amplitude) - 1), "recordings": int((~late).sum())}
+    kept = [entry for entry, chosen in zip(entries, late, strict=True) if chosen]
+    return kept, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
+
+
+def _without(levels: Levels, drift: Floats) -> LevelFit:
+    """The fit of the levels without the drift at about its amplitude."""
+    amplitude, _ = levels.fit(levels.value, _AMPLITUDE * drift[:, None]).amplitude(levels.value, drift)
+    return levels.fit(levels.value - amplitude * drift)
+
+
+def _steps(levels: Levels) -> list[Floats]:
+    """1 in the first recordings, as many as a warm-up may last."""
+    return [(levels.order < last).astype(float)[:, None] for last in range(1, _LONGEST_STEP + 1)]
+
+
+def _drift(levels: Levels, time: float) -> Floats:
+    return np.asarray(np.exp(-levels.order / time))
+
+
+def _ageing(cycles: Floats) -> list[Floats]:
+    return [np.exp(-cycles / (share * cycles.max()))[:, None] for share in _ONSETS] + [
+        np.log10(1 + cycles / (share * cycles.max()))[:, None] for share in _ONSETS
+    ]

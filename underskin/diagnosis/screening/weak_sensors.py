@@ -1,0 +1,45 @@
+"""Sensors that answer with a small share of the others' level, in all of their recordings: a fault, not a spread.
+
+A sensor is weak where the largest of its levels y lies below the others' median by more than ln 2.9, and by far more
+than they scatter. Real sensors of one skin differ by tens of percent.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from underskin.diagnosis.screening.levels import Levels
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Mask
+
+_LEAST_GAP = 1.07
+_SCATTERS = 4.0  # robust standard deviations of the others
+_MOST = 0.34  # of the sensors, or one of two
+
+
+def weak_sensors(entries: Sequence[FrfRecording], levels: Levels) -> tuple[Mask, list[Finding]]:
+    """Which recordings are of weak sensors (entries,), and the findings on these."""
+    weak: Mask = np.zeros(len(entries), dtype=bool)
+    findings = []
+    numbers = np.unique(levels.sensor)
+    for number in numbers:
+        own = levels.sensor == number
+        others = levels.value[~own]
+        if len(others) < 2:
+            continue
+        usual = float(np.median(others))
+        scatter = 1.4826 * float(np.median(np.abs(others - usual)))
+        gap = usual - levels.value[own]
+        if np.median(gap) < max(_LEAST_GAP, _SCATTERS * scatter) or gap.min() < 0.6 * _LEAST_GAP:
+            continue
+        name = entries[levels.number[own][0]].sensor
+        all_own = np.array([entry.sensor == name for entry in entries])
+        weak |= all_own
+        arguments = {"sensor": name, "share": float(np.exp(-np.median(gap))), "recordings": int(all_own.sum())}
+        first = entries[int(np.flatnonzero(all_own)[0])]
+        findings.append(Finding(Reason.WEAK_SENSOR, first.id, "frf_re_pc_per_n", arguments))
+    if len(findings) > max(1.0, _MOST * len(numbers)):
+        return np.zeros(len(entries), dtype=bool), []
+    return weak, findings
