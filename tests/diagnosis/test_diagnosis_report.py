@@ -230,13 +230,13 @@ def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) 
     made = replace(SENSORS, mechanisms=("strain_stiffening",), parameters=(8.0,), modulus_mpa=2.7)
     file = tmp_path / "palm.json"
     file.write_text(json.dumps(to_dict(campaign(made, table))), encoding="utf-8")
-    asked = ["--preload-n", "0.2", "3.0", "--recordings", "4", "--offset-mm", "0", "--offset-mm", "60"]
+    asked = ["--preload-n", "0.2", "6.0", "--recordings", "6", "--offset-mm", "0", "--offset-mm", "60"]
     result = CliRunner().invoke(app, ["plan", str(file), *asked])
     assert result.exit_code == 0
     planned = json.loads(result.stdout)
     assert planned["probability_of_deciding"] > planned["without_it"]
-    assert sum(entry["repeats"] for entry in planned["recordings"]) <= 4
-    assert all(0.2 <= entry["preload_n"] <= 3.0 for entry in planned["recordings"])
+    assert sum(entry["repeats"] for entry in planned["recordings"]) <= 6
+    assert all(0.2 <= entry["preload_n"] <= 6.0 for entry in planned["recordings"])
     places = {entry.id: [entry.x_mm, entry.y_mm] for entry in campaign(made, table).skin.sensors}
     assert all(entry["position_mm"] == places[entry["sensor"]] for entry in planned["recordings"])
 

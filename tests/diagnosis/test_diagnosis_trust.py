@@ -152,15 +152,16 @@ def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: Si
 
 
 @pytest.mark.slow
-def test_no_d33_is_given_where_several_answers_are_left(table: SigmaTable) -> None:
+def test_where_several_answers_are_left_their_d33_are_averaged_and_none_is_to_be_quoted(table: SigmaTable) -> None:
     """E declared three times too small, one sphere and few preloads: E and what acts like it are not told apart."""
     made = campaign(Made(preloads_n=(0.5, 1.0, 2.0), spheres_mm=(10.0,), modulus_mpa=8.0), table)
     wrong = replace(made, skin=replace(made.skin, youngs_modulus_mpa=8.0 / 3))
     report = diagnosis_report(wrong, table)
     assert report["verdict"] in ("ambiguous", "unexplained")
-    assert report["d33"] is None
+    if report["d33"] is not None:
+        assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
+        assert not report["d33"]["quotable"]
     assert "Quote it" not in page(report)
-    assert "No d33 is given" in page(report)
 
 
 @pytest.mark.slow

@@ -187,7 +187,9 @@ def not_adopted(report: Mapping[str, Any]) -> str | None:
     A law that nobody listed may, where it is certain and its axis says something of other recordings; so may one of
     several answers that predict the recordings alike.
     """
-    if report["verdict"] == "explained" or (report["verdict"] == "ambiguous" and report["provenance"].get("alike")):
+    if report["verdict"] == "explained" or (
+        report["verdict"] == "ambiguous" and report.get("provenance", {}).get("alike")
+    ):
         return None
     law = report.get("unnamed")
     if law is None or report["d33"] is None or law["axis"] in OF_ONE_CAMPAIGN:

@@ -23,7 +23,7 @@ _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
 _LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN, _OVER_AGEING = 3.6, 3.0  # of ln evidence, and over ageing
+_GAIN, _OVER_AGEING, _OVER_RIVALS = 3.6, 3.0, 1.5  # of ln evidence, over ageing, and over what else may do it
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
@@ -55,7 +55,7 @@ def warming(levels: Levels) -> WarmUp | None:
     rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in (*_steps(levels), *slower)]
     if amplitude > 0 and levels.cycles is not None:
         rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
-    return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) else None
+    return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) + _OVER_RIVALS else None
 
 
 def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:
