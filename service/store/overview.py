@@ -101,10 +101,10 @@ def of_array(answer: Mapping[str, Any] | None) -> float | None:
 
 
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
-    """The latest diagnosis of each of these campaigns that has one."""
+    """The latest diagnosis of each of these campaigns that has one of it alone."""
     query = (
         select(*(diagnoses.c[name] for name in _OF_DIAGNOSES))
-        .where(diagnoses.c.campaign.in_(numbers))
+        .where(diagnoses.c.campaign.in_(numbers), diagnoses.c.kind == "campaign")
         .order_by(diagnoses.c.number)
     )
     return {row.campaign: row for row in connection.execute(query)}
