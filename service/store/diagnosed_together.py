@@ -1,5 +1,5 @@
-"""What a diagnosis of several campaigns is of: the campaigns as they were when it was asked for, and the skins of which it
-has all that there were.
+"""What a diagnosis of several campaigns is of: the campaigns as they were when it was asked for, and the skins of which
+all were asked for.
 """
 
 import hashlib
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import orjson
-from sqlalchemy import ColumnElement, Connection, Select, case, exists, func, insert, select
+from sqlalchemy import ColumnElement, Connection, Select, and_, case, exists, func, insert, select
 from sqlalchemy.sql.selectable import ScalarSelect
 
 from service.schemas.diagnoses import DiagnosisKind
@@ -49,13 +49,18 @@ class Together:
 def usable(connection: Connection, skin_id: str) -> list[Member]:
     """The current campaigns with recordings of a skin and of those joined to it, by arrival; locked until the
     transaction ends, so that they stay so."""
-    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id))))
-    query = (
-        query.where(CURRENT, campaigns.c.recordings > campaigns.c.excluded)
-        .order_by(campaigns.c.number)
-        .with_for_update()
-    )
+    query = select(campaigns).where(_usable(skin_id)).order_by(campaigns.c.number).with_for_update()
     return [member(row, skin_id) for row in connection.execute(query)]
+
+
+def count_usable(connection: Connection, skin_id: str) -> int:
+    """How many there are."""
+    return int(connection.execute(select(func.count()).select_from(campaigns).where(_usable(skin_id))).scalar_one())
+
+
+def _usable(skin_id: str) -> ColumnElement[bool]:
+    of_skin = campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
+    return and_(of_skin, CURRENT, campaigns.c.recordings > campaigns.c.excluded)
 
 
 def member(row: AnyRow, skin_id: str) -> Member:
@@ -150,5 +155,5 @@ def added() -> ScalarSelect[str]:
 def outdated(row: AnyRow) -> str | None:
     """Why a diagnosis of several campaigns is not of them as they are now, by its row; None where it is."""
     if row.member_changed is not None:
-        return f"changed: {row.member_changed}"
-    return None if row.member_added is None else f"changed: campaign {row.member_added} was added"
+        return str(row.member_changed)
+    return None if row.member_added is None else f"campaign {row.member_added} was added"

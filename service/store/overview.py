@@ -14,7 +14,7 @@ from service.store.tables import AnyRow, campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
-_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at")
+_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at", "name")
 _LATELY = 12  # campaigns of a trend
 
 

@@ -162,7 +162,7 @@ class Skins:
         *,
         without: Sequence[str] = (),
     ) -> Document:
-        """Start one diagnosis of several campaigns of the skin together; its `id` and `state`, as in `client.diagnoses`.
+        """Start one diagnosis of several campaigns of the skin together; its `id` and `state`.
 
         Without `campaigns` it is of all that are in use. `name` is what the report is called, without one the skin's
         id. `without` as in `client.diagnoses.start`. The same request on campaigns that have not changed is answered

@@ -7,8 +7,8 @@
 Fields have the names and the lab units of the HTTP interface. A single number holds for all rows; arrays must be
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
 domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
-`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`); several skins
-together: `client.fleets` (`underskin.client.fleets`).
+`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`); several
+skins together: `client.fleets` (`underskin.client.fleets`).
 """
 
 from collections.abc import Mapping

@@ -42,6 +42,8 @@ def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
         assert (done["report"]["campaign"], done["report"]["campaigns"]) == ("palm since May", names)
         assert done["report"]["verdict"] == report()["verdict"]
         assert client.skins.diagnose("palm", name="palm since May") == {"id": started["id"], "state": "done"}
+        with pytest.raises(ServiceError, match="is of several campaigns"):
+            client.skins.adopt("palm", started["id"])
         client.campaigns.exclude(ids[0], "r3", "cable loose")
         again = client.diagnoses.wait(client.skins.diagnose("palm", name="palm since May")["id"])
         assert (again["id"] != started["id"], again["excluded"]) == (True, 1)
@@ -105,7 +107,7 @@ def test_all_or_chosen_campaigns_are_queued_once(server: Server, client: Client)
     assert (listed["kind", "campaign"], listed["kind", "fleet"]) == ([alone["id"]], [])
     assert client.diagnoses.cancel(chosen["id"])["state"] == "cancelled"
     assert client.skins.diagnose("palm", ids[::2])["id"] != chosen["id"]
-    with pytest.raises(ServiceError, match="several campaigns|no report"):
+    with pytest.raises(ServiceError, match="no report"):
         client.skins.adopt("palm", whole["id"])
 
 
@@ -132,16 +134,16 @@ def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: C
     added = sent(server, campaign("new", sensors=1), "palm-b")
     assert outdated() == [None, None]
     client.skins.join("palm", "palm-b", "one skin, two labels")
-    assert outdated() == [f"changed: campaign {added} was added", None]
+    assert outdated() == [f"campaign {added} was added", None]
     client.campaigns.withdraw(added, "of another skin")
     assert outdated() == [None, None]
     client.campaigns.exclude(ids[1], "s0-1N", "cable loose")
-    changed = f"changed: campaign {ids[1]} was changed: recordings were excluded since"
+    changed = f"campaign {ids[1]} was changed: recordings were excluded since"
     assert outdated() == [changed, changed]
     again = client.skins.diagnose("palm", ids[:2])["id"]
     assert (again != chosen, found(server, again)["outdated"]) == (True, None)
     client.campaigns.withdraw(ids[0], "wrong sphere")
-    withdrawn = f"changed: campaign {ids[0]} was withdrawn: wrong sphere"
+    withdrawn = f"campaign {ids[0]} was withdrawn: wrong sphere"
     assert outdated() == [withdrawn, withdrawn]
 
 
@@ -149,7 +151,7 @@ def test_a_correction_outdates_a_fleet(server: Server, client: Client) -> None:
     (first, *_) = [sent_to(server, f"palm-{number}", 1)[0] for number in range(3)]
     fleet = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
     newer = client.campaigns.post(campaign("right", sensors=1), corrects=first, reason="E was mistyped")["id"]
-    assert found(server, fleet)["outdated"] == f"changed: campaign {first} was corrected by {newer}"
+    assert found(server, fleet)["outdated"] == f"campaign {first} was corrected by {newer}"
     again = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
     assert newer in found(server, again)["campaign_ids"]
     assert [entry["id"] for entry in client.diagnoses.all(skin="palm-1")] == [again, fleet]
@@ -201,7 +203,7 @@ def test_a_wrong_request_of_a_skin_names_the_field(
     (error,) = refused(server, "/v1/skins/palm/diagnosis", body, 422)["errors"]
     assert (error["field"], error["index"]) == (field, index)
     assert code in (None, error["code"])
-    assert error["allowed"]
+    assert code != "too_few" or error["allowed"] == "must have at least 2 entries"
 
 
 @pytest.mark.parametrize(
