@@ -191,7 +191,10 @@ def query(operation: dict[str, Any]) -> dict[str, Any]:
 
 def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
     for method, path, operation in operations(document):
-        if "{" in path or path in ("/v1/skins/import", "/v1/fleets/diagnosis"):  # about what is kept already: tests/service/store
+        if "{" in path or path in (
+            "/v1/skins/import",
+            "/v1/fleets/diagnosis",
+        ):  # about what is kept already: tests/service/store
             continue
         for media_type, body in [*examples(operation, document)] or [("", "")]:
             if media_type.startswith("multipart/"):  # which needs a boundary
