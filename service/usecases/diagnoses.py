@@ -36,7 +36,6 @@ def ask_of_skin(
     """
     root = skins.require_root(connection, skin_id)
     _require_known(asked.without)
-    skins.lock(connection, [root])
     members = diagnosed_together.usable(connection, root)
     if asked.campaigns is not None:
         members = _chosen(connection, root, asked.campaigns, members)
@@ -65,9 +64,8 @@ def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, 
         roots.append(str(row.root_id))
     name = checked_name("name", asked.name, False)
     _require_known(asked.without)
-    skins.lock(connection, roots)
     members: list[Member] = []
-    for root in sorted(roots):
+    for root in sorted(roots):  # so that all requests lock campaigns in the same order
         own = diagnosed_together.usable(connection, root)
         if not own:
             raise Conflict(f"Skin {root!r} has no campaign in use with recordings: leave it out of the fleet.")

@@ -1,5 +1,6 @@
 """Diagnoses of several kept campaigns: asked for, queued, worked out, outdated; and requests that are refused."""
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -120,6 +121,26 @@ def test_asked_twice_under_one_key_is_queued_once(server: Server) -> None:
     other = server.http.post("/v1/skins/palm/diagnosis", headers=key, json={"name": "other"})
     assert other.status_code == 422
     assert server.http.post("/v1/skins/palm/diagnosis").json()["id"] != first["id"]
+
+
+def test_asked_at_once_is_queued_once(server: Server) -> None:
+    skins = ["palm", "finger", "thumb"]
+    for skin in skins:
+        sent_to(server, skin, 2)
+    told: list[tuple[str, str]] = []
+
+    def ask(path: str, body: dict[str, Any]) -> None:
+        answer = server.http.post(path, json=body)
+        assert answer.status_code == 202, answer.text
+        told.append((path, answer.json()["id"]))
+
+    requests = [("/v1/skins/finger/diagnosis", {}), ("/v1/fleets/diagnosis", {"skins": skins, "name": "fleet"})] * 4
+    threads = [threading.Thread(target=ask, args=request) for request in requests]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (len(told), len(set(told))) == (8, 2)
 
 
 def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: Client) -> None:
