@@ -1,40 +1,20 @@
 """Several campaigns, of a skin or of a fleet, diagnosed together in the browser; hostile names, and no script."""
 
-from typing import Any
-
 import httpx
-import pytest
 from playwright.sync_api import Browser
 
-from service.store import database, diagnoses
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
-from tests.support.diagnosed import report, sent, table
+from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
-from underskin import Client, __version__
-
-
-@pytest.fixture(scope="module")
-def made() -> dict[str, Any]:
-    """A report as the library might make one of several campaigns."""
-    return {**report(), "campaign": "together", "campaigns": ["one", "two"]}
-
-
-def finished(server: Server, made: dict[str, Any]) -> None:
-    """End all that waits with this report, without a worker."""
-    store = database(server.place.database_url, server.place.folder)
-    with store.writing() as connection:
-        basis = diagnoses.Basis(table().sha256, __version__)
-        while (claimed := diagnoses.claim(connection, "test", basis)) is not None:
-            assert diagnoses.finish(connection, claimed.number, "test", made)
-    store.close()
+from underskin import Client
 
 
 def sent_to(server: Server, skin: str, *names: str) -> list[str]:
     return [sent(server, campaign(name, sensors=1), skin) for name in names]
 
 
-def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: Server, made: dict[str, Any]) -> None:
+def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: Server) -> None:
     page = reader.page
     sent_to(idle, "alone", "the only one")
     reader.go("/skins/alone")
@@ -47,7 +27,7 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     page.wait_for_url("**/diagnoses/*")
     assert page.get_by_role("heading", level=1).inner_text() == "Diagnosis of several"
     page.get_by_text("It waits for its turn.").wait_for()
-    finished(idle, made)
+    finished(idle)
     page.get_by_role("heading", name="What", exact=True).wait_for(timeout=60_000)  # without reloading by hand
     reader.require_accessible()
     for name, campaign_id in (("one", first), ("two", second)):
@@ -55,7 +35,9 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
         assert link.get_attribute("href") == f"/campaigns/{campaign_id}"
     for nothing in ("Adopt", "Within the limits of your rig", "cannot be adopted", "were not kept"):
         assert page.get_by_text(nothing, exact=False).count() == 0, nothing
-    plan = idle.http.get(page.url.partition("?")[0] + "/plan", headers=BROWSING)
+    for part in ("report.html", "explanations.csv"):
+        assert idle.http.get(f"{page.url}/{part}", headers=BROWSING).status_code == 200, part
+    plan = idle.http.get(f"{page.url}/plan", headers=BROWSING)
     assert (plan.status_code, "of several campaigns" in plan.text) == (404, True)
     page.get_by_role("button", name="Without contact resonance").click()
     page.get_by_text("Supposed that it is not contact resonance").wait_for()
@@ -65,12 +47,12 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     assert "together with others, as several" in page.get_by_role("main").inner_text()
 
 
-def test_what_is_outdated_is_diagnosed_again(idle: Server, made: dict[str, Any]) -> None:
+def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
     first, second, _ = sent_to(idle, "changing", "a", "b", "c")
     with Client(str(idle.http.base_url)) as client, httpx.Client(base_url=idle.http.base_url, headers=BROWSING) as form:
         whole = client.skins.diagnose("changing", name="all of it")["id"]
         chosen = client.skins.diagnose("changing", [first, second], "two of it")["id"]
-        finished(idle, made)
+        finished(idle)
         sent_to(idle, "changing", "d")
         client.campaigns.exclude(second, "s0-1N", "cable loose")
         for diagnosis_id, count, why in ((whole, 4, "excluded since"), (chosen, 2, "excluded since")):
@@ -87,7 +69,7 @@ def test_what_is_outdated_is_diagnosed_again(idle: Server, made: dict[str, Any])
         assert (answer.status_code, "withdrawn: wrong sphere" in answer.text) == (409, True)
 
 
-def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server, made: dict[str, Any]) -> None:
+def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> None:
     for number in range(3):
         sent_to(idle, f"fleet-{number}", f"{HOSTILE[:20]} {number}")
     context = browser.new_context(java_script_enabled=False)
@@ -111,11 +93,12 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server, made
     page.get_by_label("Name").fill(HOSTILE)
     page.get_by_role("button", name="Diagnose these skins together").click()
     page.wait_for_url("**/diagnoses/*")
-    finished(idle, made)
+    finished(idle)
     page.reload()
     assert "<script>" in page.get_by_role("heading", level=1).inner_text()
     for number in range(3):
         assert page.get_by_role("link", name=f"fleet-{number}").get_attribute("href") == f"/skins/fleet-{number}"
+    assert idle.http.get(f"{page.url}/report.html", headers=BROWSING).status_code == 200
     page.get_by_role("link", name="Fleets").click()
     assert page.get_by_role("heading", name="Diagnosed before").count() == 1
     context.close()

@@ -9,10 +9,9 @@ import numpy as np
 import orjson
 import pytest
 
-from service.store import database, diagnoses
-from tests.support.diagnosed import report, sent, table
+from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
-from underskin import Client, __version__
+from underskin import Client
 
 Rows = list[dict[str, Any]]
 
@@ -21,19 +20,6 @@ Rows = list[dict[str, Any]]
 def client(server: Server) -> Iterator[Client]:
     with Client(str(server.http.base_url)) as opened:
         yield opened
-
-
-def finished(server: Server) -> None:
-    """End all that waits, without a worker."""
-    store = database(server.place.database_url, server.place.folder)
-    with store.writing() as connection:
-        basis = diagnoses.Basis(table().sha256, __version__)
-        while (claimed := diagnoses.claim(connection, "test", basis)) is not None:
-            made = (
-                report() if claimed.name is None else {**report(), "campaign": claimed.name, "d33": {"per_sensor": []}}
-            )
-            assert diagnoses.finish(connection, claimed.number, "test", made)
-    store.close()
 
 
 def diagnosed_together(server: Server, client: Client) -> tuple[list[str], str]:
