@@ -189,6 +189,8 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
     indices = [part for part in place if isinstance(part, int)]
     message = str(detail["msg"])
     code, words = _KNOWN.get(detail["type"], (ErrorCode.INVALID_VALUE, ""))
+    if detail["type"] == "too_short" and detail["ctx"]["min_length"] > 1:
+        words = f"must have at least {detail['ctx']['min_length']} entries"
     return InvalidInput(
         names[0] if names else "body",
         None if detail["type"] == "missing" else detail.get("input"),

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Literal
 
-from service.jobs.process import WorkerProcesses
+from service.jobs.process import Given, WorkerProcesses
 from service.jobs.runner import logger
 from service.problems import Refusal
 from service.store import AnyRow, Database, diagnoses
@@ -94,7 +94,8 @@ class Planner:
         planned.state = "running"
         campaign, _ = self._store.read(diagnoses.campaign_of, row)
         without = diagnoses.without(row)
-        with self._processes.at_work(campaign, limits=asdict(limits), without=without) as worker:
+        given = [Given.of(campaign, row.skin_id)]
+        with self._processes.at_work(given, limits=asdict(limits), without=without) as worker:
             while not (worker.ended or self._ending.is_set()):
                 worker.news.wait(0.5)
                 planned.progress = worker.said["progress"]

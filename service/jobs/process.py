@@ -16,7 +16,8 @@ from typing import Any, BinaryIO, Self
 
 import orjson
 
-from service.jobs.worker import Job
+from service.jobs.worker import Job, Part
+from service.schemas.diagnoses import DiagnosisKind
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.readers import json_file
 
@@ -110,6 +111,20 @@ class WorkerProcess:
             self._shared.close()
 
 
+@dataclass(frozen=True)
+class Given:
+    """A campaign for a worker: its document, its skin, and the recordings left out of it, each with the reason."""
+
+    document: bytes
+    skin_id: str
+    excluded: Sequence[tuple[str, str]] = ()
+
+    @classmethod
+    def of(cls, campaign: Campaign, skin_id: str, excluded: Sequence[tuple[str, str]] = ()) -> Self:
+        """From a campaign that lacks what is left out."""
+        return cls(json_file.write(campaign), skin_id, excluded)
+
+
 def _end_of(stderr: BinaryIO) -> str:
     stderr.seek(max(0, stderr.seek(0, os.SEEK_END) - _LAST_WORDS))
     return stderr.read().decode("utf-8", "replace")
@@ -137,14 +152,16 @@ class WorkerProcesses:
 
     def at_work(
         self,
-        campaign: Campaign,
-        excluded: tuple[tuple[str, str], ...] = (),
+        campaigns: Sequence[Given],
         limits: dict[str, Any] | None = None,
         without: Sequence[str] = (),
+        kind: DiagnosisKind = "campaign",
+        name: str | None = None,
     ) -> "Worker":
-        """A worker at its job, on a campaign; see `Job`."""
-        content = json_file.write(campaign)
-        job = Job(len(content), self.table_sha256, self._memory_bytes, excluded, limits, tuple(without))
+        """A worker at its job, on campaigns; see `Job`."""
+        parts = [Part(one.skin_id, len(one.document), one.excluded) for one in campaigns]
+        job = Job(parts, self.table_sha256, self._memory_bytes, limits, without, kind, name)
+        content = [one.document for one in campaigns]
         with self._lock:
             try:
                 process = self._running().fork()
@@ -182,14 +199,16 @@ class WorkerProcesses:
 class Worker:
     """A worker at its job. `news` is set when it has ended. Leaving the block ends it in any case."""
 
-    def __init__(self, job: Job, campaign: bytes, process: WorkerProcess, is_done: Callable[[], None]) -> None:
+    def __init__(
+        self, job: Job, documents: Sequence[bytes], process: WorkerProcess, is_done: Callable[[], None]
+    ) -> None:
         """`is_done` is called once the process has ended and nothing is shared with it any more."""
         self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
         self._process, self._is_done = process, is_done
         self._code: int | None = None
-        threading.Thread(target=self._send, args=(job, campaign), daemon=True).start()
+        threading.Thread(target=self._send, args=(job, documents), daemon=True).start()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
 
@@ -219,9 +238,11 @@ class Worker:
         """The end of what it wrote to stderr."""
         return _end_of(self._process.stderr)
 
-    def _send(self, job: Job, campaign: bytes) -> None:
+    def _send(self, job: Job, documents: Sequence[bytes]) -> None:
         with suppress(OSError, ValueError):  # it has ended already
-            self._process.stdin.write(job.line() + campaign)
+            self._process.stdin.write(job.line())
+            for document in documents:
+                self._process.stdin.write(document)
             self._process.stdin.flush()  # and stays open: its end is the runner's
 
     def _listen(self) -> None:

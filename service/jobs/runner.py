@@ -4,15 +4,17 @@ import logging
 import secrets
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
 
-from service.jobs.process import Worker, WorkerProcesses
+from service.jobs.process import Given, Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.mechanisms.declared.document import digest
+from underskin.recordings.shown_values import LONGEST_NAME
 
 logger = logging.getLogger("underskin")
 
@@ -100,9 +102,8 @@ class Runner:
 
     def _run(self, row: AnyRow) -> None:
         """One diagnosis, until it has ended, another server has claimed it, or this server ends."""
-        campaign, excluded = self._store.read(diagnoses.campaign_of, row)
-        left_out = tuple((left.recording, left.reason) for left in excluded)
-        with self._processes.at_work(campaign, left_out, without=diagnoses.without(row)) as worker:
+        without = diagnoses.without(row)
+        with self._processes.at_work(self._given(row), None, without, row.kind, row.name) as worker:
             with self._lock:
                 self._jobs[threading.current_thread()] = worker
             while not worker.ended and not self._ending.is_set():
@@ -117,6 +118,19 @@ class Runner:
             else:
                 logger.error("a diagnosis failed", extra={"fields": {"diagnosis": row.id, "said": worker.last_words}})
                 self._end(row, diagnoses.fail, worker.failure)
+
+    def _given(self, row: AnyRow) -> list[Given]:
+        """The campaigns of a diagnosis, read one after another; those of one name are told apart by their ids."""
+        members = self._store.read(diagnoses.members, row)
+        names = [member.name for member in members]
+        given = []
+        for member in members:
+            campaign, excluded = self._store.read(diagnoses.as_asked, member)
+            if names.count(member.name) > 1:
+                campaign = replace(campaign, name=f"{member.name[: LONGEST_NAME // 2]} ({member.campaign_id})")
+            left_out = [(left.recording, left.reason) for left in excluded]
+            given.append(Given.of(campaign, member.skin_id, left_out))
+        return given
 
     def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""

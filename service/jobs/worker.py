@@ -1,24 +1,29 @@
-"""A worker: one campaign in, its report or next experiment out, within a limit on memory.
+"""A worker: campaigns in, one or several, their report or next experiment out, within a limit on memory.
 
 It is a process that fork_server.py forks for one job, so that nothing of a job is left for the next.
 
-Standard input: a line of JSON (`Job`), then the campaign (`campaign/1`), then nothing until the runner ends: a worker
-whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and one with
-its figures, or one with the plan where the job has limits of a rig, or one with the error.
+Standard input: a line of JSON (`Job`), then its campaigns (`campaign/1`), then nothing until the runner ends: a worker
+whose runner is gone ends too. Standard output: a line of JSON for each progress, then one with the report and, of one
+campaign, one with its figures, or one with the plan where the job has limits of a rig, or one with the error.
 """
 
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import orjson
 
+from service.schemas.diagnoses import DiagnosisKind
+
 if TYPE_CHECKING:
+    from underskin.recordings.campaign import Campaign
     from underskin.surrogate.sigma_table import SigmaTable
+
+Say = Callable[[dict[str, Any]], None]
 
 _FEW_NUMBERS: dict[str, Any] = {
     "schema": "campaign/1",
@@ -47,23 +52,40 @@ _FEW_NUMBERS: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
+class Part:
+    """A campaign of a job: its skin, how many bytes its document has, and what was left out of it and why."""
+
+    skin_id: str
+    size: int
+    excluded: Sequence[tuple[str, str]] = ()
+
+
+@dataclass(frozen=True)
 class Job:
-    """What a worker needs beside the campaign: where its bytes end, the table's hash, what was left out and why.
+    """What a worker needs beside the campaigns: what each of them is, the table's hash, the memory that it may take.
 
     With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report. Mechanisms
-    `without` which it is to be explained are left out.
+    `without` which it is to be explained are left out. Where it is of several campaigns, of one skin or of a fleet by
+    `kind`, the report bears `name`.
     """
 
-    campaign_bytes: int
+    parts: Sequence[Part]
     table_sha256: str
     memory_bytes: int
-    excluded: tuple[tuple[str, str], ...]
     limits: dict[str, Any] | None = None
-    without: tuple[str, ...] = ()
+    without: Sequence[str] = ()
+    kind: DiagnosisKind = "campaign"
+    name: str | None = None
 
     def line(self) -> bytes:
         """As the worker reads it."""
         return orjson.dumps(asdict(self), option=orjson.OPT_APPEND_NEWLINE)
+
+    @classmethod
+    def read(cls, line: bytes) -> "Job":
+        """The inverse of `line`."""
+        fields = orjson.loads(line)
+        return cls(**{**fields, "parts": [Part(**part) for part in fields["parts"]]})
 
 
 def work(table: "SigmaTable | None", problem: str) -> None:
@@ -80,14 +102,14 @@ def work(table: "SigmaTable | None", problem: str) -> None:
     line = stdin.readline()
     if not line:
         return  # the server ended before there was a job
-    job = Job(**orjson.loads(line))
-    campaign = stdin.read(job.campaign_bytes)
+    job = Job.read(line)
+    documents = [stdin.read(part.size) for part in job.parts]
     threading.Thread(target=_end_with_the_runner, args=(stdin,), daemon=True).start()
     if table is None:
         say({"error": problem})
         return
     try:
-        _work(job, campaign, table, say)
+        _work(job, documents, table, say)
     except UnderskinError as error:
         say({"error": str(error)})
     except MemoryError:
@@ -106,15 +128,9 @@ def warm_up(table: "SigmaTable") -> None:
         figure.to_json()
 
 
-def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[str, Any]], None]) -> None:
-    """The report, with what was left out of it among the findings; then the figures, without which it is kept too."""
-    from underskin.diagnosis.pipeline import diagnose
-    from underskin.diagnosis.planning.rig_limits import RigLimits
-    from underskin.diagnosis.reporting.figures import figures
-    from underskin.diagnosis.reporting.report import report
+def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -> None:
+    """The report, with what was left out of it among the findings, within the limit on memory."""
     from underskin.errors import TableError
-    from underskin.findings.codes import Reason
-    from underskin.findings.finding import Finding
     from underskin.mechanisms.registry import CATALOGUE
     from underskin.parallel import limit_process
     from underskin.recordings.campaign import parse
@@ -124,23 +140,70 @@ def _work(job: Job, campaign: bytes, table: "SigmaTable", say: Callable[[dict[st
     CATALOGUE.reload()  # the lab's own may have changed since the fork server loaded them
     CATALOGUE.load()
     limit_process(job.memory_bytes)
+    campaigns = [parse(_read(document)) for document in documents]
+    if job.kind == "campaign":
+        _diagnose(job, campaigns[0], table, say)
+    else:
+        say({"report": _with_left_out(job, _together(job, campaigns, table, say), campaigns)})
+
+
+def _diagnose(job: Job, campaign: "Campaign", table: "SigmaTable", say: Say) -> None:
+    """One campaign; its figures come after the report, which is kept without them too."""
+    from underskin.diagnosis.pipeline import diagnose
+    from underskin.diagnosis.planning.rig_limits import RigLimits
+    from underskin.diagnosis.reporting.figures import figures
+    from underskin.diagnosis.reporting.report import report
+
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(parse(_read(campaign)), table, lambda share: say({"progress": share}), limits, job.without)
+    diagnosis = diagnose(campaign, table, lambda share: say({"progress": share}), limits, job.without)
     if job.limits is not None:
         say({"plan": diagnosis.next_experiment})
         return
     document = report(diagnosis)
-    left_out = [
-        Finding(Reason.EXCLUDED, name, "", {"excluded_for": reason}).in_report() for name, reason in job.excluded
-    ]
-    say({"report": {**document, "findings": left_out + list(document["findings"])}})
+    say({"report": _with_left_out(job, document, [campaign])})
     say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
-def _read(campaign: bytes) -> Any:
-    """The campaign's JSON, which the server has written: where it cannot be read, memory is short."""
+def _together(job: Job, campaigns: "Sequence[Campaign]", table: "SigmaTable", say: Say) -> dict[str, Any]:
+    """The report of several campaigns of a skin, or of those of a fleet."""
+    name = job.name or ""
+
+    def progress(share: float) -> None:
+        say({"progress": share})
+
+    if job.kind == "skin":
+        from underskin.diagnosis.several.campaigns import diagnose_together
+
+        return diagnose_together(campaigns, table, name, job.without, progress)
+    from underskin.diagnosis.several.fleet import diagnose_fleet
+
+    skins: dict[str, list[Campaign]] = {}
+    for part, campaign in zip(job.parts, campaigns, strict=True):
+        skins.setdefault(part.skin_id, []).append(campaign)
+    return diagnose_fleet(skins, table, name, job.without, progress)
+
+
+def _with_left_out(job: Job, document: dict[str, Any], campaigns: "Sequence[Campaign]") -> dict[str, Any]:
+    """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name."""
+    from underskin.findings.codes import Reason
+    from underskin.findings.finding import Finding
+
+    left_out = [
+        (campaign.name, Finding(Reason.EXCLUDED, recording, "", {"excluded_for": reason}).in_report())
+        for part, campaign in zip(job.parts, campaigns, strict=True)
+        for recording, reason in part.excluded
+    ]
+    said = [
+        finding if job.kind == "campaign" else {**finding, "statement": f"{name}: {finding['statement']}"}
+        for name, finding in left_out
+    ]
+    return {**document, "findings": said + list(document["findings"])}
+
+
+def _read(document: bytes) -> Any:
+    """A campaign's JSON, which the server has written: where it cannot be read, memory is short."""
     try:
-        return orjson.loads(campaign)
+        return orjson.loads(document)
     except orjson.JSONDecodeError as error:
         raise MemoryError from error
 

@@ -8,6 +8,7 @@ from service.pages.campaign import page as campaign
 from service.pages.design import page as design
 from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
+from service.pages.fleet import page as fleet
 from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
 from service.pages.shared import assets
@@ -17,7 +18,7 @@ from service.pages.start import page as start
 from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
-_OF_SKINS = (start, example, skin, campaign, diagnosis, plan, upload)
+_OF_SKINS = (start, example, skin, campaign, fleet, diagnosis, plan, upload)
 _PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, assets)
 
 router = APIRouter(include_in_schema=False)

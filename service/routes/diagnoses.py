@@ -1,15 +1,18 @@
 """Diagnoses: asked for, listed, read, cancelled. They run in service/jobs."""
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Body, Query
 from fastapi.responses import JSONResponse
+from sqlalchemy import Connection
 
-from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, number_of_cursor
+from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, SkinId, Store, Table, number_of_cursor
+from service.jobs import Runner
 from service.middleware.unique_keys import JsonRoute
-from service.routes.idempotency import Idempotent
+from service.routes.idempotency import Idempotency, Idempotent
 from service.schemas import diagnoses as models
-from service.store import diagnoses
+from service.store import AnyRow, Database, diagnoses
 from service.usecases import diagnoses as usecase
 
 router = APIRouter(prefix="/v1", tags=["diagnoses"], route_class=JsonRoute)
@@ -35,12 +38,67 @@ def ask(
     table, version and catalogue of mechanisms, is answered with that diagnosis.
     """
     without = asked.without
+
+    def act(connection: Connection) -> AnyRow:
+        return usecase.ask(connection, campaign_id, table, idempotency.sender, without)
+
+    return _queued(idempotency, store, runner, without or None, act)
+
+
+@router.post(
+    "/skins/{skin_id}/diagnosis",
+    operation_id="diagnose_skin",
+    summary="Ask for a diagnosis of its campaigns together",
+    status_code=202,
+    dependencies=WRITE,
+    responses={202: {"model": models.Asked}},
+)
+def ask_of_skin(
+    skin_id: SkinId,
+    runner: RunnerInUse,
+    idempotency: Idempotent,
+    store: Store,
+    table: Table,
+    asked: Annotated[models.AskForSkin, Body(default_factory=models.AskForSkin)],
+) -> JSONResponse:
+    """Puts one diagnosis of all of them into the queue, or of those chosen: what acts in all, and since when. The same
+    request on campaigns that have not changed is answered with that diagnosis. 409 where fewer than two campaigns in
+    use have recordings.
+    """
+
+    def act(connection: Connection) -> AnyRow:
+        return usecase.ask_of_skin(connection, skin_id, table, idempotency.sender, asked)
+
+    return _queued(idempotency, store, runner, asked.model_dump(), act)
+
+
+@router.post(
+    "/fleets/diagnosis",
+    operation_id="diagnose_fleet",
+    summary="Ask for a diagnosis of several skins together",
+    status_code=202,
+    dependencies=WRITE,
+    responses={202: {"model": models.Asked}},
+)
+def ask_of_fleet(
+    runner: RunnerInUse, idempotency: Idempotent, store: Store, table: Table, asked: models.AskForFleet
+) -> JSONResponse:
+    """Puts one diagnosis of all campaigns of these skins into the queue: what they have in common, and which skin
+    departs from the others. The same request on campaigns that have not changed is answered with that diagnosis.
+    """
+
+    def act(connection: Connection) -> AnyRow:
+        return usecase.ask_of_fleet(connection, table, idempotency.sender, asked)
+
+    return _queued(idempotency, store, runner, asked.model_dump(), act)
+
+
+def _queued(
+    idempotency: Idempotency, store: Database, runner: Runner, body: Any, act: Callable[[Connection], AnyRow]
+) -> JSONResponse:
+    """The answer to a request for a diagnosis."""
     answer = idempotency.answer(
-        store,
-        without or None,
-        lambda connection: models.Asked.model_validate(
-            usecase.ask(connection, campaign_id, table, idempotency.sender, without), from_attributes=True
-        ).model_dump(),
+        store, body, lambda connection: models.Asked.model_validate(act(connection), from_attributes=True).model_dump()
     )
     runner.stir()
     return JSONResponse(answer, status_code=202)
@@ -49,16 +107,18 @@ def ask(
 @router.get("/diagnoses", operation_id="diagnoses", summary="Diagnoses, the latest first")
 def listed(
     store: Store,
-    campaign: Annotated[str | None, Query(description="Of this campaign.")] = None,
+    campaign: Annotated[str | None, Query(description="Of this campaign, alone or together with others.")] = None,
     skin: Annotated[str | None, Query(description="Of campaigns of this skin and of those joined with it.")] = None,
+    kind: Annotated[models.DiagnosisKind | None, Query(description="Only those of this kind.")] = None,
     state: Annotated[models.State | None, Query(description="Only those in this state.")] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="How many on a page.")] = 50,
     cursor: Annotated[str | None, Query(description="`next` of the page before.")] = None,
 ) -> models.DiagnosisList:
     """Without their reports; a page holds `limit` of them."""
-    filters = diagnoses.DiagnosisFilters(campaign, skin, state)
-    rows = store.read(diagnoses.listed, filters, number_of_cursor(cursor), limit + 1)
-    page = [models.DiagnosisEntry(**usecase.entry(row)) for row in rows[:limit]]
+    filters = diagnoses.DiagnosisFilters(campaign, skin, state, kind)
+    with store.reading() as connection:
+        rows = diagnoses.listed(connection, filters, number_of_cursor(cursor), limit + 1)
+        page = [models.DiagnosisEntry(**entry) for entry in usecase.entries(connection, rows[:limit])]
     return models.DiagnosisList(diagnoses=page, next=str(rows[limit - 1].number) if len(rows) > limit else None)
 
 
@@ -68,7 +128,7 @@ def one(diagnosis_id: DiagnosisId, store: Store) -> models.Diagnosis:
     with store.reading() as connection:
         row = diagnoses.find(connection, diagnosis_id)
         report = diagnoses.report_of(connection, row.number)
-    return models.Diagnosis(**usecase.entry(row), report=report)
+        return models.Diagnosis(**usecase.entry(connection, row), report=report)
 
 
 @router.delete(
@@ -78,6 +138,6 @@ def cancel(diagnosis_id: DiagnosisId, runner: RunnerInUse, store: Store) -> mode
     """Ends its process, or takes it out of the queue. One that is done or has failed stays: 409."""
     with store.writing() as connection:
         diagnoses.cancel(connection, diagnosis_id)
-        row = diagnoses.find(connection, diagnosis_id)
+        entry = usecase.entry(connection, diagnoses.find(connection, diagnosis_id))
     runner.stir()
-    return models.DiagnosisEntry(**usecase.entry(row))
+    return models.DiagnosisEntry(**entry)

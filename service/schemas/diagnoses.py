@@ -1,22 +1,28 @@
 """Diagnoses and adopted models: requests and answers."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 State = Literal["queued", "running", "done", "failed", "cancelled"]
+DiagnosisKind = Literal["campaign", "skin", "fleet"]
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
+
+
+MOST_TOGETHER = 200  # campaigns of one diagnosis
+FEWEST_SKINS = 3  # of a fleet
+_Name = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 
 
 class Asked(BaseModel):
     """A diagnosis that was asked for."""
 
     id: str = Field(description="Its name in this interface.")
-    state: State = Field(description="`done` where the campaign was diagnosed before, as it is now.")
+    state: State = Field(description="`done` where the same was diagnosed before, as it is now.")
 
 
 class AskFor(BaseModel):
-    """How a campaign is to be diagnosed."""
+    """How something is to be diagnosed."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -28,14 +34,51 @@ class AskFor(BaseModel):
     )
 
 
+class AskForSkin(AskFor):
+    """Which campaigns of a skin are to be diagnosed together."""
+
+    campaigns: list[str] | None = Field(
+        default=None,
+        min_length=2,
+        max_length=MOST_TOGETHER,
+        description="Ids of campaigns of the skin or of those joined to it. Without them: all that are in use and have "
+        "recordings.",
+    )
+    name: _Name | None = Field(
+        default=None,
+        description="What the report is called; without one, the skin's id.",
+        examples=["palm 3 since May"],
+    )
+
+
+class AskForFleet(AskFor):
+    """Which skins are to be diagnosed together, each with all of its campaigns."""
+
+    skins: list[str] = Field(
+        min_length=FEWEST_SKINS,
+        max_length=MOST_TOGETHER,
+        description="Ids of skins of one make, each with a campaign that is in use and has recordings.",
+        examples=[["palm-1", "palm-2", "palm-3"]],
+    )
+    name: _Name = Field(description="What the report is called.", examples=["palms of batch 7"])
+
+
 class DiagnosisEntry(Asked):
     """A diagnosis without its report."""
 
-    campaign_id: str = Field(description="The campaign.")
-    skin_id: str = Field(description="The skin that the campaign was sent for.")
+    kind: DiagnosisKind = Field(
+        description="What it is of: one campaign, several campaigns of a skin, or those of a fleet of skins."
+    )
+    name: str | None = Field(description="What the report of several campaigns is called; null for one campaign.")
+    campaign_id: str = Field(description="The campaign; of several, the one that arrived last.")
+    campaign_ids: list[str] = Field(description="All campaigns that it is of, by skin and by arrival.")
+    skin_id: str = Field(description="The skin that the campaign `campaign_id` was sent for.")
     progress: float = Field(description="0 to 1.")
-    excluded: int = Field(description="How many recordings of the campaign it leaves out, since they were excluded.")
-    outdated: str | None = Field(description="Why it is not of the campaign as it is now; null where it is.")
+    excluded: int = Field(description="How many recordings of the campaigns it leaves out, since they were excluded.")
+    outdated: str | None = Field(
+        description="Why it is not of the campaigns as they are now; null where it is. One of all campaigns of a skin "
+        "is outdated by a new one too."
+    )
     table_sha256: str = Field(description="SHA-256 of the table of σ.")
     version: str = Field(description="Version of underskin.")
     without: list[str] = Field(description="Mechanisms that it leaves out of the catalogue.")

@@ -7,17 +7,18 @@ is taken for dead, and the diagnosis is claimed again, by the same server after 
 import json
 import secrets
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from sqlalchemy import Connection, Select, insert, select, text, update
+from sqlalchemy import ColumnElement, Connection, Select, insert, select, text, update
 
-from service.schemas.diagnoses import State
+from service.schemas.diagnoses import DiagnosisKind, State
 from service.store import campaigns as kept_campaigns
-from service.store import skins
+from service.store import diagnosed_together, skins
 from service.store.campaigns import Excluded
 from service.store.codec import compressed, decompressed
+from service.store.diagnosed_together import Member, Together
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, diagnoses
 from service.store.times import now
@@ -26,7 +27,7 @@ from underskin.recordings.campaign import Campaign
 HEARTBEAT_TIMEOUT_S = 10.0
 _USABLE = ("queued", "running", "done")
 
-# All but the report and its figures, and what is said of its campaign.
+# All but the report and its figures, and what is said of its campaign: of several, of the latest of them.
 _LISTED = (
     *[column for column in diagnoses.c if column.name not in ("report", "figures")],
     campaigns.c.id.label("campaign_id"),
@@ -35,6 +36,8 @@ _LISTED = (
     campaigns.c.withdraw_reason,
     campaigns.c.corrected_by,
     campaigns.c.excluded.label("excluded_now"),
+    diagnosed_together.changed().label("member_changed"),
+    diagnosed_together.added().label("member_added"),
 )
 
 
@@ -45,6 +48,7 @@ class DiagnosisFilters:
     campaign: str | None = None
     skin: str | None = None
     state: State | None = None
+    kind: DiagnosisKind | None = None
 
 
 def rows() -> Select[Any]:
@@ -73,19 +77,46 @@ def ask(
     why = kept_campaigns.unused(campaign)
     if why is not None:
         raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")
+    wanted = {"campaign": campaign.number, "excluded": campaign.excluded, "kind": "campaign", "together_sha256": ""}
+    wanted |= _basis(basis, without)
+    return _same(connection, wanted) or _queued(connection, {**wanted, "asked_from": asked_from})
+
+
+def ask_together(
+    connection: Connection, together: Together, basis: Basis, asked_from: str | None, without: Sequence[str] = ()
+) -> AnyRow:
+    """As `ask`, of several campaigns, whose rows are locked."""
     wanted = {
-        "campaign": campaign.number,
-        "excluded": campaign.excluded,
-        "without": json.dumps(sorted(set(without))),
-        **asdict(basis),
+        "campaign": max(member.number for member in together.members),
+        "excluded": sum(member.excluded for member in together.members),
+        "kind": together.kind,
+        "name": together.name,
+        "together_sha256": together.sha256,
+        **_basis(basis, without),
     }
+    same = _same(connection, wanted)
+    if same is not None:
+        return same
+    row = _queued(connection, {**wanted, "asked_from": asked_from})
+    diagnosed_together.keep(connection, row.number, together)
+    return find(connection, row.id)
+
+
+def _basis(basis: Basis, without: Sequence[str]) -> dict[str, Any]:
+    return {"without": json.dumps(sorted(set(without))), **asdict(basis)}
+
+
+def _same(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow | None:
+    """The first diagnosis of all this that neither failed nor was cancelled."""
     same = [diagnoses.c[name] == value for name, value in wanted.items()]
-    query = select(diagnoses.c.id).where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number).limit(1)
-    diagnosis_id = connection.execute(query).scalar()
-    if diagnosis_id is None:
-        diagnosis_id = f"d-{secrets.token_hex(8)}"
-        asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": now(), "asked_from": asked_from}
-        connection.execute(insert(diagnoses), {**wanted, **asked})
+    return connection.execute(rows().where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number)).first()
+
+
+def _queued(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow:
+    """A new one."""
+    diagnosis_id = f"d-{secrets.token_hex(8)}"
+    asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": now()}
+    connection.execute(insert(diagnoses), {**wanted, **asked})
     return find(connection, diagnosis_id)
 
 
@@ -124,9 +155,11 @@ def listed(connection: Connection, filters: DiagnosisFilters, before: int | None
     """Rows of diagnoses, the latest first, those asked for before the number `before`."""
     query = rows()
     if filters.campaign is not None:
-        query = query.where(campaigns.c.id == filters.campaign)
+        query = query.where(_with_one_of(campaigns.c.id == filters.campaign))
     if filters.skin is not None:
-        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
+        query = query.where(_with_one_of(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin)))))
+    if filters.kind is not None:
+        query = query.where(diagnoses.c.kind == filters.kind)
     if filters.state is not None:
         query = query.where(diagnoses.c.state == filters.state)
     if before is not None:
@@ -134,8 +167,15 @@ def listed(connection: Connection, filters: DiagnosisFilters, before: int | None
     return connection.execute(query.order_by(diagnoses.c.number.desc()).limit(limit)).all()
 
 
+def _with_one_of(these: ColumnElement[bool]) -> ColumnElement[bool]:
+    """Whether a diagnosis is of one of these campaigns, alone or together with others."""
+    return these | diagnosed_together.has_one_of(select(campaigns.c.number).where(these))
+
+
 def outdated(row: AnyRow) -> str | None:
-    """Why a diagnosis is not of its campaign as it is now; None where it is."""
+    """Why a diagnosis is not of its campaign, or of its campaigns, as they are now; None where it is."""
+    if row.kind != "campaign":
+        return diagnosed_together.outdated(row)
     changed = "changed: recordings were excluded since" if row.excluded != row.excluded_now else None
     return kept_campaigns.unused(row) or changed
 
@@ -196,10 +236,25 @@ def release(connection: Connection, number: int, server: str) -> bool:
     return _mine(connection, number, server, **queued)
 
 
+def members(connection: Connection, row: AnyRow) -> list[Member]:
+    """The campaigns that a diagnosis is of."""
+    if row.kind == "campaign":
+        name = kept_campaigns.find(connection, row.campaign_id).name
+        return [Member(row.campaign, row.campaign_id, name, row.skin_id, row.excluded)]
+    return diagnosed_together.members_of(connection, [row.number])[row.number]
+
+
 def campaign_of(connection: Connection, row: AnyRow) -> tuple[Campaign, list[Excluded]]:
-    """The campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
-    whole = kept_campaigns.load(connection, kept_campaigns.find(connection, row.campaign_id))
-    excluded = sorted(kept_campaigns.excluded_of(connection, row.campaign), key=lambda left: left.at)[: row.excluded]
+    """The campaign of a diagnosis of one, as `as_asked` has it."""
+    (only,) = members(connection, row)
+    return as_asked(connection, only)
+
+
+def as_asked(connection: Connection, member: Member) -> tuple[Campaign, list[Excluded]]:
+    """A campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
+    whole = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
+    excluded = kept_campaigns.excluded_of(connection, member.number)
+    excluded = sorted(excluded, key=lambda left: left.at)[: member.excluded]
     names = {left.recording for left in excluded}
     return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
 

@@ -1,6 +1,7 @@
 """Diagnoses that have ended, and the models adopted from them, in a skin's export: out, checked, and in.
 
-What waits or runs stays behind: it is asked for again elsewhere. Figures derived with models are computed again.
+What waits or runs stays behind: it is asked for again elsewhere. So does what is also of campaigns of other skins,
+which the file lacks. Figures derived with models are computed again.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,9 +11,10 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StringConstraints
 from sqlalchemy import Connection, Table, insert, select
 
-from service.schemas.diagnoses import Verdict
-from service.store import skins
+from service.schemas.diagnoses import DiagnosisKind, Verdict
+from service.store import diagnosed_together, skins
 from service.store.codec import compressed, decompressed
+from service.store.diagnosed_together import Member, Together
 from service.store.engine import Database, holds
 from service.store.import_checks import ImportedRow, Time
 from service.store.tables import AnyRow, campaigns, diagnoses, models
@@ -52,8 +54,8 @@ class _D33(BaseModel):
     high: Positive
 
 
-class _Report(BaseModel):
-    """What is read again of a report; the rest is handed on."""
+class _AnyReport(BaseModel):
+    """What is read again of every report; the rest is handed on."""
 
     document: Literal["report/1"] = Field(alias="schema")
     verdict: Verdict
@@ -62,8 +64,21 @@ class _Report(BaseModel):
     mechanisms: list[_Mechanism]
     alternatives: list[_Alternative]
     fit: dict[str, Any] | None
-    d33: _D33 | None
     provenance: dict[str, Any]
+
+
+class _Report(_AnyReport):
+    """Of a report on one campaign d33 too, for a model of the skin may be adopted from it."""
+
+    d33: _D33 | None
+
+
+class MemberRow(ImportedRow):
+    """A row of diagnosed_campaigns."""
+
+    campaign_id: Id
+    skin_id: Id
+    excluded: int = Field(ge=0)
 
 
 class DiagnosisRow(ImportedRow):
@@ -76,7 +91,11 @@ class DiagnosisRow(ImportedRow):
     without: Annotated[str, StringConstraints(max_length=4000, pattern=r'^\[("[a-z0-9_]+"(, "[a-z0-9_]+")*)?\]$')] = (
         "[]"
     )
-    own_sha256: Text = ""  # older files have neither
+    own_sha256: Text = ""  # older files have neither, nor the next four
+    kind: DiagnosisKind = "campaign"
+    name: Text | None = None
+    members: list[MemberRow] = Field(default_factory=list)  # of several campaigns, in order
+    all_of: list[Id] = Field(default_factory=list)  # the skins of which they are all
     state: Literal["done", "failed", "cancelled"]
     progress: Share
     asked_at: Time
@@ -116,7 +135,10 @@ def exported(connection: Connection, root: str) -> tuple[list[dict[str, Any]], l
     """Diagnoses and models of a skin and of those joined to it, as an export has them."""
     of_skin = skins.members(root)
     query = _DIAGNOSES.where(campaigns.c.skin_id.in_(of_skin), diagnoses.c.state.in_(_ENDED))
-    entries = [_diagnosis(row) for row in connection.execute(query.order_by(diagnoses.c.number))]
+    query = query.where(
+        ~diagnosed_together.has_other_than(select(campaigns.c.number).where(campaigns.c.skin_id.in_(of_skin)))
+    )
+    entries = [_diagnosis(connection, row) for row in connection.execute(query.order_by(diagnoses.c.number)).all()]
     query = _MODELS.where(models.c.skin_id.in_(of_skin))
     return entries, [_model(row) for row in connection.execute(query.order_by(models.c.number))]
 
@@ -129,19 +151,34 @@ def checked(
     rows = [DiagnosisRow.model_validate(row) for row in diagnosed]
     model_rows = [ModelRow.model_validate(row) for row in adopted]
     for row in rows:
-        if row.campaign_id not in set(campaign_ids):
+        of_campaigns = [row.campaign_id, *(one.campaign_id for one in row.members)]
+        if not set(of_campaigns) <= set(campaign_ids):
             raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
+        _require_whole(row, skin_ids)
         if (row.state == "done") != (row.report is not None):
             raise KeyError(f"diagnosis {row.id}: report")
-        if row.report is not None and _Report.model_validate(row.report).verdict != row.verdict:
+        kind = _Report if row.kind == "campaign" else _AnyReport
+        if row.report is not None and kind.model_validate(row.report).verdict != row.verdict:
             raise KeyError(f"diagnosis {row.id}: verdict")
-    explained = {row.id for row in rows if row.verdict == "explained" and row.report and row.report["d33"]}
+    alone = [row for row in rows if row.kind == "campaign"]
+    explained = {row.id for row in alone if row.verdict == "explained" and row.report and row.report["d33"]}
     for model in model_rows:
         if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
             raise KeyError(f"model {model.id}")
         if (model.withdrawn_at is None) != (model.withdraw_reason is None):
             raise KeyError(f"model {model.id}: withdraw_reason")
     return Checked(rows, model_rows)
+
+
+def _require_whole(row: DiagnosisRow, skin_ids: Sequence[str]) -> None:
+    """What a diagnosis says of several campaigns holds together; raises KeyError."""
+    several = row.kind != "campaign"
+    if several != (len(row.members) > 1) or several != (row.name is not None) or (row.all_of and not several):
+        raise KeyError(f"diagnosis {row.id}: members")
+    if not {*row.all_of, *(one.skin_id for one in row.members)} <= set(skin_ids):
+        raise KeyError(f"diagnosis {row.id}: skins of its members")
+    if several and row.campaign_id not in {one.campaign_id for one in row.members}:
+        raise KeyError(f"diagnosis {row.id}: campaign {row.campaign_id}")
 
 
 def known(connection: Connection, file: Checked) -> set[str]:
@@ -155,7 +192,7 @@ def clashes(connection: Connection, file: Checked) -> list[str]:
     sentences = []
     for row in file.diagnoses:
         there = connection.execute(_DIAGNOSES.where(diagnoses.c.id == row.id)).first()
-        if there is not None and _diagnosis(there) != row.model_dump():
+        if there is not None and _diagnosis(connection, there) != row.model_dump():
             sentences.append(f"Diagnosis {row.id!r} is there already and differs")
     for model in file.models:
         same = (models.c.id == model.id) | ((models.c.skin_id == model.skin_id) & (models.c.version == model.version))
@@ -169,10 +206,7 @@ def add(store: Database, file: Checked) -> None:
     with store.writing() as connection:
         for row in file.diagnoses:
             if not holds(connection, diagnoses, id=row.id):
-                values = row.model_dump(exclude={"campaign_id", "report"})
-                values["campaign"] = _number(connection, campaigns, row.campaign_id)
-                values["report"] = None if row.report is None else compressed(row.report)
-                connection.execute(insert(diagnoses), values)
+                _add(connection, row)
         for model in file.models:
             if not holds(connection, models, id=model.id):
                 values = model.model_dump(exclude={"diagnosis_id"})
@@ -180,13 +214,35 @@ def add(store: Database, file: Checked) -> None:
                 connection.execute(insert(models), values)
 
 
+def _add(connection: Connection, row: DiagnosisRow) -> None:
+    values = row.model_dump(exclude={"campaign_id", "report", "members", "all_of"})
+    values["campaign"] = _number(connection, campaigns, row.campaign_id)
+    values["report"] = None if row.report is None else compressed(row.report)
+    if row.name is None:
+        connection.execute(insert(diagnoses), values)
+        return
+    members = [
+        Member(_number(connection, campaigns, one.campaign_id), one.campaign_id, "", one.skin_id, one.excluded)
+        for one in row.members
+    ]
+    together = Together(row.kind, row.name, members, row.all_of)
+    connection.execute(insert(diagnoses), {**values, "together_sha256": together.sha256})
+    diagnosed_together.keep(connection, _number(connection, diagnoses, row.id), together)
+
+
 def _number(connection: Connection, table: Table, name: str) -> int:
     return int(connection.execute(select(table.c.number).where(table.c.id == name)).scalar_one())
 
 
-def _diagnosis(row: AnyRow) -> dict[str, Any]:
-    values = {name: getattr(row, name) for name in DiagnosisRow.model_fields}
-    return values | {"report": None if row.report is None else decompressed(row.report)}
+def _diagnosis(connection: Connection, row: AnyRow) -> dict[str, Any]:
+    """The row of an export from that of the store."""
+    members = diagnosed_together.members_of(connection, [row.number]).get(row.number, [])
+    several = {
+        "members": [{name: getattr(one, name) for name in MemberRow.model_fields} for one in members],
+        "all_of": diagnosed_together.all_of(connection, row.number),
+        "report": None if row.report is None else decompressed(row.report),
+    }
+    return {name: several[name] if name in several else getattr(row, name) for name in DiagnosisRow.model_fields}
 
 
 def _model(row: AnyRow) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from service.store.tables import AnyRow, campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
-_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at")
+_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at", "name")
 _LATELY = 12  # campaigns of a trend
 
 
@@ -101,10 +101,10 @@ def of_array(answer: Mapping[str, Any] | None) -> float | None:
 
 
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
-    """The latest diagnosis of each of these campaigns that has one."""
+    """The latest diagnosis of each of these campaigns that has one of it alone."""
     query = (
         select(*(diagnoses.c[name] for name in _OF_DIAGNOSES))
-        .where(diagnoses.c.campaign.in_(numbers))
+        .where(diagnoses.c.campaign.in_(numbers), diagnoses.c.kind == "campaign")
         .order_by(diagnoses.c.number)
     )
     return {row.campaign: row for row in connection.execute(query)}

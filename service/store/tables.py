@@ -129,7 +129,8 @@ sensor_d33 = Table(
 )
 
 # One diagnosis of a campaign with `excluded` of its recordings left out: exclusions are never taken back, so that their
-# number says which.
+# number says which. One of several campaigns has them in `diagnosed_campaigns`, the latest of them in `campaign`, and
+# in `excluded` how many recordings of all of them are left out.
 diagnoses = Table(
     "diagnoses",
     metadata,
@@ -141,6 +142,10 @@ diagnoses = Table(
     Column("version", String, nullable=False),  # of underskin
     Column("without", Text, nullable=False, server_default="[]"),  # JSON list of mechanisms that it leaves out
     Column("own_sha256", String, nullable=False, server_default=""),  # of the lab's own mechanisms; empty for none
+    Column("kind", String, nullable=False, server_default="campaign"),  # campaign, skin or fleet
+    Column("name", Text),  # what its report is called; null for one of a single campaign
+    # of what is diagnosed together (service/store/diagnosed_together.py); empty for a single campaign
+    Column("together_sha256", String, nullable=False, server_default=""),
     Column("state", String, nullable=False),
     Column("progress", Float, nullable=False),  # 0 to 1
     Column("asked_at", String, nullable=False),
@@ -156,6 +161,26 @@ diagnoses = Table(
     Column("figures", LargeBinary),  # plotly's JSON of each figure by name, compressed; none where made elsewhere
     Index("diagnoses_of_campaign", "campaign", "number"),
     Index("diagnoses_by_state", "state", "number"),
+)
+
+# The campaigns of a diagnosis of several.
+diagnosed_campaigns = Table(
+    "diagnosed_campaigns",
+    metadata,
+    Column("diagnosis", _Number, ForeignKey("diagnoses.number"), primary_key=True),
+    Column("position", Integer, primary_key=True),  # by skin, then by arrival
+    Column("campaign", _Number, ForeignKey("campaigns.number"), nullable=False),
+    Column("skin_id", String, ForeignKey("skins.id"), nullable=False),  # the skin that was asked for
+    Column("excluded", Integer, nullable=False),  # as in `diagnoses`, of this campaign
+    Index("diagnosed_together_with", "campaign", "diagnosis"),
+)
+
+# The skins of which a diagnosis of several campaigns has all that there were; none where campaigns were chosen.
+diagnosed_skins = Table(
+    "diagnosed_skins",
+    metadata,
+    Column("diagnosis", _Number, ForeignKey("diagnoses.number"), primary_key=True),
+    Column("skin_id", String, ForeignKey("skins.id"), primary_key=True),
 )
 
 # As `inversions`, under the model that was adopted for the skin; one a campaign, of the model asked for last.

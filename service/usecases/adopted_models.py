@@ -77,6 +77,8 @@ def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str |
     diagnosis = diagnoses.find(connection, diagnosis_id)
     if diagnosis.state != "done":
         raise Conflict(f"Diagnosis {diagnosis.id!r} has no report: its state is {diagnosis.state}.")
+    if diagnosis.kind != "campaign":
+        raise Conflict(f"Diagnosis {diagnosis.id!r} is of several campaigns: adopt the diagnosis of one of them.")
     of_row(connection, diagnosis)  # which refuses what cannot serve
     return models.adopt(connection, root, diagnosis, sender)
 

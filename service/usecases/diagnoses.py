@@ -1,4 +1,4 @@
-"""Diagnoses of campaigns: asked for, and described."""
+"""Diagnoses: asked for, of one campaign or of several together, and described."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,11 +6,15 @@ from typing import Any
 from sqlalchemy import Connection
 
 from service.jobs.runner import basis
-from service.schemas.diagnoses import DiagnosisEntry
-from service.store import AnyRow, diagnoses
+from service.schemas.diagnoses import MOST_TOGETHER, AskForFleet, AskForSkin, DiagnosisEntry
+from service.store import AnyRow, Conflict, campaigns, diagnosed_together, diagnoses, skins
+from service.store.diagnosed_together import Member, Together
 from service.usecases.mechanisms import catalogue
-from underskin.errors import not_one_of
+from underskin.errors import ErrorCode, InvalidInput, not_one_of
+from underskin.recordings.validation import name as checked_name
 from underskin.surrogate.sigma_table import SigmaTable
+
+_FEWEST = 2  # campaigns of one skin
 
 
 def ask(
@@ -18,15 +22,129 @@ def ask(
 ) -> AnyRow:
     """Queue the diagnosis of a campaign, with this table, version and catalogue; the one that it has already, where it
     has one. Raises InvalidInput where `without` names a mechanism that is not in the catalogue."""
+    _require_known(without)
+    return diagnoses.ask(connection, campaign_id, basis(table.sha256), sender, without)
+
+
+def ask_of_skin(
+    connection: Connection, skin_id: str, table: SigmaTable, sender: str | None, asked: AskForSkin
+) -> AnyRow:
+    """As `ask`, of the campaigns of a skin together.
+
+    Raises Missing where there is no such skin, InvalidInput that names the campaign that is not its own, and Conflict
+    where one is not in use, or fewer than two are.
+    """
+    root = skins.require_root(connection, skin_id)
+    _require_known(asked.without)
+    members = diagnosed_together.usable(connection, root)
+    if asked.campaigns is not None:
+        members = _chosen(connection, root, asked.campaigns, members)
+    elif len(members) < _FEWEST:
+        count = "no campaign" if not members else "one campaign"
+        raise Conflict(f"Skin {root!r} has {count} in use with recordings; {_FEWEST} or more are diagnosed together.")
+    name = root if asked.name is None else checked_name("name", asked.name, False)
+    together = Together("skin", name, members, [root] if asked.campaigns is None else [])
+    return _together(connection, together, table, sender, asked.without)
+
+
+def ask_of_fleet(connection: Connection, table: SigmaTable, sender: str | None, asked: AskForFleet) -> AnyRow:
+    """As `ask`, of all campaigns of several skins together.
+
+    Raises InvalidInput that names the skin that is not there or was given before, and Conflict where one has no
+    campaign in use.
+    """
+    roots: list[str] = []
+    for index, skin_id in enumerate(asked.skins):
+        row = skins.find(connection, skin_id)
+        if row is None:
+            raise InvalidInput("skins", skin_id, "must be the id of a skin", index, code=ErrorCode.NOT_ONE_OF)
+        if row.root_id in roots:
+            allowed = f"must be another skin than skins[{roots.index(row.root_id)}], which is the same one"
+            raise InvalidInput("skins", skin_id, allowed, index, code=ErrorCode.NOT_UNIQUE)
+        roots.append(str(row.root_id))
+    name = checked_name("name", asked.name, False)
+    _require_known(asked.without)
+    members: list[Member] = []
+    for root in sorted(roots):  # so that all requests lock campaigns in the same order
+        own = diagnosed_together.usable(connection, root)
+        if not own:
+            raise Conflict(f"Skin {root!r} has no campaign in use with recordings: leave it out of the fleet.")
+        members += own
+    return _together(connection, Together("fleet", name, members, sorted(roots)), table, sender, asked.without)
+
+
+def ask_again(
+    connection: Connection, diagnosis_id: str, table: SigmaTable, sender: str | None, without: Sequence[str]
+) -> AnyRow:
+    """Ask for the same of the campaigns as they are now; a diagnosis of all campaigns is then of new ones too."""
+    row = diagnoses.find(connection, diagnosis_id)
+    if row.kind == "campaign":
+        return ask(connection, row.campaign_id, table, sender, without)
+    all_of = diagnosed_together.all_of(connection, row.number)
+    without = list(without)
+    if row.kind == "fleet":
+        return ask_of_fleet(connection, table, sender, AskForFleet(skins=all_of, name=row.name, without=without))
+    members = diagnoses.members(connection, row)
+    chosen = None if all_of else [member.campaign_id for member in members]
+    asked = AskForSkin(campaigns=chosen, name=row.name, without=without)
+    return ask_of_skin(connection, members[0].skin_id, table, sender, asked)
+
+
+def _together(
+    connection: Connection, together: Together, table: SigmaTable, sender: str | None, without: Sequence[str]
+) -> AnyRow:
+    if len(together.members) > MOST_TOGETHER:
+        raise Conflict(f"{len(together.members)} campaigns are too many: up to {MOST_TOGETHER} are diagnosed together.")
+    return diagnoses.ask_together(connection, together, basis(table.sha256), sender, without)
+
+
+def _chosen(connection: Connection, root: str, asked: Sequence[str], usable: Sequence[Member]) -> list[Member]:
+    """Those asked for of the campaigns that may be used, by arrival."""
+    by_id = {member.campaign_id: member for member in usable}
+    for index, campaign_id in enumerate(asked):
+        if campaign_id in asked[:index]:
+            raise InvalidInput("campaigns", campaign_id, "must be given once", index, code=ErrorCode.NOT_UNIQUE)
+        if campaign_id not in by_id:
+            raise _not_usable(connection, root, campaign_id, index)
+    return [member for member in usable if member.campaign_id in asked]
+
+
+def _not_usable(connection: Connection, root: str, campaign_id: str, index: int) -> Exception:
+    """Why a campaign cannot be diagnosed with others of a skin."""
+    own = {row.id: row for row in campaigns.of_skin(connection, root)}
+    if campaign_id not in own:
+        allowed = f"must be a campaign of skin {root!r} or of one joined to it"
+        return InvalidInput("campaigns", campaign_id, allowed, index, code=ErrorCode.NOT_ONE_OF)
+    why = campaigns.unused(own[campaign_id])
+    return Conflict(
+        f"campaigns[{index}] = {campaign_id!r} is not diagnosed: "
+        + ("all of its recordings are excluded." if why is None else f"it was {why}.")
+    )
+
+
+def _require_known(without: Sequence[str]) -> None:
     known = catalogue()
     for name in without:
         if name not in known:
             raise not_one_of("without", name, known)
-    return diagnoses.ask(connection, campaign_id, basis(table.sha256), sender, without)
 
 
-def entry(row: AnyRow) -> dict[str, Any]:
-    """The fields of DiagnosisEntry from a row of the store."""
-    names = [name for name in DiagnosisEntry.model_fields if name not in ("outdated", "without")]
-    values = {name: getattr(row, name) for name in names}
-    return values | {"outdated": diagnoses.outdated(row), "without": diagnoses.without(row)}
+def entries(connection: Connection, rows: Sequence[AnyRow]) -> list[dict[str, Any]]:
+    """The fields of DiagnosisEntry from rows of the store."""
+    members = diagnosed_together.members_of(connection, [row.number for row in rows if row.kind != "campaign"])
+    derived = ("outdated", "without", "campaign_ids")
+    names = [name for name in DiagnosisEntry.model_fields if name not in derived]
+    return [
+        {name: getattr(row, name) for name in names}
+        | {
+            "outdated": diagnoses.outdated(row),
+            "without": diagnoses.without(row),
+            "campaign_ids": [one.campaign_id for one in members.get(row.number, ())] or [row.campaign_id],
+        }
+        for row in rows
+    ]
+
+
+def entry(connection: Connection, row: AnyRow) -> dict[str, Any]:
+    """The same of one row."""
+    return entries(connection, [row])[0]

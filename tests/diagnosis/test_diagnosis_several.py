@@ -93,7 +93,7 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
     thick = replace(other, skin=replace(other.skin, thickness_mm=3.0))
     with pytest.raises(InvalidInput, match="as may has it"):
         diagnose_together([made("may"), thick], table, "two skins")
-    with pytest.raises(InvalidInput, match="kind frf"):
+    with pytest.raises(InvalidInput, match="two at least with recordings of kind frf"):
         diagnose_together([made("may"), replace(other, recordings=())], table, "empty")
     with pytest.raises(InvalidInput, match="must be 3 at least"):
         diagnose_fleet({"a": [other], "b": [other]}, table, "two")

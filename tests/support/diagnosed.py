@@ -13,6 +13,8 @@ from service.store import database, diagnoses
 from tests.support.store_server import Server
 from underskin import __version__
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.several.campaigns import diagnose_together
+from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
 from underskin.recordings.conditions import Sensor, SkinDescription
@@ -118,6 +120,29 @@ def report() -> dict[str, Any]:
     """The report on `resonant`, made here: what any worker makes of it."""
     made = diagnosis_report(parse(resonant("array")), table())
     return dict(orjson.loads(orjson.dumps(made, option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
+@cache
+def joint_reports() -> dict[str, dict[str, Any]]:
+    """Reports on several campaigns like `resonant`, of a skin and of a fleet, by the kind of their diagnosis."""
+    one, two, three = (parse(resonant(name)) for name in ("one", "two", "three"))
+    fleet = {"a": [one], "b": [two], "c": [three]}
+    made = {
+        "skin": diagnose_together([one, two], table(), "several"),
+        "fleet": diagnose_fleet(fleet, table(), "fleet"),
+    }
+    return dict(orjson.loads(orjson.dumps(made, option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
+def finished(server: Server) -> None:
+    """End all that waits without a worker, each with a report of its kind."""
+    store = database(server.place.database_url, server.place.folder)
+    with store.writing() as connection:
+        basis = diagnoses.Basis(table().sha256, __version__)
+        while (row := diagnoses.claim(connection, "test", basis)) is not None:
+            made = report() if row.kind == "campaign" else {**joint_reports()[row.kind], "campaign": row.name}
+            assert diagnoses.finish(connection, row.number, "test", made)
+    store.close()
 
 
 def diagnosed(server: Server, document: dict[str, Any], made: dict[str, Any], skin: str = "palm") -> tuple[str, str]:

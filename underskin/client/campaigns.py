@@ -133,7 +133,7 @@ class Campaigns:
 
 
 class Skins:
-    """Skins: list, join, d33 over time, adopted models, export."""
+    """Skins: list, join, d33 over time, campaigns diagnosed together, adopted models, export."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -153,6 +153,23 @@ class Skins:
     def history(self, skin_id: str, *, model: ModelName = "paper") -> Document:
         """d33 of each sensor over time, its trend, and what is left out."""
         return self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model))
+
+    def diagnose(
+        self,
+        skin_id: str,
+        campaigns: Sequence[str] | None = None,
+        name: str | None = None,
+        *,
+        without: Sequence[str] = (),
+    ) -> Document:
+        """Start one diagnosis of several campaigns of the skin together; its `id` and `state`.
+
+        Without `campaigns` it is of all that are in use. `name` is what the report is called, without one the skin's
+        id. `without` as in `client.diagnoses.start`. The same request on campaigns that have not changed is answered
+        with the diagnosis that there is.
+        """
+        given = {"campaigns": None if campaigns is None else list(campaigns), "name": name, "without": list(without)}
+        return self._session.json("POST", _skin(skin_id, "diagnosis"), json=given)
 
     def adopt(self, skin_id: str, diagnosis_id: str) -> Document:
         """Adopt the model of an explained diagnosis for the skin; requests with the model `adopted` use it."""

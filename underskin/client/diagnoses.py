@@ -36,10 +36,16 @@ class Diagnoses:
         return self._session.json("GET", path_of("diagnoses", diagnosis_id))
 
     def all(
-        self, *, campaign: str | None = None, skin: str | None = None, state: str | None = None
+        self,
+        *,
+        campaign: str | None = None,
+        skin: str | None = None,
+        state: str | None = None,
+        kind: str | None = None,
     ) -> Iterator[Document]:
-        """Diagnoses, the latest first, without their reports."""
-        yield from pages(self._session, "/v1/diagnoses", "diagnoses", campaign=campaign, skin=skin, state=state)
+        """Diagnoses, the latest first, without their reports; `kind`: `campaign`, `skin` or `fleet`."""
+        filters = {"campaign": campaign, "skin": skin, "state": state, "kind": kind}
+        yield from pages(self._session, "/v1/diagnoses", "diagnoses", **filters)
 
     def wait(
         self, diagnosis_id: str, *, progress: Callable[[float], object] = lambda _: None, timeout: float | None = None

@@ -7,7 +7,8 @@
 Fields have the names and the lab units of the HTTP interface. A single number holds for all rows; arrays must be
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
 domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
-`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`).
+`client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`); several
+skins together: `client.fleets` (`underskin.client.fleets`).
 """
 
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from numpy.typing import ArrayLike
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
+from underskin.client.fleets import Fleets
 from underskin.client.http_session import Session
 from underskin.client.mechanisms import Mechanisms
 from underskin.units import Floats
@@ -48,6 +50,7 @@ class Client:
         self._npz = npz
         self.campaigns = Campaigns(self._session)
         self.skins = Skins(self._session)
+        self.fleets = Fleets(self._session)
         self.diagnoses = Diagnoses(self._session)
         self.mechanisms = Mechanisms(self._session)
 

@@ -17,7 +17,7 @@ from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, d
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
-from service.store import AnyRow, Database, campaigns, diagnoses, models, skins
+from service.store import AnyRow, Database, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
@@ -42,13 +42,20 @@ _ABOUT = {
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 
 
-@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=WRITE)
-def ask(
-    request: Request, campaign_id: CampaignId, sent: Form, runner: RunnerInUse, store: Store, table: Table
+@router.post("/campaigns/{campaign_id}/diagnosis", dependencies=[*WRITE, OWN_FORM])
+def ask(request: Request, campaign_id: CampaignId, runner: RunnerInUse, store: Store, table: Table) -> Response:
+    """Puts it into the queue; one that was diagnosed as it is now is shown."""
+    row = store.write(usecase.ask, campaign_id, table, sender(request))
+    runner.stir()
+    return see(f"/diagnoses/{row.id}")
+
+
+@router.post("/diagnoses/{diagnosis_id}/again", dependencies=WRITE)
+def ask_again(
+    request: Request, diagnosis_id: DiagnosisId, sent: Form, runner: RunnerInUse, store: Store, table: Table
 ) -> Response:
-    """Puts it into the queue, without the mechanisms that it is supposed not to be; one that was diagnosed so as it is
-    now is shown."""
-    row = store.write(usecase.ask, campaign_id, table, sender(request), sent.get("without", "").split())
+    """Puts the same into the queue, of the campaigns as they are now, without the mechanisms that the form names."""
+    row = store.write(usecase.ask_again, diagnosis_id, table, sender(request), sent.get("without", "").split())
     runner.stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -61,26 +68,31 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
         own = next((model for model in of_skin if model.id == row.id), None)
         adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
-        campaign = campaigns.find(connection, row.campaign_id)
+        members = diagnoses.members(connection, row)
+    alone = row.kind == "campaign"
+    not_adopted = None if report is None or not alone else _not_adopted(report)
     place = f"/v1/diagnoses/{row.id}"
     return page(
         request,
         "diagnosis.html",
         row=row,
-        campaign_name=campaign.name,
+        name=row.name or members[0].name,
+        alone=alone,
+        members=members,
         shown=None if report is None else _shown(row, report, figures),
-        lacks_figures=report is not None and report["fit"] is not None and not figures,
+        lacks_figures=alone and report is not None and report["fit"] is not None and not figures,
         outdated=diagnoses.outdated(row),
         adopted_as=adopted_as,
         in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
-        may_be_adopted=report is not None and _not_adopted(report) is None,
-        open=report is not None and left_open(report),
+        may_be_adopted=alone and report is not None and not_adopted is None,
+        open=alone and report is not None and left_open(report),
         limit_fields=FIELDS,
         without=in_words(diagnoses.without(row)),
+        without_names=" ".join(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
         has_law=report is not None and report.get("unnamed") is not None,
         not_kept=None if report is None else _not_kept(report),
-        not_adopted=None if report is None else _not_adopted(report),
+        not_adopted=not_adopted,
         same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
     )
 

@@ -40,6 +40,7 @@ class VerdictSummary:
     mood: Literal["good", "look", "quiet"]
     beside: str
     at: str  # when it ended, or was asked for
+    name: str | None  # of one of several campaigns
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, VerdictSummary]:
@@ -56,17 +57,17 @@ def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
 def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
     if not report:
-        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at)
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at, row.name)
     law = report["verdict"] == "unexplained" and report.get("unnamed")
     tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
-        return VerdictSummary(row.id, tag, "quiet", "", at)
+        return VerdictSummary(row.id, tag, "quiet", "", at, row.name)
     probability = report["probability"]
     if report["verdict"] in ("no_mismatch", "unexplained"):
         tag = f"{tag}, {in_percent(probability)}"
     sure = report["verdict"] == "no_mismatch" and probability >= EXPLAINED
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
-    return VerdictSummary(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at)
+    return VerdictSummary(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at, row.name)
 
 
 def _beside(report: Mapping[str, Any]) -> str:

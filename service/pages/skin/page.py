@@ -1,29 +1,45 @@
 """A skin: its array as a map, its sensors over time, its campaigns."""
 
+from collections.abc import Sequence
 from typing import Annotated
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 
-from service.dependencies import WRITE, SkinId, Store, Table, number_of_cursor, sender
+from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, number_of_cursor, sender
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_of_rows
-from service.pages.shared.forms import Form, reason, see
+from service.pages.shared.forms import OWN_FORM, Form, reason, see
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
 from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_rows
 from service.problems import validated
 from service.schemas.campaign_d33 import D33Value
+from service.schemas.diagnoses import AskForSkin, DiagnosisKind
 from service.schemas.skins import Join
-from service.store import Database, campaigns, inversions, models, overview, skins
+from service.store import (
+    AnyRow,
+    Database,
+    campaigns,
+    diagnosed_together,
+    diagnoses,
+    inversions,
+    models,
+    overview,
+    skins,
+)
 from service.usecases import d33_cache
+from service.usecases import diagnoses as diagnosis_usecase
 from service.usecases import skins as usecase
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/skins/{skin_id}")
 
 _ON_A_PAGE = 50
+_SEVERAL: tuple[DiagnosisKind, ...] = ("skin", "fleet")
+_MOST_TOGETHER = 5  # of the latest diagnoses of each kind
 _AT_ONCE = 2  # campaigns whose d33 a page waits for
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", *D33Value.model_fields,
@@ -57,11 +73,14 @@ def skin(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
+        together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
+        may_be_together = diagnosed_together.count_usable(connection, root) > 1
         model_row = models.last(connection, root)
         last_model = None if model_row is None else adopted_versions(connection, [model_row])[0]
         model = last_model if last_model is not None and last_model.withdrawn_at is None else None
         adopted = [] if model is None else [model.diagnosis_id]
         verdict = verdicts.of_rows(connection, list(diagnosed.values()), adopted)
+        of_several = verdicts.of_rows(connection, together)
         verdict_of = {number: verdict[row.id] for number, row in diagnosed.items()}
     serves = model is not None and model.outdated is None
     answer = None if last is None else d33_cache.answer(store, table, last, None)
@@ -87,6 +106,8 @@ def skin(
             (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))
             for row in rows[:_ON_A_PAGE]
         ],
+        diagnosed_together=list(of_several.values()),
+        may_be_together=may_be_together,
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,
@@ -108,6 +129,18 @@ def skin(
     if waiting:
         made.background = BackgroundTask(d33_cache.complete, store, table, root)
     return made
+
+
+def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[AnyRow]:
+    return diagnoses.listed(connection, diagnoses.DiagnosisFilters(skin=root, kind=kind), None, _MOST_TOGETHER)
+
+
+@router.post("/diagnosis", dependencies=[*WRITE, OWN_FORM])
+def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, store: Store, table: Table) -> Response:
+    """Puts one diagnosis of all campaigns in use into the queue; one that there is already is shown."""
+    row = store.write(diagnosis_usecase.ask_of_skin, skin_id, table, sender(request), AskForSkin())
+    runner.stir()
+    return see(f"/diagnoses/{row.id}")
 
 
 @router.post("/model/withdraw", dependencies=WRITE)

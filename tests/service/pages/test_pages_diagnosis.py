@@ -200,6 +200,9 @@ def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made:
     campaign_id = idle.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
     for path in (
         f"/campaigns/{campaign_id}/diagnosis",
+        "/skins/forms/diagnosis",
+        "/fleets/diagnosis",
+        f"/diagnoses/{diagnosis_id}/again",
         f"/diagnoses/{diagnosis_id}/cancel",
         f"/diagnoses/{diagnosis_id}/adopt",
         "/skins/forms/model/withdraw",
@@ -219,6 +222,9 @@ def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Serv
         own = {"Origin": str(server.http.base_url).rstrip("/")}
         for path in (
             f"/campaigns/{campaign_id}/diagnosis",
+            "/skins/locked/diagnosis",
+            "/fleets/diagnosis",
+            f"/diagnoses/{diagnosis_id}/again",
             f"/diagnoses/{diagnosis_id}/cancel",
             f"/diagnoses/{diagnosis_id}/adopt",
             "/skins/locked/model/withdraw",

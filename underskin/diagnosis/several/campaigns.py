@@ -34,7 +34,8 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least, each with FRFs; they are put in the order of their first recordings' times where all have one.
+        Two at least with FRFs, others are left out; they are put in the order of their first recordings' times where
+        all have one.
     table
         σ.
     name
@@ -52,10 +53,11 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, one without FRFs, or skins that are declared otherwise.
+        Fewer than two campaigns with FRFs, or skins that are declared otherwise.
     """
-    _check(campaigns)
-    ordered = in_order(campaigns)
+    with_frf = [campaign for campaign in campaigns if any(isinstance(one, FrfRecording) for one in campaign.recordings)]
+    _check(with_frf)
+    ordered = in_order(with_frf)
     results = []
     for number, campaign in enumerate(ordered):
         results.append(diagnose(campaign, table, without=without))
@@ -111,13 +113,11 @@ def date_of(campaign: Campaign) -> str | None:
 
 def _check(campaigns: Sequence[Campaign]) -> None:
     if len(campaigns) < 2:
-        raise InvalidInput("campaigns", len(campaigns), "must be two at least, to be diagnosed together")
+        raise InvalidInput("campaigns", len(campaigns), "must be two at least with recordings of kind frf")
     names = [campaign.name for campaign in campaigns]
     for campaign in campaigns:
         if names.count(campaign.name) > 1:
             raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")
-        if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
-            raise InvalidInput("campaigns", campaign.name, "must hold recordings of kind frf")
     first = campaigns[0].skin
     for campaign in campaigns[1:]:
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio"):

@@ -24,7 +24,7 @@ from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.population import STATED, without_departing
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import in_percent
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
@@ -56,9 +56,10 @@ def diagnose_fleet(
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
     results: dict[str, list[DiagnosisResult]] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
-        if not campaigns:
-            raise InvalidInput("skins", skin, "must have a campaign")
-        results[skin] = [diagnose(campaign, table, without=without) for campaign in in_order(campaigns)]
+        with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
+        if not with_frf:
+            raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
+        results[skin] = [diagnose(campaign, table, without=without) for campaign in in_order(with_frf)]
         progress((number + 1) / (len(skins) + 1))
     usable = {skin: last for skin, own in results.items() if (last := _last(own)) is not None}
     lacking = [skin for skin in skins if skin not in usable]

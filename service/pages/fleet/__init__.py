@@ -1,0 +1,1 @@
+"""The page of fleets: skins of one make."""

@@ -1,0 +1,159 @@
+"""What a diagnosis of several campaigns is of: the campaigns as they were when it was asked for, and the skins of which
+all were asked for.
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import orjson
+from sqlalchemy import ColumnElement, Connection, Select, and_, case, exists, func, insert, select
+from sqlalchemy.sql.selectable import ScalarSelect
+
+from service.schemas.diagnoses import DiagnosisKind
+from service.store import skins
+from service.store.campaigns import CURRENT
+from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnosed_skins, diagnoses
+from service.store.tables import skins as skin_rows
+
+
+@dataclass(frozen=True)
+class Member:
+    """A campaign of a diagnosis: its number and id, the skin that was asked for, how many recordings are left out."""
+
+    number: int
+    campaign_id: str
+    name: str
+    skin_id: str
+    excluded: int
+
+
+@dataclass(frozen=True)
+class Together:
+    """Campaigns to diagnose together; `all_of`: the skins of which they are all."""
+
+    kind: DiagnosisKind
+    name: str
+    members: Sequence[Member]
+    all_of: Sequence[str]
+
+    @property
+    def sha256(self) -> str:
+        """The same for the same campaigns in the same state, asked for in the same way."""
+        members = [[one.skin_id, one.campaign_id, one.excluded] for one in self.members]
+        content = orjson.dumps([self.kind, self.name, members, sorted(self.all_of)])
+        return hashlib.sha256(content).hexdigest()
+
+
+def usable(connection: Connection, skin_id: str) -> list[Member]:
+    """The current campaigns with recordings of a skin and of those joined to it, by arrival; locked until the
+    transaction ends, so that they stay so."""
+    query = select(campaigns).where(_usable(skin_id)).order_by(campaigns.c.number).with_for_update()
+    return [member(row, skin_id) for row in connection.execute(query)]
+
+
+def count_usable(connection: Connection, skin_id: str) -> int:
+    """How many there are."""
+    return int(connection.execute(select(func.count()).select_from(campaigns).where(_usable(skin_id))).scalar_one())
+
+
+def _usable(skin_id: str) -> ColumnElement[bool]:
+    of_skin = campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
+    return and_(of_skin, CURRENT, campaigns.c.recordings > campaigns.c.excluded)
+
+
+def member(row: AnyRow, skin_id: str) -> Member:
+    """A campaign's row as a part of a diagnosis of a skin."""
+    return Member(row.number, row.id, row.name, skin_id, row.excluded)
+
+
+def keep(connection: Connection, diagnosis: int, together: Together) -> None:
+    """Keep what the diagnosis of this number is of."""
+    rows = [
+        {"diagnosis": diagnosis, "position": position, "campaign": one.number, "skin_id": one.skin_id,
+         "excluded": one.excluded}
+        for position, one in enumerate(together.members)
+    ]  # fmt: skip
+    connection.execute(insert(diagnosed_campaigns), rows)
+    if together.all_of:
+        connection.execute(
+            insert(diagnosed_skins), [{"diagnosis": diagnosis, "skin_id": skin_id} for skin_id in together.all_of]
+        )
+
+
+def members_of(connection: Connection, numbers: Sequence[int]) -> dict[int, list[Member]]:
+    """The campaigns of those of these diagnoses that are of several, by the diagnosis' number."""
+    columns = (campaigns.c.number, campaigns.c.id, campaigns.c.name)
+    asked = (diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.skin_id, diagnosed_campaigns.c.excluded)
+    query = select(*columns, *asked).join(campaigns, campaigns.c.number == diagnosed_campaigns.c.campaign)
+    query = query.where(diagnosed_campaigns.c.diagnosis.in_(numbers))
+    found: dict[int, list[Member]] = {}
+    for row in connection.execute(query.order_by(diagnosed_campaigns.c.diagnosis, diagnosed_campaigns.c.position)):
+        found.setdefault(row.diagnosis, []).append(member(row, row.skin_id))
+    return found
+
+
+def all_of(connection: Connection, number: int) -> list[str]:
+    """The skins of which a diagnosis has all campaigns that there were."""
+    query = select(diagnosed_skins.c.skin_id).where(diagnosed_skins.c.diagnosis == number)
+    return list(connection.execute(query.order_by(diagnosed_skins.c.skin_id)).scalars())
+
+
+def has_one_of(numbers: Select[Any]) -> ColumnElement[bool]:
+    """Whether a diagnosis of several has one of these campaigns, given by a query of their numbers."""
+    these = select(diagnosed_campaigns.c.diagnosis).where(diagnosed_campaigns.c.campaign.in_(numbers))
+    return diagnoses.c.number.in_(these)
+
+
+def has_other_than(numbers: Select[Any]) -> ColumnElement[bool]:
+    """Whether a diagnosis of several has a campaign that is none of these, given by a query of numbers."""
+    these = select(diagnosed_campaigns.c.diagnosis).where(diagnosed_campaigns.c.campaign.not_in(numbers))
+    return diagnoses.c.number.in_(these)
+
+
+def changed() -> ScalarSelect[str]:
+    """What became of the first campaign that is no longer as a diagnosis of several has it; null where all are."""
+    own = diagnosed_campaigns.alias("own")
+    its = campaigns.alias("its")
+    differs = its.c.excluded != own.c.excluded
+    how = case(
+        (its.c.withdrawn_at.is_not(None), "withdrawn: " + its.c.withdraw_reason),
+        (its.c.corrected_by.is_not(None), "corrected by " + its.c.corrected_by),
+        else_="changed: recordings were excluded since",
+    )
+    return (
+        select("campaign " + its.c.id + " was " + how)
+        .join(own, own.c.campaign == its.c.number)
+        .where(own.c.diagnosis == diagnoses.c.number)
+        .where(its.c.withdrawn_at.is_not(None) | its.c.corrected_by.is_not(None) | differs)
+        .order_by(own.c.position)
+        .limit(1)
+        .correlate(diagnoses)
+        .scalar_subquery()
+    )
+
+
+def added() -> ScalarSelect[str]:
+    """The first campaign in use that a diagnosis of all of them lacks: it came later; null where there is none."""
+    asked, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
+    has = diagnosed_campaigns.alias("has")
+    there = exists().where(has.c.diagnosis == diagnoses.c.number, has.c.campaign == new.c.number)
+    return (
+        select(func.min(new.c.id))
+        .select_from(diagnosed_skins)
+        .join(asked, asked.c.id == diagnosed_skins.c.skin_id)
+        .join(its, its.c.root_id == asked.c.root_id)
+        .join(new, new.c.skin_id == its.c.id)
+        .where(diagnosed_skins.c.diagnosis == diagnoses.c.number)
+        .where(new.c.withdrawn_at.is_(None), new.c.corrected_by.is_(None), new.c.recordings > new.c.excluded, ~there)
+        .correlate(diagnoses)
+        .scalar_subquery()
+    )
+
+
+def outdated(row: AnyRow) -> str | None:
+    """Why a diagnosis of several campaigns is not of them as they are now, by its row; None where it is."""
+    if row.member_changed is not None:
+        return str(row.member_changed)
+    return None if row.member_added is None else f"campaign {row.member_added} was added"

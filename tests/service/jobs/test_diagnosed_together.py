@@ -1,0 +1,264 @@
+"""Diagnoses of several kept campaigns: asked for, queued, worked out, outdated; and requests that are refused."""
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.service.requests import problem_of
+from tests.support.diagnosed import awaited, found, resonant, sent
+from tests.support.store_server import Place, Server, campaign, running
+from underskin import Client, ServiceError
+
+ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[Client]:
+    with Client(str(server.http.base_url)) as opened:
+        yield opened
+
+
+def sent_to(server: Server, skin: str, count: int) -> list[str]:
+    """The ids of some campaigns of a skin."""
+    return [sent(server, campaign(f"{skin} {number}", sensors=1), skin) for number in range(count)]
+
+
+def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]:
+    """The problem that a request is answered with."""
+    return problem_of(server.http.post(path, json=body), status)
+
+
+def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
+    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        ids = [sent(server, resonant("array")) for _ in range(2)]
+        started = client.skins.diagnose("palm", name="palm since May")
+        done = client.diagnoses.wait(started["id"])
+        assert (done["state"], done["kind"], done["name"]) == ("done", "skin", "palm since May")
+        assert (done["campaign_ids"], done["campaign_id"], done["outdated"]) == (ids, ids[-1], None)
+        # Names that are the same are told apart by the ids.
+        names = [f"array ({campaign_id})" for campaign_id in ids]
+        assert (done["report"]["campaign"], done["report"]["campaigns"]) == ("palm since May", names)
+        assert (done["verdict"], done["probability"]) == ("explained", done["report"]["probability"])
+        assert client.skins.diagnose("palm", name="palm since May") == {"id": started["id"], "state": "done"}
+        with pytest.raises(ServiceError, match="is of several campaigns"):
+            client.skins.adopt("palm", started["id"])
+        client.campaigns.exclude(ids[0], "r3", "cable loose")
+        again = client.diagnoses.wait(client.skins.diagnose("palm", name="palm since May")["id"])
+        assert (again["id"] != started["id"], again["excluded"]) == (True, 1)
+        assert again["report"]["findings"][0]["statement"] == f"array ({ids[0]}): Left out: cable loose"
+
+
+def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
+    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        ids = [sent(server, resonant("array"), f"palm-{number}") for number in range(3)]
+        skins = ["palm-2", "palm-0", "palm-1"]
+        done = client.diagnoses.wait(client.fleets.diagnose(skins, "batch 7")["id"])
+        assert (done["state"], done["kind"], done["campaign_ids"]) == ("done", "fleet", ids)
+        assert (done["report"]["campaign"], len(done["report"]["campaigns"])) == ("batch 7", 3)
+        assert isinstance(done["report"]["population"], list)
+        assert client.fleets.diagnose(sorted(skins), "batch 7") == {"id": done["id"], "state": "done"}
+
+
+def test_a_killed_server_takes_up_a_diagnosis_of_several(place: Place) -> None:
+    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
+        ids = [sent(server, resonant(name)) for name in ("array", "again")]
+        diagnosis_id = client.skins.diagnose("palm")["id"]
+        awaited(server, diagnosis_id, "running")
+        server.kill()
+    with running(place, **ONE) as server:
+        done = awaited(server, diagnosis_id)
+        assert (done["state"], done["campaign_ids"], done["report"]["campaign"]) == ("done", ids, "palm")
+
+
+def test_one_of_several_that_needs_too_much_memory_fails(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    with running(Place(folder), **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
+        large = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
+        for name in ("one", "two"):
+            sent(server, {**large, "name": name})
+        answer = server.http.post("/v1/skins/palm/diagnosis")
+        failed = awaited(server, answer.json()["id"])
+        assert (failed["state"], failed["report"]) == ("failed", None)
+        assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
+
+
+def test_all_or_chosen_campaigns_are_queued_once(server: Server, client: Client) -> None:
+    ids = sent_to(server, "palm", 3)
+    whole = client.skins.diagnose("palm")
+    chosen = client.skins.diagnose("palm", ids[::-2])
+    left_out = client.skins.diagnose("palm", without=["adhesion"])
+    assert len({one["id"] for one in (whole, chosen, left_out)}) == 3
+    assert client.skins.diagnose("palm", campaigns=[ids[0], ids[2]]) == chosen
+    assert client.skins.diagnose("palm") == whole
+    assert found(server, whole["id"])["name"] == "palm"
+    assert found(server, chosen["id"])["campaign_ids"] == [ids[0], ids[2]]
+    assert found(server, left_out["id"])["without"] == ["adhesion"]
+    alone = client.diagnoses.start(ids[2])
+    listed = {filters: [entry["id"] for entry in client.diagnoses.all(**{filters[0]: filters[1]})] for filters in (
+        ("campaign", ids[0]), ("campaign", ids[1]), ("campaign", ids[2]), ("skin", "palm"), ("kind", "campaign"),
+        ("kind", "skin"), ("kind", "fleet"),
+    )}  # fmt: skip
+    together = [left_out["id"], chosen["id"], whole["id"]]
+    assert listed["campaign", ids[0]] == listed["kind", "skin"] == together
+    assert listed["campaign", ids[1]] == [left_out["id"], whole["id"]]
+    assert listed["campaign", ids[2]] == listed["skin", "palm"] == [alone["id"], *together]
+    assert (listed["kind", "campaign"], listed["kind", "fleet"]) == ([alone["id"]], [])
+    assert client.diagnoses.cancel(chosen["id"])["state"] == "cancelled"
+    assert client.skins.diagnose("palm", ids[::2])["id"] != chosen["id"]
+    with pytest.raises(ServiceError, match="no report"):
+        client.skins.adopt("palm", whole["id"])
+
+
+def test_asked_twice_under_one_key_is_queued_once(server: Server) -> None:
+    sent_to(server, "palm", 2)
+    key = {"Idempotency-Key": "mine"}
+    first = server.http.post("/v1/skins/palm/diagnosis", headers=key).json()
+    server.http.delete(f"/v1/diagnoses/{first['id']}")
+    assert server.http.post("/v1/skins/palm/diagnosis", headers=key).json() == first
+    other = server.http.post("/v1/skins/palm/diagnosis", headers=key, json={"name": "other"})
+    assert other.status_code == 422
+    assert server.http.post("/v1/skins/palm/diagnosis").json()["id"] != first["id"]
+
+
+def test_asked_at_once_is_queued_once(server: Server) -> None:
+    skins = ["palm", "finger", "thumb"]
+    for skin in skins:
+        sent_to(server, skin, 2)
+    told: list[tuple[str, str]] = []
+
+    def ask(path: str, body: dict[str, Any]) -> None:
+        answer = server.http.post(path, json=body)
+        assert answer.status_code == 202, answer.text
+        told.append((path, answer.json()["id"]))
+
+    requests = [("/v1/skins/finger/diagnosis", {}), ("/v1/fleets/diagnosis", {"skins": skins, "name": "fleet"})] * 4
+    threads = [threading.Thread(target=ask, args=request) for request in requests]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert (len(told), len(set(told))) == (8, 2)
+
+
+def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: Client) -> None:
+    ids = sent_to(server, "palm", 4)
+    whole = client.skins.diagnose("palm")["id"]
+    chosen = client.skins.diagnose("palm", ids[:2])["id"]
+
+    def outdated() -> list[str | None]:
+        return [found(server, diagnosis_id)["outdated"] for diagnosis_id in (whole, chosen)]
+
+    assert outdated() == [None, None]
+    added = sent(server, campaign("new", sensors=1), "palm-b")
+    assert outdated() == [None, None]
+    client.skins.join("palm", "palm-b", "one skin, two labels")
+    assert outdated() == [f"campaign {added} was added", None]
+    client.campaigns.withdraw(added, "of another skin")
+    assert outdated() == [None, None]
+    client.campaigns.exclude(ids[1], "s0-1N", "cable loose")
+    changed = f"campaign {ids[1]} was changed: recordings were excluded since"
+    assert outdated() == [changed, changed]
+    again = client.skins.diagnose("palm", ids[:2])["id"]
+    assert (again != chosen, found(server, again)["outdated"]) == (True, None)
+    client.campaigns.withdraw(ids[0], "wrong sphere")
+    withdrawn = f"campaign {ids[0]} was withdrawn: wrong sphere"
+    assert outdated() == [withdrawn, withdrawn]
+
+
+def test_a_correction_outdates_a_fleet(server: Server, client: Client) -> None:
+    (first, *_) = [sent_to(server, f"palm-{number}", 1)[0] for number in range(3)]
+    fleet = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
+    newer = client.campaigns.post(campaign("right", sensors=1), corrects=first, reason="E was mistyped")["id"]
+    assert found(server, fleet)["outdated"] == f"campaign {first} was corrected by {newer}"
+    again = client.fleets.diagnose(["palm-0", "palm-1", "palm-2"], "batch 7")["id"]
+    assert newer in found(server, again)["campaign_ids"]
+    assert [entry["id"] for entry in client.diagnoses.all(skin="palm-1")] == [again, fleet]
+
+
+def test_a_skin_with_too_few_campaigns_is_refused(server: Server, client: Client) -> None:
+    assert "no skin 'palm'" in refused(server, "/v1/skins/palm/diagnosis", {}, 404)["detail"]
+    first, second = sent_to(server, "palm", 2)
+    client.campaigns.withdraw(second, "wrong sphere")
+    assert "one campaign in use" in refused(server, "/v1/skins/palm/diagnosis", {}, 409)["detail"]
+    gone = refused(server, "/v1/skins/palm/diagnosis", {"campaigns": [first, second]}, 409)
+    assert "campaigns[1]" in gone["detail"]
+    assert "withdrawn: wrong sphere" in gone["detail"]
+    for recording in ("s0-1N", "s0-2N"):
+        client.campaigns.exclude(first, recording, "cable loose")
+    assert "no campaign in use" in refused(server, "/v1/skins/palm/diagnosis", {}, 409)["detail"]
+    sent_to(server, "palm", 2)
+    emptied = refused(server, "/v1/skins/palm/diagnosis", {"campaigns": [first, second]}, 409)
+    assert "campaigns[0]" in emptied["detail"]
+    assert "all of its recordings are excluded" in emptied["detail"]
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "index", "code"),
+    [
+        ({"campaigns": []}, "campaigns", None, "too_few"),
+        ({"campaigns": ["FIRST"]}, "campaigns", None, "too_few"),
+        ({"campaigns": ["FIRST", "FIRST"]}, "campaigns", 1, "not_unique"),
+        ({"campaigns": ["FIRST", "FOREIGN"]}, "campaigns", 1, "not_one_of"),
+        ({"campaigns": ["FIRST", "c-1"]}, "campaigns", 1, "not_one_of"),
+        ({"campaigns": ["FIRST", 7]}, "campaigns", 1, None),
+        ({"campaigns": "FIRST"}, "campaigns", None, None),
+        ({"name": ""}, "name", None, None),
+        ({"name": " \n"}, "name", None, "wrong_type"),
+        ({"name": 7}, "name", None, None),
+        ({"name": "x" * 201}, "name", None, None),
+        ({"without": ["nothing"]}, "without", None, "not_one_of"),
+        ({"skins": ["palm"]}, "skins", None, "unknown_field"),
+    ],
+)
+def test_a_wrong_request_of_a_skin_names_the_field(
+    server: Server, body: dict[str, Any], field: str, index: int | None, code: str | None
+) -> None:
+    first, _ = sent_to(server, "palm", 2)
+    (foreign,) = sent_to(server, "finger", 1)
+    named = {"FIRST": first, "FOREIGN": foreign}
+    if isinstance(body.get("campaigns"), list):
+        body = {"campaigns": [named.get(one, one) for one in body["campaigns"]]}
+    (error,) = refused(server, "/v1/skins/palm/diagnosis", body, 422)["errors"]
+    assert (error["field"], error["index"]) == (field, index)
+    assert code in (None, error["code"])
+    assert code != "too_few" or error["allowed"] == "must have at least 2 entries"
+
+
+@pytest.mark.parametrize(
+    ("body", "field", "index", "code"),
+    [
+        ({"name": "fleet"}, "skins", None, "required"),
+        ({"skins": ["a", "b", "c"]}, "name", None, "required"),
+        ({"skins": [], "name": "fleet"}, "skins", None, "too_few"),
+        ({"skins": ["a", "b"], "name": "fleet"}, "skins", None, "too_few"),
+        ({"skins": ["a", "b", "a"], "name": "fleet"}, "skins", 2, "not_unique"),
+        ({"skins": ["a", "b", "joined"], "name": "fleet"}, "skins", 2, "not_unique"),
+        ({"skins": ["a", "nowhere", "c"], "name": "fleet"}, "skins", 1, "not_one_of"),
+        ({"skins": ["a", "b", 3], "name": "fleet"}, "skins", 2, None),
+        ({"skins": {"a": 1}, "name": "fleet"}, "skins", None, None),
+        ({"skins": ["a", "b", "c"], "name": "\t"}, "name", None, "wrong_type"),
+        ({"skins": ["a", "b", "c"], "name": "fleet", "without": ["x"]}, "without", None, "not_one_of"),
+        ({"skins": ["a", "b", "c"], "name": "fleet", "campaigns": []}, "campaigns", None, "unknown_field"),
+    ],
+)
+def test_a_wrong_request_of_a_fleet_names_the_field(
+    server: Server, client: Client, body: dict[str, Any], field: str, index: int | None, code: str | None
+) -> None:
+    for skin in ("a", "b", "c", "joined"):
+        sent_to(server, skin, 1)
+    client.skins.join("a", "joined", "one skin, two labels")
+    (error,) = refused(server, "/v1/fleets/diagnosis", body, 422)["errors"]
+    assert (error["field"], error["index"]) == (field, index)
+    assert code in (None, error["code"])
+
+
+def test_a_skin_of_a_fleet_without_a_campaign_in_use_is_named(server: Server, client: Client) -> None:
+    for skin in ("a", "b"):
+        sent_to(server, skin, 1)
+    client.campaigns.withdraw(sent_to(server, "c", 1)[0], "wrong sphere")
+    problem = refused(server, "/v1/fleets/diagnosis", {"skins": ["a", "b", "c"], "name": "fleet"}, 409)
+    assert "'c' has no campaign in use" in problem["detail"]

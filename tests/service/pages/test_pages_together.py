@@ -1,0 +1,112 @@
+"""Several campaigns, of a skin or of a fleet, diagnosed together in the browser; hostile names, and no script."""
+
+import httpx
+from playwright.sync_api import Browser
+
+from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING, HOSTILE, token_of
+from tests.support.diagnosed import finished, sent
+from tests.support.store_server import Server, campaign
+from underskin import Client
+
+
+def sent_to(server: Server, skin: str, *names: str) -> list[str]:
+    return [sent(server, campaign(name, sensors=1), skin) for name in names]
+
+
+def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    sent_to(idle, "alone", "the only one")
+    reader.go("/skins/alone")
+    assert page.get_by_role("button", name="Diagnose its campaigns together").count() == 0
+    first, second = sent_to(idle, "several", "one", "two")
+    reader.go("/skins/several")
+    reader.require_accessible()
+    page.get_by_role("button", name="Diagnose its campaigns together").focus()
+    page.keyboard.press("Enter")
+    page.wait_for_url("**/diagnoses/*")
+    assert page.get_by_role("heading", level=1).inner_text() == "Diagnosis of several"
+    page.get_by_text("It waits for its turn.").wait_for()
+    finished(idle)
+    page.get_by_role("heading", name="What", exact=True).wait_for(timeout=60_000)  # without reloading by hand
+    reader.require_accessible()
+    for name, campaign_id in (("one", first), ("two", second)):
+        link = page.locator("details").get_by_role("link", name=name, exact=True)
+        assert link.get_attribute("href") == f"/campaigns/{campaign_id}"
+    for nothing in ("Adopt", "Within the limits of your rig", "cannot be adopted", "were not kept"):
+        assert page.get_by_text(nothing, exact=False).count() == 0, nothing
+    for part in ("report.html", "explanations.csv"):
+        assert idle.http.get(f"{page.url}/{part}", headers=BROWSING).status_code == 200, part
+    plan = idle.http.get(f"{page.url}/plan", headers=BROWSING)
+    assert (plan.status_code, "of several campaigns" in plan.text) == (404, True)
+    page.get_by_role("button", name="Without contact resonance").click()
+    page.get_by_text("Supposed that it is not contact resonance").wait_for()
+    reader.go("/skins/several")
+    assert page.get_by_role("heading", name="Diagnosed together").count() == 1
+    reader.go(f"/campaigns/{first}")
+    assert "together with others, as several" in page.get_by_role("main").inner_text()
+
+
+def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
+    first, second, _ = sent_to(idle, "changing", "a", "b", "c")
+    with Client(str(idle.http.base_url)) as client, httpx.Client(base_url=idle.http.base_url, headers=BROWSING) as form:
+        whole = client.skins.diagnose("changing", name="all of it")["id"]
+        chosen = client.skins.diagnose("changing", [first, second], "two of it")["id"]
+        finished(idle)
+        sent_to(idle, "changing", "d")
+        client.campaigns.exclude(second, "s0-1N", "cable loose")
+        for diagnosis_id, count, why in ((whole, 4, "excluded since"), (chosen, 2, "excluded since")):
+            shown = form.get(f"/diagnoses/{diagnosis_id}").text
+            assert why in shown
+            assert "Diagnose them again" in shown
+            sent_form = {"form_token": token_of(shown), "without": "adhesion"}
+            answer = form.post(f"/diagnoses/{diagnosis_id}/again", data=sent_form)
+            again = client.diagnoses.get(answer.headers["location"].rpartition("/")[2])
+            assert (len(again["campaign_ids"]), again["outdated"], again["without"]) == (count, None, ["adhesion"])
+            assert again["name"] == client.diagnoses.get(diagnosis_id)["name"]
+        client.campaigns.withdraw(first, "wrong sphere")
+        answer = form.post(f"/diagnoses/{chosen}/again", data=sent_form)
+        assert (answer.status_code, "withdrawn: wrong sphere" in answer.text) == (409, True)
+
+
+def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> None:
+    for number in range(3):
+        sent_to(idle, f"fleet-{number}", f"{HOSTILE[:20]} {number}")
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    address = str(idle.http.base_url).rstrip("/")
+    page.goto(f"{address}/")
+    page.get_by_role("link", name="diagnosed together").click()
+    page.get_by_label("Find a skin").fill("fleet-")
+    page.get_by_role("button", name="Find").click()
+    boxes = page.get_by_role("checkbox")
+    assert boxes.count() == 3
+    for number in range(2):
+        page.get_by_label(f"fleet-{number}").check()
+    page.get_by_label("Name").fill(HOSTILE)
+    page.get_by_role("button", name="Diagnose these skins together").click()
+    page.get_by_role("alert").get_by_text("must have at least 3 entries").wait_for()
+    page.go_back()
+    page.get_by_label("fleet-2").check()
+    for number in range(2):
+        page.get_by_label(f"fleet-{number}").check()
+    page.get_by_label("Name").fill(HOSTILE)
+    page.get_by_role("button", name="Diagnose these skins together").click()
+    page.wait_for_url("**/diagnoses/*")
+    finished(idle)
+    page.reload()
+    assert "<script>" in page.get_by_role("heading", level=1).inner_text()
+    for number in range(3):
+        assert page.get_by_role("link", name=f"fleet-{number}").get_attribute("href") == f"/skins/fleet-{number}"
+    assert idle.http.get(f"{page.url}/report.html", headers=BROWSING).status_code == 200
+    page.get_by_role("link", name="Fleets").click()
+    assert page.get_by_role("heading", name="Diagnosed before").count() == 1
+    context.close()
+
+
+def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
+    sent_to(idle, "fleet-9", "nine")
+    reader.go("/fleets")
+    reader.require_accessible()
+    reader.go("/fleets?find=nothing-is-called-so")
+    assert "No skin is called so" in reader.page.get_by_role("main").inner_text()

@@ -1,0 +1,150 @@
+"""Diagnoses of several campaigns in exports and backups: elsewhere as they were here, and spoilt ones refused."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import orjson
+import pytest
+
+from tests.support.diagnosed import finished, sent
+from tests.support.store_server import Server, campaign
+from underskin import Client
+
+Rows = list[dict[str, Any]]
+
+
+@pytest.fixture
+def client(server: Server) -> Iterator[Client]:
+    with Client(str(server.http.base_url)) as opened:
+        yield opened
+
+
+def diagnosed_together(server: Server, client: Client) -> tuple[list[str], str]:
+    """Ids of diagnoses of the skin `palm`, of all, of two and of one of its campaigns, and of one of a fleet."""
+    ids = [
+        sent(server, campaign(name, sensors=1), skin) for name, skin in (("a", "palm"), ("b", "palm-b"), ("c", "palm"))
+    ]
+    for skin in ("finger", "thumb"):
+        sent(server, campaign(skin, sensors=1), skin)
+    client.skins.join("palm", "palm-b", "one skin, two labels")
+    client.campaigns.exclude(ids[0], "s0-1N", "cable loose")
+    own = [
+        client.skins.diagnose("palm", without=["adhesion"]),
+        client.skins.diagnose("palm", ids[:2], "two"),
+        client.diagnoses.start(ids[2]),
+    ]
+    fleet = client.fleets.diagnose(["palm", "finger", "thumb"], "batch 7")
+    finished(server)
+    return [one["id"] for one in own], fleet["id"]
+
+
+def told(client: Client, ids: list[str]) -> list[dict[str, Any]]:
+    return [client.diagnoses.get(diagnosis_id) for diagnosis_id in ids]
+
+
+def test_they_are_elsewhere_as_they_were_here(
+    server: Server, elsewhere: Server, client: Client, tmp_path: Path
+) -> None:
+    own, fleet = diagnosed_together(server, client)
+    file = tmp_path / "palm.h5"
+    client.skins.export("palm", file)
+    with Client(str(elsewhere.http.base_url)) as there:
+        for kept, present in ((3, 0), (0, 3)):
+            answer = there.skins.load(file)
+            assert (answer["kept"], answer["present"]) == (kept, present)
+        assert told(there, own) == told(client, own)
+        listed = [entry["id"] for entry in there.diagnoses.all()]
+        assert (sorted(listed), fleet in listed) == (sorted(own), False)
+        # The same request elsewhere is answered with the diagnosis that came.
+        assert there.skins.diagnose("palm", without=["adhesion"]) == {"id": own[0], "state": "done"}
+        added = sent(elsewhere, campaign("new", sensors=1), "palm")
+        assert there.diagnoses.get(own[0])["outdated"] == f"campaign {added} was added"
+        assert there.diagnoses.get(own[1])["outdated"] is None
+
+
+def test_a_backup_holds_those_of_fleets_too(server: Server, client: Client, tmp_path: Path) -> None:
+    own, fleet = diagnosed_together(server, client)
+    before = told(client, [*own, fleet])
+    backup = tmp_path / "backup"
+    assert server.place.command("backup", str(backup)).returncode == 0
+    sent(server, campaign("new", sensors=1), "palm")
+    done = server.place.command("restore", str(backup))
+    assert done.returncode == 0, done.stderr
+    assert told(client, [*own, fleet]) == before
+
+
+def changed(**values: Any) -> Callable[[Rows], None]:
+    def spoil(rows: Rows) -> None:
+        rows[0].update(values)
+
+    return spoil
+
+
+def of_one_member(rows: Rows) -> None:
+    rows[0]["members"] = rows[0]["members"][:1]
+
+
+def of_a_foreign_campaign(rows: Rows) -> None:
+    rows[0]["members"][0]["campaign_id"] = "c-0000000000000000"
+
+
+def of_a_foreign_skin(rows: Rows) -> None:
+    rows[0]["members"][0]["skin_id"] = "finger"
+
+
+def without_its_latest(rows: Rows) -> None:
+    rows[0]["campaign_id"] = rows[1]["members"][0]["campaign_id"]
+    rows[0]["members"] = [one for one in rows[0]["members"] if one["campaign_id"] != rows[0]["campaign_id"]]
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        changed(kind="campaign"),
+        changed(kind="herd"),
+        changed(name=None),
+        changed(all_of=["finger"]),
+        changed(members=[]),
+        changed(members=None),
+        of_one_member,
+        of_a_foreign_campaign,
+        of_a_foreign_skin,
+        without_its_latest,
+    ],
+)
+def test_spoilt_ones_are_refused(
+    server: Server, elsewhere: Server, client: Client, tmp_path: Path, spoil: Callable[[Rows], None]
+) -> None:
+    diagnosed_together(server, client)
+    file = tmp_path / "palm.h5"
+    client.skins.export("palm", file)
+    with h5py.File(file, "r+") as opened:
+        rows = orjson.loads(opened["diagnoses"][()].tobytes())
+        spoil(rows)
+        del opened["diagnoses"]
+        opened["diagnoses"] = np.frombuffer(orjson.dumps(rows), np.uint8)
+    answer = elsewhere.http.post(
+        "/v1/skins/import", content=file.read_bytes(), headers={"Content-Type": "application/octet-stream"}
+    )
+    assert answer.status_code == 422, answer.text
+    assert elsewhere.http.get("/v1/diagnoses").json()["diagnoses"] == []
+
+
+def test_files_of_an_older_underskin_come_in(server: Server, elsewhere: Server, client: Client, tmp_path: Path) -> None:
+    alone = client.diagnoses.start(sent(server, campaign("a", sensors=1)))["id"]
+    finished(server)
+    file = tmp_path / "palm.h5"
+    client.skins.export("palm", file)
+    with h5py.File(file, "r+") as opened:
+        (row,) = orjson.loads(opened["diagnoses"][()].tobytes())
+        for name in ("kind", "name", "members", "all_of"):
+            del row[name]
+        del opened["diagnoses"]
+        opened["diagnoses"] = np.frombuffer(orjson.dumps([row]), np.uint8)
+    with Client(str(elsewhere.http.base_url)) as there:
+        assert there.skins.load(file)["kept"] == 1
+        assert told(there, [alone]) == told(client, [alone])
+        assert client.skins.load(file)["present"] == 1
