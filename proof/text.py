@@ -11,6 +11,7 @@ from proof.markdown import table
 from proof.phrases import median_of, misses, percent, right
 from proof.statistics import Share, calibration, share
 from proof.text_curves import curves, quiet_curves
+from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_unlisted import alarms, hidden, left_out
 from rig.identifiable import THRESHOLD
@@ -46,6 +47,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "unlisted": lambda result: hidden(result, parts.get("quiet_unlisted")),
         "quiet_unlisted": alarms,
         "left_out": left_out,
+        "joint": joint,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -1,0 +1,115 @@
+"""Several kinds of recordings, several dates, several skins: what is told together, and what from the parts alone.
+
+Joint campaigns of the virtual rig (`rig.joint`), each diagnosed together and from its parts: FRFs without the curves
+beside them, the last date alone, each skin alone.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from proof.judge import answer
+from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, sources, stored
+from rig.joint import WHAT, drawn_joint
+
+SEED, COUNT = 36518, 150
+_VISIBLE = 20.0  # in χ²
+_SURE = 0.8
+_ERRORS = ("modulus_error", "thickness_error", "strain_stiffening")
+
+Report = Mapping[str, Any]
+
+
+def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """Of each joint campaign what was hidden, and what is told together and apart."""
+    cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
+    version = f"{diagnosing()} {sources('rig')}"
+    return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
+
+
+def _judged(work: Work, version: str, case: tuple[int, str]) -> dict[str, Any]:
+    number, what = case
+    key = digest_of(["joint", SEED, number, what, version])
+    return stored(work.folder / "joint", key, partial(_one, number, what))
+
+
+def _one(number: int, what: str) -> dict[str, Any]:
+    documents, truth = drawn_joint(SEED, number, what)
+    hidden = [entry for entry in truth["hidden"] if entry["identifiable"]]
+    head = {"name": truth["name"], "what": what, "hidden": [entry["effect"] for entry in truth["hidden"]]}
+    told = {"dates": _dates, "skins": _skins}.get(what, _kinds)(documents, truth, hidden)
+    return {**head, **told}
+
+
+def _kinds(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
+    (document,) = documents
+    alone = {**document, "recordings": [one for one in document["recordings"] if one.get("kind", "frf") == "frf"]}
+    both = {"together": diagnosed(document), "alone": diagnosed(alone)}
+    expected = {entry["effect"] for entry in hidden}
+    told_apart = {entry["effect"] for entry in hidden if entry["chi2_gain_modulus_free"] > _VISIBLE} & set(_ERRORS)
+    told_apart |= {entry["effect"] for entry in hidden if entry["effect"] == "modulus_error"}
+    modulus = truth["documents"][0]["youngs_modulus_mpa"]
+    kind = next(one["kind"] for one in document["recordings"] if one.get("kind", "frf") != "frf")
+    stated = [
+        entry
+        for entry in both["together"].get("by_kind", ())
+        if (entry["kind"], entry["parameter"]) == (kind, "youngs_modulus")
+    ]
+    return {
+        "identifiable": bool(truth["skins"][0]["modulus_identifiable"]),
+        "apart": sorted(told_apart),
+        "right": {name: set(answer(report)) == expected for name, report in both.items()},
+        "named": {name: sorted(told_apart & _present(report)) for name, report in both.items()},
+        "answers": {name: [report["verdict"], list(answer(report))] for name, report in both.items()},
+        "modulus_held": [bool(entry["low"] <= modulus <= entry["high"]) for entry in stated],
+        "contradicted": bool(both["together"].get("contradictions")),
+    }
+
+
+def _present(report: Report) -> set[str]:
+    """What is in every surviving set."""
+    return {entry["mechanisms"][0] for entry in report.get("presence", ())
+            if len(entry["mechanisms"]) == 1 and entry["probability"] >= _SURE}  # fmt: skip
+
+
+def _dates(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
+    from underskin.diagnosis.several.campaigns import diagnose_together
+    from underskin.recordings.campaign import from_dict
+    from underskin.surrogate.sigma_table import load_table
+
+    together = diagnose_together([from_dict(document)[0] for document in documents], load_table(), truth["name"])
+    changed = [entry for entry in hidden if entry["since"]]
+    scopes = {entry["name"]: entry["scope"] for entry in together["mechanisms"]}
+    expected = {entry["effect"] for entry in hidden}
+    since = [entry["effect"] in scopes and scopes[entry["effect"]].get("since") == entry["since"] for entry in changed]
+    return {
+        "right": {"together": set(scopes) == expected, "alone": set(answer(diagnosed(documents[-1]))) == expected},
+        "since": since,
+        "false": not changed and any("since" in scope for scope in scopes.values()),
+        "answers": {"together": [together["verdict"], {name: scope.get("since") for name, scope in scopes.items()}]},
+    }
+
+
+def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
+    from underskin.diagnosis.several.fleet import diagnose_fleet
+    from underskin.recordings.campaign import from_dict
+    from underskin.surrogate.sigma_table import load_table
+
+    campaigns = {str(document["skin"]["id"]): [from_dict(document)[0]] for document in documents}
+    fleet = diagnose_fleet(campaigns, load_table(), truth["name"])
+    departing = {entry["departs"] for entry in hidden if entry["departs"]}
+    stated = {one["skin"] for entry in fleet["population"] for one in entry["departures"]}
+    stated |= {
+        skin
+        for entry in fleet["mechanisms"]
+        if len(entry["scope"]["skins"]) < len(campaigns)
+        for skin in entry["scope"]["skins"]
+    }
+    d33 = {entry["skin"]: entry for entry in next(
+        (one["skins"] for one in fleet["population"] if one["parameter"] == "d33"), [])}  # fmt: skip
+    known = {entry["skin"]: next(iter(entry["d33_pc_per_n"].values())) for entry in truth["documents"]}
+    return {
+        "departs": sorted(departing),
+        "stated": sorted(stated),
+        "d33_held": [d33[skin]["low"] <= value <= d33[skin]["high"] for skin, value in known.items() if skin in d33],
+    }
