@@ -40,11 +40,13 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
             _remember_mechanisms(store)
         migrate.restore(store, file, before)
         needed = store.read(key_requirement.is_needed)
-        mechanisms = store.read(mechanism_files.put_back)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
-    _say_of_mechanisms(mechanisms)
+    try:
+        _say_of_mechanisms(store.read(mechanism_files.put_back))
+    except OSError as error:
+        raise UnderskinError(f"the store is restored, but the mechanisms of the lab's own are not: {error}") from error
     if needed:
         typer.echo(_of_keys(KeyStore(settings.data)))
 

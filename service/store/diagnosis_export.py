@@ -18,6 +18,7 @@ from service.store.diagnosed_together import Member, Together
 from service.store.engine import Database, holds
 from service.store.import_checks import ImportedRow, Time
 from service.store.tables import AnyRow, campaigns, diagnoses, models
+from underskin.prediction.adopted_model import not_adopted
 
 Text = Annotated[str, StringConstraints(max_length=4000)]
 Id = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^/\x00-\x1f]+$")]
@@ -161,7 +162,7 @@ def checked(
         if row.report is not None and kind.model_validate(row.report).verdict != row.verdict:
             raise KeyError(f"diagnosis {row.id}: verdict")
     alone = [row for row in rows if row.kind == "campaign"]
-    explained = {row.id for row in alone if row.verdict == "explained" and row.report and row.report["d33"]}
+    explained = {row.id for row in alone if row.report and not_adopted(row.report) is None and row.report["d33"]}
     for model in model_rows:
         if model.diagnosis_id not in explained or model.skin_id not in set(skin_ids):
             raise KeyError(f"model {model.id}")

@@ -54,8 +54,9 @@ def set_aside(file: Path) -> None:
 
 def remember(connection: Connection) -> None:
     """Keep the files as they are in the store, whose backups then hold them."""
-    files = {file.name: file.read_bytes() for file in sorted(folder_of_lab().glob("*.yaml"))}
-    own_mechanisms.replace(connection, files)
+    folder = folder_of_lab()
+    if folder.is_dir():  # else those of the last backup stay
+        own_mechanisms.replace(connection, {file.name: file.read_bytes() for file in sorted(folder.glob("*.yaml"))})
 
 
 def put_back(connection: Connection) -> PutBack:
@@ -64,6 +65,8 @@ def put_back(connection: Connection) -> PutBack:
     written: list[str] = []
     replaced: list[str] = []
     for name, content in kept.items():
+        if Path(name).name != name or not name.endswith(".yaml"):  # in no backup that this service made
+            continue
         present = {file: file.read_bytes() for file in folder.glob("*.yaml")}
         if present.get(folder / name) == content:
             continue

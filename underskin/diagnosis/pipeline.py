@@ -122,9 +122,14 @@ def _of_frf(
     if inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
 
+    alone, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
+
     def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
-        problem, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms, beside)
-        return problem, search(problem, known)
+        """Beside other kinds under the same noise, so that evidences can be compared."""
+        if beside is None:
+            return alone, search(alone, known)
+        problem = FittingProblem(alone.lines, table, beside)
+        return problem, search(problem)
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search

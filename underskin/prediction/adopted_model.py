@@ -164,7 +164,11 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     parameters = {
         entry["name"]: {parameter["name"]: float(parameter["value"]) for parameter in entry["parameters"]}
         for entry in report["mechanisms"]
+        if not _of_curves_alone(entry["name"])
     }
+    if report["mechanisms"] and not parameters:
+        allowed = "must be of mechanisms that act on FRFs: those of curves alone predict none"
+        raise InvalidInput("diagnosis_id", report["mechanisms"][0]["name"], allowed)
     frf = [mechanism for name, mechanism in CATALOGUE.items() if name in parameters and "frf" in mechanism.kinds]
     known = parameters_together(frf, campaign, "frf")
     for name, values in parameters.items():
@@ -179,6 +183,10 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     unsure = float(np.log(d33["high"] / d33["low"])) / _REPORTED_SDS
     model = AdoptedModel(campaign.skin, parameters, unsure)
     return model if report["verdict"] in ("explained", "ambiguous") else replace(model, **_law(report, campaign, table))
+
+
+def _of_curves_alone(name: str) -> bool:
+    return name in CATALOGUE and "frf" not in CATALOGUE[name].kinds
 
 
 def not_adopted(report: Mapping[str, Any]) -> str | None:

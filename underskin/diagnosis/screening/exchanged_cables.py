@@ -4,7 +4,7 @@ Sensors of different gains answer with each other's level since: before and afte
 crosswise ones agree. All pairs and recordings are tried, and the plainest is held against the model of levels.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import log
@@ -53,9 +53,10 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
 
 
 def with_right_sensors(
-    entries: Sequence[FrfRecording], levels: Levels, found: Exchange
+    entries: Sequence[FrfRecording], levels: Levels, found: Exchange, places: Mapping[str, tuple[float, float]]
 ) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with the sensors that they are of, and the finding on it; places move with the sensors."""
+    """The recordings with the sensors that they are of, and the finding on it; contacts move with the sensors, whose
+    `places` [mm] are given."""
     since = levels.number[found.since]
     names = dict(zip(levels.sensor.tolist(), (entries[number].sensor for number in levels.number), strict=True))
     first, second = (names[number] for number in found.sensors)
@@ -64,8 +65,18 @@ def with_right_sensors(
     arguments = {"first": first, "second": second, "since": entries[start].id, "recordings": len(since)}
     right = list(entries)
     for number in since.tolist():
-        right[number] = replace(entries[number], sensor=second if entries[number].sensor == first else first)
+        entry = entries[number]
+        there = second if entry.sensor == first else first
+        right[number] = replace(entry, sensor=there, position_mm=_moved(entry, places[entry.sensor], places[there]))
     return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**arguments, "put_right": True})
+
+
+def _moved(entry: FrfRecording, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float] | None:
+    """Where the contact lies beside the other sensor."""
+    if entry.position_mm is None:
+        return None
+    x, y = (at + new - old for at, new, old in zip(entry.position_mm, there, here, strict=True))
+    return x, y
 
 
 def _crosswise(flat: Floats, levels: Levels, pair: tuple[int, int]) -> tuple[float, Indices]:

@@ -53,4 +53,5 @@ def _plainest(
         return without_step(entries, own, best)
     if isinstance(best, WarmUp):
         return without_first(entries, best)
-    return None if best is None else with_right_sensors(entries, own, best)
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    return None if best is None else with_right_sensors(entries, own, best, places)

@@ -18,7 +18,7 @@ from underskin.units import Floats
 
 _OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
-_UNTHOUGHT = 0.015  # probability that none of what was compared is right
+UNTHOUGHT = 0.015  # probability that none of what was compared is right
 _EQUAL = 0.01  # nats, within which laws are equally probable
 
 
@@ -162,8 +162,8 @@ class Search:
         showing = [weight for _, weight in self.processes_showing]
         showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
-        probabilities = (1 - _UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
-        probabilities[-1] += _UNTHOUGHT
+        probabilities = (1 - UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        probabilities[-1] += UNTHOUGHT
         left = [self._left_to(entry) for entry in kept]
         probabilities[-1] += ((1 - np.array(left)) * probabilities[:-1]).sum()
         probabilities = self._beside_unlisted(kept, probabilities * [*left, 1.0])

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.diagnosis.data.dataset import lines
-from underskin.diagnosis.inference.explanation import Beside, Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import Campaign
@@ -26,16 +26,12 @@ _CHANGED = 0.03  # change of the noise of some line, relative, below which it st
 
 
 def frf_problem(
-    campaign: Campaign,
-    uneven: Mapping[str, Floats],
-    table: SigmaTable,
-    mechanisms: Known,
-    beside: Beside | None = None,
+    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: Known
 ) -> tuple[FittingProblem, list[Explanation]]:
     """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
     measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
     mechanisms.bind(measured.campaign, table, "frf")
-    problem = FittingProblem(measured, table, beside)
+    problem = FittingProblem(measured, table)
     nothing, *singles = known = _along_frequency(problem)
     fixed = [one for one in singles if not any(entry.acts_on == "line_variance" for entry in one.model.parameters)]
     best = max(fixed, key=lambda entry: entry.log_evidence, default=nothing)
@@ -44,7 +40,7 @@ def frf_problem(
     refined = lines(campaign, uneven, (problem.lines, best.best.prediction.value))
     refined = replace(refined, mechanisms=mechanisms)
     change = np.abs(refined.deviation / problem.lines.deviation - 1).max()
-    return (FittingProblem(refined, table, beside), []) if change > _CHANGED else (problem, known)
+    return (FittingProblem(refined, table), []) if change > _CHANGED else (problem, known)
 
 
 def _along_frequency(problem: FittingProblem) -> list[Explanation]:

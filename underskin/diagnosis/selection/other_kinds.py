@@ -30,12 +30,14 @@ from underskin.units import Floats, to_si
 
 _BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
 _EXTRAPOLATED = 0.7  # of what a law takes off a modulus at no strain: laws of one fit differ by that
-_UNIFORM_VARIANCE = 12.0  # a uniform prior's variance is the square of its width over this
 _INFORMED = 0.8  # of a prior's deviation, above which a posterior's says nothing
 _MODULUS_ERROR, _MODULUS = "modulus_error", ("", "youngs_modulus")
 _MODULUS_SD = 1.5  # of the logarithm of a modulus that nobody declared
 
 Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
+Moments = tuple[
+    float, float, bool
+]  # of a prior: mean, variance, and whether it is flat: then the variance of a normal one as high
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,15 +207,13 @@ def _acts_on(name: str, lines: Lines) -> bool:
     return known and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
 
 
-def _in_model(
-    quantities: Sequence[Quantity], model: Model, lines: Lines
-) -> tuple[Floats, Floats, list[tuple[float, float]]]:
+def _in_model(quantities: Sequence[Quantity], model: Model, lines: Lines) -> tuple[Floats, Floats, list[Moments]]:
     """The quantities as matrix · x + offset of the model's fit coordinates, and the mean and variance of what is known
     of each without any recording; a row of zeros where the model has no such quantity."""
     places = own_places(model.names, lines)
     names = [entry.name for entry in model.parameters]
     matrix, offset = np.zeros((len(quantities), len(names))), np.zeros(len(quantities))
-    priors: list[tuple[float, float]] = []
+    priors: list[Moments] = []
     for row, (mechanism, key) in enumerate(quantities):
         if (mechanism, key) == _MODULUS:
             declared = lines.campaign.skin.youngs_modulus_mpa
@@ -221,7 +221,7 @@ def _in_model(
             if _MODULUS_ERROR in places:
                 matrix[row, places[_MODULUS_ERROR].start] = 1.0
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
-            priors.append((np.nan, _MODULUS_SD**2))
+            priors.append((np.nan, _MODULUS_SD**2, False))
             continue
         own = places.get(mechanism, slice(0, 0))
         found = [index for index in range(own.start, own.stop) if names[index] == key]
@@ -229,31 +229,38 @@ def _in_model(
             matrix[row, found[0]] = 1.0
             priors.append(_moments(model.parameters[found[0]]))
         else:
-            priors.append((0.0, 0.0))
+            priors.append((0.0, 0.0, False))
     return matrix, offset, priors
 
 
-def _moments(entry: Parameter) -> tuple[float, float]:
+def _moments(entry: Parameter) -> Moments:
     precision, centre = curvature_of_prior(entry)
     low, high = entry.bounds
-    return (centre, 1 / precision) if precision else ((low + high) / 2, (high - low) ** 2 / _UNIFORM_VARIANCE)
+    return (
+        ((low + high) / 2, (high - low) ** 2 / (2 * np.pi), True) if not precision else (centre, 1 / precision, False)
+    )
 
 
-def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[tuple[float, float]]) -> Knowledge:
+def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Knowledge:
     """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence; normal."""
-    variance = np.array([prior[1] for prior in priors])
+    centre, variance, flat = (np.array(column) for column in zip(*priors, strict=True))
+    centre = np.where(np.isnan(centre), told.mean, centre)
+    flat = flat.astype(bool)
     known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * variance)
     if not known.any():
         return Knowledge(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
-    mean, matrix, offset = told.mean[known], matrix[known], offset[known]
-    before = np.diag(variance[known])
-    centre = np.array([prior[0] for prior in priors])[known]
-    centre = np.where(np.isnan(centre), mean, centre)
-    precision = _definite(np.linalg.inv(told.covariance[np.ix_(known, known)]) - np.linalg.inv(before))
-    spread = np.linalg.inv(precision) + before
+    after = np.linalg.inv(told.covariance[np.ix_(known, known)])
+    centre, variance, flat = centre[known], variance[known], flat[known]
+    before = np.diag(np.where(flat, 0.0, 1 / variance))
+    precision = _definite(after - before)
+    mean = np.linalg.solve(precision, after @ told.mean[known] - before @ centre)
+    # The evidence is the integral of the likelihood over the prior, a flat one as a normal one of the same height
+    prior = np.diag(variance)
     away = mean - centre
-    volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ before)[1]
-    height = told.log_weight + 0.5 * volume + 0.5 * away @ np.linalg.solve(spread, away)
+    volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ prior)[1]
+    height = told.log_weight + 0.5 * volume
+    height += 0.5 * away @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, away))
+    matrix, offset = matrix[known], offset[known]
     batch = np.diag([told.tolerance**2 if told.quantities[row] == _MODULUS else 0.0 for row in np.flatnonzero(known)])
     loose = np.eye(len(mean)) + precision @ batch
     height -= 0.5 * np.linalg.slogdet(loose)[1]

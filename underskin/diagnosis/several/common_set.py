@@ -9,16 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.selection.priors import SHOWS, least_evidence
+from underskin.diagnosis.selection.priors import SHOWS, least_evidence, log_prior
 from underskin.diagnosis.several.course import Candidate, Names, log_change
 
 _HOPELESS = 40.0  # nats
+_DIFFERS = 0.03  # probability that a skin differs from its sisters by one mechanism
 
 
 @dataclass(frozen=True)
 class CommonSet:
     """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
-    of the common set and of the sets that differ from it."""
+    of all of them together."""
 
     common: Names
     sets: tuple[Names, ...]
@@ -35,12 +36,12 @@ def common_set(candidates: Sequence[Candidate], supported: int) -> CommonSet:
             found = candidate.explained(names)
             log_evidence[number, place] = -np.inf if found is None else found.log_evidence
     log_evidence = np.maximum(log_evidence - log_evidence.max(axis=1, keepdims=True), -_HOPELESS)
-    changes = np.array([[log_change(len(one ^ two), supported) for two in sets] for one in sets])
+    changes = np.array([[log_change(len(one ^ two), supported, _DIFFERS) for two in sets] for one in sets])
     shown = np.array([[_shows(candidate, names) for names in sets] for candidate in candidates])
     own = shown[:, None] | np.eye(len(sets), dtype=bool)  # (skins, common sets, sets)
     weights = np.where(own, changes[None] + log_evidence[:, None], -np.inf)
     of_skins = np.logaddexp.reduce(weights, axis=2)  # (skins, common sets)
-    prior = np.array([_log_prior(candidates[0], one) for one in sets])
+    prior = np.array([log_prior(len(one), supported) for one in sets])
     together = of_skins.sum(axis=0)
     least = SHOWS + np.array(
         [
@@ -56,13 +57,16 @@ def common_set(candidates: Sequence[Candidate], supported: int) -> CommonSet:
     chosen = posterior.argmax(axis=1)
     order = candidates[0].problem.lines.mechanisms.named
 
-    def named(place: int) -> Names:
-        return tuple(name for name in order if name in sets[place])
+    def named(place: int, names: frozenset[str] | None = None) -> Names:
+        return tuple(name for name in order if name in (sets[place] if names is None else names))
 
     each = tuple(float(posterior[number, place]) for number, place in enumerate(chosen))
-    differing = [posterior[number, place] for number, place in enumerate(chosen) if place != best]
-    probability = float(share[best] * np.prod(differing))
-    return CommonSet(named(best), tuple(named(int(place)) for place in chosen), each, probability)
+    at_best = weights[np.arange(len(chosen)), best, chosen] - of_skins[:, best]
+    probability = float(share[best] * np.exp(at_best.sum()))
+    of_each = tuple(
+        named(int(place), one.supported(sets[place])) for one, place in zip(candidates, chosen, strict=True)
+    )
+    return CommonSet(named(best), of_each, each, probability)
 
 
 def _shows(candidate: Candidate, names: frozenset[str]) -> bool:
@@ -72,8 +76,3 @@ def _shows(candidate: Candidate, names: frozenset[str]) -> bool:
     return whole is not None and all(
         less is not None and whole.log_evidence > less.log_evidence + least_evidence(whole) for less in smaller
     )
-
-
-def _log_prior(candidate: Candidate, names: frozenset[str]) -> float:
-    found = candidate.explained(names)
-    return 0.0 if found is None else candidate.search.log_prior(found)

@@ -12,11 +12,12 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.answers import UNTHOUGHT, Search
+from underskin.diagnosis.selection.priors import log_prior
 from underskin.diagnosis.several.posteriors import Shared, log_agreement
 from underskin.units import Floats
 
-_CHANGES = 0.15  # probability that a set changes from one campaign to the next by one mechanism
+CHANGES = 0.15  # probability that a set changes from one campaign to the next by one mechanism
 _BEHIND, _MOST_SETS = 12.0, 12  # nats behind a campaign's best, and how many of its sets
 _HOPELESS = 30.0  # nats behind which a set in a campaign is on no course
 _SAME_STRENGTH = 0.9  # probability that a mechanism that stays has the strength that it had
@@ -46,9 +47,20 @@ class Candidate:
         least = self.search.log_weight(showing[0]) - _BEHIND
         return [frozenset(entry.names) for entry in showing[:_MOST_SETS] if self.search.log_weight(entry) > least]
 
+    @property
+    def undescribed(self) -> float:
+        """The probability that what is missing in this campaign has no name, beyond what stays for what nobody thought
+        of, which is the same in all campaigns."""
+        share = sum(answer.probability for answer in self.search.answers if answer.explanation is None)
+        return max(share - UNTHOUGHT, 0.0) / (1 - UNTHOUGHT)
+
+    def supported(self, names: frozenset[str]) -> frozenset[str]:
+        """Those of the mechanisms that this campaign can show."""
+        return frozenset(name for name in names if name not in self.search.unsupported)
+
     def explained(self, names: frozenset[str]) -> Explanation | None:
         """A set, as far as this campaign supports its mechanisms."""
-        own = frozenset(name for name in names if name not in self.search.unsupported)
+        own = self.supported(names)
         if own not in self.known:
             catalogue = self.problem.lines.mechanisms.named
             (found,) = self.problem.explain([Request(tuple(name for name in catalogue if name in own))])
@@ -86,7 +98,7 @@ def courses(candidates: Sequence[Candidate], supported: int) -> Courses:
     best = np.maximum.reduce(log_evidence, axis=1)[:, None]
     log_evidence = np.where(log_evidence > best - _HOPELESS, log_evidence - best, -np.inf)
     order = candidates[0].problem.lines.mechanisms.named
-    begun = [candidates[0].search.log_prior(found) if (found := candidates[0].explained(one)) else 0.0 for one in sets]
+    begun = [log_prior(len(one), supported) for one in sets]
     paths: list[tuple[float, tuple[int, ...]]] = [
         (float(log_evidence[0, place] + begun[place]), (place,)) for place in range(len(sets))
     ]
@@ -104,11 +116,12 @@ def courses(candidates: Sequence[Candidate], supported: int) -> Courses:
     weights = np.array([weight for weight, _ in paths])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
 
-    def named(place: int) -> Names:
-        return tuple(name for name in order if name in sets[place])
+    def named(path: tuple[int, ...]) -> tuple[Names, ...]:
+        own = [one.supported(sets[place]) for one, place in zip(candidates, path, strict=True)]
+        return tuple(tuple(name for name in order if name in names) for names in own)
 
     found_courses = tuple(
-        Course(tuple(map(named, path)), float(share))
+        Course(named(path), float(share))
         for (_, path), share in sorted(zip(paths, shares, strict=True), key=lambda entry: -entry[1])
     )
     present: dict[str, Floats] = {}
@@ -123,15 +136,20 @@ def _step(
     candidates: Sequence[Candidate], number: int, sets: Sequence[frozenset[str]], here: int, there: int, supported: int
 ) -> float:
     """ln of the prior of the change, and of how well what stays agrees."""
-    log_prior = log_change(len(sets[here] ^ sets[there]), supported)
+    of_change = log_change(len(sets[here] ^ sets[there]), supported)
     before, after = candidates[number - 1].explained(sets[here]), candidates[number].explained(sets[there])
     if before is None or after is None:
         return -np.inf
     common = [name for name in before.names if name in after.names]
     agreement = log_agreement(Shared.of(before, common), Shared.of(after, common))
-    return log_prior + float(np.logaddexp(np.log(_SAME_STRENGTH) + agreement, np.log(1 - _SAME_STRENGTH)))
+    return of_change + float(np.logaddexp(np.log(_SAME_STRENGTH) + agreement, np.log(1 - _SAME_STRENGTH)))
 
 
-def log_change(mechanisms: int, supported: int) -> float:
-    """ln of the prior probability that a set differs from another by so many mechanisms."""
-    return mechanisms * float(np.log(_CHANGES / max(supported, 1))) if mechanisms else float(np.log(1 - _CHANGES))
+def log_change(mechanisms: int, supported: int, share: float = CHANGES) -> float:
+    """ln of the prior probability that a set differs from another by so many mechanisms; one with this `share`."""
+    return mechanisms * float(np.log(share / max(supported, 1))) if mechanisms else float(np.log(1 - share))
+
+
+def same_strength(one: Shared, two: Shared) -> bool:
+    """Whether it is more probable that a mechanism kept its strength than that it has another."""
+    return bool(np.log(_SAME_STRENGTH) + log_agreement(one, two) > np.log(1 - _SAME_STRENGTH))

@@ -14,10 +14,11 @@ from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
+from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.campaigns import in_order
 from underskin.diagnosis.several.common_set import CommonSet, common_set
 from underskin.diagnosis.several.course import Candidate
@@ -30,6 +31,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 _LEAST_SKINS = 3
 _QUANTILE = float(ndtri(0.975))
 _MODULUS_ERROR = "modulus_error"
+_INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
 
 
 @dataclass(frozen=True)
@@ -54,14 +56,14 @@ def diagnose_fleet(
     """
     if len(skins) < _LEAST_SKINS:
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
-    results: dict[str, list[DiagnosisResult]] = {}
+    results: dict[str, DiagnosisResult] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
         with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
-        results[skin] = [diagnose(campaign, table, without=without) for campaign in in_order(with_frf)]
+        results[skin] = _latest(with_frf, table, without)
         progress((number + 1) / (len(skins) + 1))
-    usable = {skin: last for skin, own in results.items() if (last := _last(own)) is not None}
+    usable = {skin: result for skin, result in results.items() if result.search is not None}
     lacking = [skin for skin in skins if skin not in usable]
     candidates = {
         skin: Candidate(result.problem, result.search)
@@ -69,7 +71,7 @@ def diagnose_fleet(
         if result.problem is not None and result.search is not None
     }
     if not candidates:
-        return {**report(next(iter(results.values()))[-1]), "campaign": name, "campaigns": _names(skins)}
+        return {**report(next(iter(results.values()))), "campaign": name, "campaigns": _names(skins)}
     found = common_set(list(candidates.values()), min(one.search.supported for one in candidates.values()))
     fits = {
         skin: fit
@@ -79,21 +81,26 @@ def diagnose_fleet(
     populations = [
         entry for entry in (_of_d33(fits), _of_modulus(candidates, fits), *_of_strengths(fits)) if entry is not None
     ]
-    return _document(name, skins, usable, found, lacking, populations)
+    undescribed = {skin: one.undescribed for skin, one in candidates.items()}
+    return _document(name, skins, usable, found, undescribed, lacking, populations)
 
 
 def _names(skins: Mapping[str, Sequence[Campaign]]) -> list[str]:
     return [campaign.name for own in skins.values() for campaign in own]
 
 
-def _last(results: Sequence[DiagnosisResult]) -> DiagnosisResult | None:
-    """The latest that says anything."""
-    return next((result for result in results[::-1] if result.search is not None), None)
+def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
+    """The diagnosis of the latest campaign that says anything, else of the first."""
+    for campaign in in_order(campaigns)[::-1]:
+        result = diagnose(campaign, table, without=without)
+        if result.search is not None:
+            break
+    return result
 
 
 def _of_d33(fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
-    said = [_Said(skin, *_of_place(fit, place_of(fit, "d33"))) for skin, fit in fits.items()]
-    return _population("d33", "pC/N", said)
+    each = {skin: _of_place(fit, place_of(fit, "d33")) for skin, fit in fits.items()}
+    return _population("d33", "pC/N", [_Said(skin, *found) for skin, found in each.items() if found is not None])
 
 
 def _of_modulus(candidates: Mapping[str, Candidate], fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
@@ -106,8 +113,9 @@ def _of_modulus(candidates: Mapping[str, Candidate], fits: Mapping[str, Explanat
         if declared is None or free is None or _MODULUS_ERROR in candidates[skin].search.unsupported:
             continue
         place = own_places(free.names, free.best.hypothesis.lines)[_MODULUS_ERROR].start
-        value, deviation = _of_place(free, place)
-        said.append(_Said(skin, value + float(np.log(declared)), deviation))
+        found = _of_place(free, place)
+        if found is not None:
+            said.append(_Said(skin, found[0] + float(np.log(declared)), found[1]))
     return _population("youngs_modulus", "MPa", said)
 
 
@@ -129,16 +137,27 @@ def _of_strengths(fits: Mapping[str, Explanation]) -> list[dict[str, Any] | None
         for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
             for place in range(places.start, places.stop):
                 entry = fit.model.parameters[place]
-                if entry.scale == "log" and not entry.moves_covariance and mechanism != _MODULUS_ERROR:
+                if entry.scale != "log" or entry.moves_covariance or mechanism == _MODULUS_ERROR:
+                    continue
+                found = _of_place(fit, place)
+                if found is not None:
                     key = (mechanism, entry.name, entry.unit)
-                    said.setdefault(key, []).append(_Said(skin, *_of_place(fit, place)))
+                    said.setdefault(key, []).append(_Said(skin, *found))
     return [_population(f"{mechanism}.{name}", unit, own) for (mechanism, name, unit), own in said.items()]
 
 
-def _of_place(explanation: Explanation, place: int) -> tuple[float, float]:
-    """Mean and standard deviation of a parameter on a logarithmic scale."""
-    stated = parameter(explanation, place)
-    return float(np.log(stated["value"])), float(np.log(stated["high"] / stated["low"])) / (2 * _QUANTILE)
+def _of_place(explanation: Explanation, place: int) -> tuple[float, float] | None:
+    """Mean and standard deviation of a parameter on a logarithmic scale by the recordings alone, the prior taken out;
+    None where they say next to nothing."""
+    hypothesis = explanation.best.hypothesis
+    row = hypothesis.mean_places.index(place)
+    after = 1 / float(explanation.best.covariance[row, row])
+    prior, centre = curvature_of_prior(explanation.model.parameters[place])
+    precision = after - prior
+    if precision < _INFORMS * prior:
+        return None
+    mean = (after * float(explanation.point.fit[place]) - prior * centre) / precision
+    return float(mean), float(precision**-0.5)
 
 
 def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] | None:
@@ -175,6 +194,7 @@ def _document(
     skins: Mapping[str, Sequence[Campaign]],
     usable: Mapping[str, DiagnosisResult],
     found: CommonSet,
+    undescribed: Mapping[str, float],
     lacking: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
@@ -186,8 +206,9 @@ def _document(
             by_mechanism.setdefault(mechanism, []).append(skin)
             present.setdefault(mechanism, []).append(share)
     departures = [(entry, one) for entry in populations for one in entry["departures"]]
-    unexplained = [skin for skin, own in reports.items() if own["verdict"] == "unexplained"]
-    probability = found.probability
+    unexplained = [skin for skin, share in undescribed.items() if share > 0.5]
+    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
+    probability = 1 - described if unexplained else found.probability * described
     verdict = _verdict(probability, bool(by_mechanism or departures), unexplained)
     mechanisms: list[dict[str, Any]] = [
         {
@@ -264,7 +285,7 @@ def _statement(
         for entry, one in departures
     ]
     if not departures and populations:
-        parts.append("No skin departs from the others.")
+        parts.append("None is seen to depart from the others.")
     if lacking:
         parts.append(f"Nothing could be told of {', '.join(lacking)}.")
     return " ".join(parts)

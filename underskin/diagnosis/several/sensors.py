@@ -120,11 +120,10 @@ def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequen
     middle = float(np.median(change))
     around = change - middle
     of_middle = float(1.25 * np.sqrt(np.mean(deviation**2) / len(change)))
-    beyond = np.array(
-        [_probability(x, sd, len(common)) for x, sd in zip(around, np.hypot(deviation, of_middle), strict=True)]
-    )
+    own = np.hypot(deviation, of_middle)
+    beyond = np.array([_probability(x, sd, len(common)) for x, sd in zip(around, own, strict=True)])
     found = [
-        Change(sensor, number, float(np.expm1(change[place])), float(deviation[place]), float(beyond[place]))
+        Change(sensor, number, float(np.expm1(around[place])), float(own[place]), float(beyond[place]))
         for place, sensor in enumerate(common)
         if len(common) >= _FEWEST_COMMON and beyond[place] > _STATED and abs(around[place]) > _LEAST
     ]

@@ -9,7 +9,8 @@ from scipy.special import ndtri
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult
-from underskin.diagnosis.several.course import Candidate, Course, Courses, courses
+from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
 from underskin.diagnosis.several.posteriors import Shared, combined, values
 from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
 from underskin.findings.formatting import in_percent
@@ -38,17 +39,17 @@ def together_report(
     ]
     names = [campaigns[number].name for number in usable]
     found = courses(candidates, min(candidate.search.supported for candidate in candidates))
-    undescribed = [_undescribed(candidate) for candidate in candidates]
-    described = float(np.prod([1 - share for share in undescribed]))
+    undescribed = [candidate.undescribed for candidate in candidates]
+    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed]))
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
-        sensors_of(campaigns[number], {name: strengths[name] for name in own}, _unsure(candidate, own), table)
-        for number, candidate, own in zip(usable, candidates, leader.sets, strict=True)
+        sensors_of(campaigns[number], strengths[place], _unsure(candidates[place], leader.sets[place]), table)
+        for place, number in enumerate(usable)
     ]
     changed = changes(sensors)
     mechanisms = [*_mechanisms(candidates, found, leader, names, dates), *_aged(changed, names, dates)]
-    verdict = _verdict(leader, described, changed)
+    verdict = _verdict(leader, described, undescribed, changed)
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
     last = reports[usable[-1]]
     findings = [
@@ -84,22 +85,31 @@ def together_report(
     }
 
 
-def _strengths(candidates: Sequence[Candidate], leader: Course) -> dict[str, dict[str, float]]:
-    """The parameters of each mechanism, from all campaigns in which it acts."""
-    found = {}
+def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:
+    """Of each campaign the parameters of its mechanisms, from all campaigns in which they have that strength."""
+    found: list[dict[str, dict[str, float]]] = [{} for _ in candidates]
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
-        each = _each(candidates, leader, mechanism)
-        found[mechanism] = values(each[0].parameters, combined(each)[0]) if each and len(each[0].mean) else {}
+        for run in _runs(candidates, leader, mechanism):
+            each = list(run.values())
+            pooled = values(each[0].parameters, combined(each)[0]) if len(each[0].mean) else {}
+            for number in run:
+                found[number][mechanism] = pooled
     return found
 
 
-def _each(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[Shared]:
-    fits = [
-        candidate.explained(frozenset(own))
-        for candidate, own in zip(candidates, leader.sets, strict=True)
-        if mechanism in own
-    ]
-    return [Shared.of(fit, [mechanism], skin=False) for fit in fits if fit is not None and mechanism in fit.names]
+def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[dict[int, Shared]]:
+    """The campaigns in which a mechanism acts, by number, those together in which it has the same strength."""
+    runs: list[dict[int, Shared]] = []
+    for number, (candidate, own) in enumerate(zip(candidates, leader.sets, strict=True)):
+        fit = candidate.explained(frozenset(own)) if mechanism in own else None
+        if fit is None:
+            continue
+        shared = Shared.of(fit, [mechanism], skin=False)
+        if runs and same_strength(next(reversed(runs[-1].values())), shared):
+            runs[-1][number] = shared
+        else:
+            runs.append({number: shared})
+    return runs
 
 
 def _unsure(candidate: Candidate, names: Sequence[str]) -> float:
@@ -113,12 +123,8 @@ def _unsure(candidate: Candidate, names: Sequence[str]) -> float:
     return float(np.sqrt(max(deviations[0] ** 2 - deviations[1] ** 2, 0.0)))
 
 
-def _undescribed(candidate: Candidate) -> float:
-    return sum(answer.probability for answer in candidate.search.answers if answer.explanation is None)
-
-
-def _verdict(leader: Course, described: float, changed: Sequence[Change]) -> str:
-    if described < 0.5:
+def _verdict(leader: Course, described: float, undescribed: Sequence[float], changed: Sequence[Change]) -> str:
+    if max(undescribed) > 0.5:
         return "unexplained"
     if leader.probability * described < EXPLAINED:
         return "ambiguous"
@@ -130,34 +136,37 @@ def _mechanisms(
 ) -> list[dict[str, Any]]:
     entries = []
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
-        where = [number for number, own in enumerate(leader.sets) if mechanism in own]
-        each = _each(candidates, leader, mechanism)
-        if not each:
-            continue
-        mean, deviation = combined(each) if len(each[0].mean) else (each[0].mean, each[0].mean)
-        parameters = []
-        for entry, middle, sd in zip(each[0].parameters, mean, deviation, strict=True):
-            low, high = entry.bounds
-            ends = (middle, max(middle - _QUANTILE * sd, low), min(middle + _QUANTILE * sd, high))
-            value = dict(
-                zip(("value", "low", "high"), (rounded(entry.from_fit(float(at))) for at in ends), strict=True)
+        for run in _runs(candidates, leader, mechanism):
+            where, each = list(run), list(run.values())
+            mean, deviation = combined(each) if len(each[0].mean) else (each[0].mean, each[0].mean)
+            parameters = []
+            for entry, middle, sd in zip(each[0].parameters, mean, deviation, strict=True):
+                low, high = entry.bounds
+                ends = (middle, max(middle - _QUANTILE * sd, low), min(middle + _QUANTILE * sd, high))
+                value = dict(
+                    zip(("value", "low", "high"), (rounded(entry.from_fit(float(at))) for at in ends), strict=True)
+                )
+                parameters.append({"name": entry.name, "unit": entry.unit, **value})
+            entries.append(
+                {
+                    "name": mechanism,
+                    "probability": round(float(np.min(found.present[mechanism][where])), 3),
+                    "parameters": parameters,
+                    "explains_percent": None,
+                    "scope": _scope(where, _shown_in(candidates, mechanism), names, dates),
+                }
             )
-            parameters.append({"name": entry.name, "unit": entry.unit, **value})
-        entries.append(
-            {
-                "name": mechanism,
-                "probability": round(float(np.min(found.present[mechanism][where])), 3),
-                "parameters": parameters,
-                "explains_percent": None,
-                "scope": _scope(where, names, dates),
-            }
-        )
     return entries
 
 
-def _scope(where: Sequence[int], names: Sequence[str], dates: Mapping[int, str]) -> dict[str, Any]:
-    """In which campaigns; `since` where it is there from one on, and not before."""
-    from_on = where == list(range(where[0], len(names))) and where[0] > 0
+def _shown_in(candidates: Sequence[Candidate], mechanism: str) -> list[int]:
+    """The campaigns that could show it."""
+    return [number for number, one in enumerate(candidates) if mechanism not in one.search.unsupported]
+
+
+def _scope(where: Sequence[int], able: Sequence[int], names: Sequence[str], dates: Mapping[int, str]) -> dict[str, Any]:
+    """In which campaigns; `since` where it is there from one on in all that can show it, and not before."""
+    from_on = list(where) == [number for number in able if number >= where[0]] and where[0] > min(able)
     since = dates.get(where[0], names[where[0]]) if from_on else None
     return {"campaigns": [names[number] for number in where], **({"since": since} if since else {})}
 
