@@ -1,5 +1,6 @@
 """Commands on the store as a whole: backup and restore, while servers run."""
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from service.store import Database, StorageFull, StoreError, database, key_requi
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
+from underskin.mechanisms.declared.document import FOLDER
 
 
 def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file of that name is replaced.")]) -> None:
@@ -20,6 +22,8 @@ def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file 
     use_folder_of_lab(settings)
     try:
         store = database(settings.database_url, settings.data)
+        if store.is_sqlite and not Path(str(store.url.database)).exists():
+            raise UnderskinError(f"there is no store in {settings.data}: set UNDERSKIN_DATA to the server's folder")
         _remember_mechanisms(store)
         backups.make(store, file)
     except (StoreError, OSError) as error:
@@ -65,7 +69,7 @@ def _say_of_mechanisms(found: mechanism_files.PutBack) -> None:
         (found.replaced, "put back; what the folder has in their place is set aside in discarded"),
     ):
         if names:
-            typer.echo(f"mechanisms of the lab's own {became}: {', '.join(names)}")
+            typer.echo(f"mechanisms of the lab's own in {os.environ[FOLDER]} {became}: {', '.join(names)}")
 
 
 def _of_keys(keys: KeyStore) -> str:

@@ -196,3 +196,13 @@ def test_the_likelihood_of_the_curves_has_their_evidence_under_their_prior(table
     prior = np.exp(-0.5 * ((log_e - middle) / 1.5) ** 2) / (1.5 * np.sqrt(2 * np.pi))
     integral = np.log(np.trapezoid(np.exp(log_likelihood - log_likelihood.max()) * prior, log_e)) + log_likelihood.max()
     assert integral == pytest.approx(told.log_weight, abs=0.02)
+
+
+def test_the_modulus_that_is_stated_of_a_block_is_the_true_one_not_the_declared_one(table: SigmaTable) -> None:
+    document = {"schema": "campaign/1", "name": "block", "skin": lines()["skin"], "recordings": []}
+    found = report(document, curves("compression", BLOCK, 9.0), table)
+    assert named(found) == ["modulus_error"]
+    modulus = found["fit"]["after"]["youngs_modulus"]
+    assert modulus["low"] < 9.0 < modulus["high"]
+    assert modulus["high"] / modulus["low"] < 1.15
+    assert f"{modulus['value']:.3g} MPa" in found["statement"]

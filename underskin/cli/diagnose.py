@@ -88,7 +88,11 @@ def diagnose(
     files, campaign = files or [], campaign or []
     _refuse_overwriting(files, campaign, output_dir)
     description = None if rig is None else rig_description_in(rig)
+    if output_dir.exists() and not output_dir.is_dir():
+        raise typer.BadParameter(f"{output_dir} is a file", param_hint="--output-dir")
     output_dir.mkdir(parents=True, exist_ok=True)
+    if campaign and (together is not None or fleet is not None):
+        raise typer.BadParameter("takes files; of stored campaigns ask the service", param_hint="--together, --fleet")
     if together is not None or fleet is not None:
         of_several(files, description, without or [], output_dir, html=html, together=together, fleet=fleet)
         return

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from underskin.recordings.campaign import Campaign
     from underskin.recordings.rig_description import RigDescription
 
-_NAME = re.compile(r"[\w.-][\w .-]*")
+_NAME = re.compile(r"\w[\w .-]*")
 
 
 def of_several(
@@ -45,6 +45,10 @@ def of_several(
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
     campaigns = _read(files, rig)
+    known = sorted({campaign.skin.id for campaign in campaigns if campaign.skin.id is not None})
+    if together is not None and len(known) > 1:
+        allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
+        raise typer.BadParameter(allowed, param_hint="--together")
     console = Console(stderr=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)

@@ -48,9 +48,15 @@ class _Ends:
 
 
 def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
-    """The document; empty for a law over frequency, over words or over the places of the skin."""
+    """The document; empty for a law over frequency, over words, over the places of the skin, or the same everywhere."""
     law = leading.law
-    if not isinstance(law, RecordingLaw) or law.axis.words or law.axis.relative or law.axis.name in _PLACES:
+    if (
+        leading.is_constant
+        or not isinstance(law, RecordingLaw)
+        or law.axis.words
+        or law.axis.relative
+        or law.axis.name in _PLACES
+    ):
         return {}
     base = _commonest(problem)
     ends = _ends(leading, law, base)

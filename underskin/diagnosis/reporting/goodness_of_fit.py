@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
@@ -11,6 +12,9 @@ from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
+
+_FACTOR = "modulus_factor"  # of modulus_error
+_QUANTILE = float(ndtri(0.975))
 
 
 def explains_percent(
@@ -106,13 +110,26 @@ def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[st
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
-    """Young's modulus under an explanation, with its 95 % interval; from a factor on what was declared, or free."""
+    """Young's modulus under an explanation, with its 95 % interval; from factors on what was declared, or free."""
     fitted = parameter(explanation, place_of(explanation, "youngs_modulus"))
     declared = problem.lines.campaign.skin.youngs_modulus_mpa
     if declared is None:
         return fitted
+    names = [entry.name for entry in explanation.model.parameters]
+    if _FACTOR in names:
+        fitted = {**fitted, **_product(explanation, [names.index("youngs_modulus"), names.index(_FACTOR)])}
     scaled = {name: rounded(declared * fitted[name]) for name in ("value", "low", "high")}
     return {**fitted, "unit": "MPa", **scaled}
+
+
+def _product(explanation: Explanation, places: Sequence[int]) -> dict[str, float | None]:
+    """Of parameters on a logarithmic scale, with the 95 % interval."""
+    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    middle = float(explanation.point.fit[list(places)].sum())
+    half = _QUANTILE * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
+    return {
+        key: rounded(float(np.exp(middle + way * half)), 6) for key, way in (("value", 0), ("low", -1), ("high", 1))
+    }
 
 
 def _noise(explanation: Explanation) -> dict[str, Any]:

@@ -143,7 +143,8 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     of_kinds = "" if diagnosis.joined is None else kinds.statement(diagnosis.joined, told_by_kind)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
-    d33, implausible = _d33(search, problem, fit, stands=stands)
+    consistent = diagnosis.joined is None or not kinds.contradictions(diagnosis.joined)
+    d33, implausible = _d33(search, problem, fit, stands=stands and consistent)
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
     present = averaged.presence(search, _presence(search, problem))
@@ -153,13 +154,12 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         diagnosis.shape,
         problem.kind,
         fit,
-        caveats=caveats(findings),
+        caveats=" ".join(filter(None, [*(entry["statement"] for entry in contradictory), caveats(findings)])),
         power=diagnosis.power,
         group=present[0] if present else None,
         idle=_idle(diagnosis, named) if named is not None else (),
         told=[
             *(_told(problem, mechanisms) if named is not None else ()),
-            *(entry["statement"] for entry in contradictory),
             *filter(None, [of_kinds, averaged.alike_statement(alike) if alike is not None else ""]),
         ],
     )

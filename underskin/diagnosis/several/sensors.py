@@ -150,7 +150,9 @@ def change_in_words(change: Change, names: Sequence[str], dates: Mapping[int, st
     """d33 of one or of all sensors."""
     whose = "of all sensors" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     way = "fell" if change.value < 0 else "rose"
-    since = dates.get(change.since, names[change.since])
+    before, after = (dates.get(number, names[number]) for number in (change.since - 1, change.since))
     low, high = (abs(100 * (change.value + way * 1.96 * change.uncertainty)) for way in (-1, 1))
     low, high = sorted((low, high))
-    return f"d33 {whose} {way} by {abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g}) until {since}."
+    return (
+        f"d33 {whose} {way} by {abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g}) between {before} and {after}."
+    )

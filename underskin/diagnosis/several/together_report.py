@@ -19,6 +19,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _QUANTILE = float(ndtri(0.975))
 _ALTERNATIVES = 6
+_DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
 
 
 def together_report(
@@ -45,6 +46,8 @@ def together_report(
     strengths = _strengths(candidates, leader)
     sensors = [
         sensors_of(campaigns[number], strengths[place], _unsure(candidates[place], leader.sets[place]), table)
+        if undescribed[place] <= _DESCRIBED
+        else None  # whose levels no mechanism here explains
         for place, number in enumerate(usable)
     ]
     changed = changes(sensors)
@@ -64,17 +67,22 @@ def together_report(
         "verdict": verdict,
         "probability": round(probability, 3),
         "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, names, dates),
-        "location": last["location"],
+        "location": {
+            "axes": [],
+            "region": {},
+            "effect_percent": None,
+            "statement": "See each campaign's own diagnosis.",
+        },
         "mechanisms": mechanisms,
         "presence": _presence(found, described),
         "unnamed": None,
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
-        "not_identifiable": last["not_identifiable"],
+        "not_identifiable": [],
         "findings": findings,
-        "fit": last["fit"],
-        "power": last["power"],
+        "fit": None,
+        "power": [],
         "d33": {**(last["d33"] or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
-        "next_experiment": last["next_experiment"],
+        "next_experiment": None,
         "provenance": {
             **results[usable[-1]].provenance,
             "each": [
