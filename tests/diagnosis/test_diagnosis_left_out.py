@@ -8,6 +8,7 @@ import pytest
 
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.html_report import body_of
 from underskin.diagnosis.reporting.report import report
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.saving import document
@@ -66,6 +67,9 @@ def test_a_gain_of_each_sensor(table: SigmaTable) -> None:
     law = found["unnamed"]
     assert found["verdict"] == "unexplained"
     assert (law["acts_on"], law["axis"]) == ("gain", "sensor")
+    assert [entry["at"] for entry in law["course"]] == [f"s{number}" for number in range(9)]
+    assert all(entry["low"] < entry["change"] < entry["high"] for entry in law["course"])
+    assert "s4" in body_of(found, {})
 
 
 def test_a_delay_that_turns_the_phase_by_half_a_turn(table: SigmaTable) -> None:

@@ -24,6 +24,7 @@ from underskin.units import Floats
 _QUANTILE = float(ndtri(0.975))
 _RIVALS, _LEAST_RIVAL = 5, 0.01
 _PLACES = 41  # along the axis, at which a course is looked at
+_STATED = 21  # of these, at which a smooth one is stated
 _STEP = 1e-4  # of fit coordinates, for a course's band
 _OUTWEIGHED = 3.0  # nats
 SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
@@ -84,12 +85,13 @@ class LeadingLaw:
             x = self.axis.levels if len(self.axis.levels) <= _PLACES else np.linspace(low, high, _PLACES)
         else:
             x = np.geomspace(low, high, 8 * _PLACES)
-        sizes = self._change(x, self.values)
+        sizes = self.change(x, self.values)
         place = int(np.argmax(np.abs(sizes)))
         return float(x[place]), float(sizes[place]), float(np.sqrt(self.variance(x[[place]])[0]))
 
-    def _change(self, x: Floats, values: Mapping[str, float]) -> Floats:
-        change = course(self.law, values, x)
+    def change(self, x: Floats, values: Mapping[str, float] | None = None) -> Floats:
+        """At values x of the axis, with these parameters or as fitted; see `largest`."""
+        change = course(self.law, self.values if values is None else values, x)
         if change.ndim == 2:
             return np.hypot(*change.T)
         if np.iscomplexobj(change):
@@ -112,11 +114,11 @@ class LeadingLaw:
         mean = self.explanation.best.hypothesis.mean_places
         rows = [mean.index(place) for place in range(places.start, places.stop)]
         covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
-        here = self._change(x, self.values)
+        here = self.change(x, self.values)
         slopes = []
         for entry in self.law.parameters_bound:
             moved = {**self.values, entry.name: entry.from_fit(entry.to_fit(self.values[entry.name]) + _STEP)}
-            slopes.append((self._change(x, moved) - here) / _STEP)
+            slopes.append((self.change(x, moved) - here) / _STEP)
         jacobian = np.array(slopes)
         return np.maximum(np.einsum("px,pq,qx->x", jacobian, covariance, jacobian), 0.0)
 
@@ -143,7 +145,31 @@ def unnamed(
         ],
         "heldout_rmse_percent": {"before": rounded(before.rmse_percent), "after": rounded(after.rmse_percent)},
         "range": {_range_name(leading): _range(leading, low, high)},
+        **({"course": _course(leading)} if leading.form == "free" else {}),
     }
+
+
+def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
+    """Of a smooth course, or of words, the change at places along the measured axis with its 95 % interval: relative,
+    of a force in N, of a place the distance in mm, over frequency the magnitude less 1."""
+    low, high = leading.ends
+    words: tuple[str, ...] = ()
+    if leading.axis is None:
+        x = np.geomspace(low, high, _STATED)
+    else:
+        words = leading.axis.words
+        x = leading.axis.levels if len(leading.axis.levels) <= _STATED else np.linspace(low, high, _STATED)
+    change, half = leading.change(x), _QUANTILE * np.sqrt(leading.variance(x))
+    ends = zip(x.tolist(), change.tolist(), (change - half).tolist(), (change + half).tolist(), strict=True)
+    return [
+        {
+            "at": words[round(at)] if words else rounded(at),
+            "change": rounded(middle, 3),
+            "low": rounded(least, 3),
+            "high": rounded(most, 3),
+        }
+        for at, middle, least, most in ends
+    ]
 
 
 def _range_name(leading: LeadingLaw) -> str:
