@@ -190,7 +190,7 @@ def without_response(made: Campaign, sensors: set[str], seed: int = 3) -> Campai
 @pytest.mark.slow
 def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
     report = diagnosis_report(without_response(campaign(Made(sensors=3, lines=40), table), {"s2"}), table)
-    said = "sensor 's2' shows no response above its noise in any of its 8 recordings: left out."
+    said = "sensor 's2' shows no response above its noise in any of its 8 recordings: left out"
     assert said in report["statement"]
     assert report["statement"].index(said) < 200
     assert "nothing needs to be added for those that were used" in report["statement"]

@@ -44,8 +44,15 @@ def amplitude_step(levels: Levels) -> Step | None:
         return None
     base = levels.fit(levels.value).evidence
     steps = [step for step in (_step(levels, factor, base) for factor in _FACTORS) if step is not None]
-    plain = [step for step in steps if step.gain > (_GAIN if step.off.sum() > 1 else _GAIN_ALONE)]
+    plain = [step for step in steps if step.gain > _least_gain(step)]
     return max(plain, key=lambda step: step.gain, default=None)
+
+
+def _least_gain(step: Step) -> float:
+    """A single recording that is √2 off may have missed its place."""
+    if step.off.sum() > 1:
+        return _GAIN
+    return _GAIN_ALONE if abs(log(step.factor)) > _PLAIN_SIZE else np.inf
 
 
 def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:

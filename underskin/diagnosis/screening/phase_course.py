@@ -18,7 +18,7 @@ from underskin.units import Complexes, Floats, Indices, Mask
 
 _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
-_MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 8.0  # pick-up has a phase of its own
+_MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
 _STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
 _WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
 _SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
