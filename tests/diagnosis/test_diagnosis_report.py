@@ -228,7 +228,7 @@ def test_campaigns_of_one_name_are_told_what_to_do(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_plan_separates_what_is_confusable(tmp_path: Path, table: SigmaTable) -> None:
     made = replace(
-        SENSORS, mechanisms=("strain_stiffening",), parameters=(12.0,), modulus_mpa=2.7, offsets_mm=(0.0, 0.8)
+        SENSORS, mechanisms=("strain_stiffening",), parameters=(8.0,), modulus_mpa=2.7, offsets_mm=(0.0, 0.8)
     )
     file = tmp_path / "palm.json"
     file.write_text(json.dumps(to_dict(campaign(made, table))), encoding="utf-8")
