@@ -109,7 +109,10 @@ class Adoption(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    diagnosis_id: str = Field(description="A diagnosis of one of the skin's campaigns, its verdict `explained`.")
+    diagnosis_id: str = Field(
+        description="Of one of the skin's campaigns: its verdict is `explained`, or `ambiguous` where all that remains "
+        "predicts alike, or `unexplained` with a law that holds for other recordings."
+    )
 
 
 class ModelVersion(BaseModel):
