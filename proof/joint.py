@@ -46,7 +46,9 @@ def _kinds(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
     alone = {**document, "recordings": [one for one in document["recordings"] if one.get("kind", "frf") == "frf"]}
     both = {"together": diagnosed(document), "alone": diagnosed(alone)}
     expected = {entry["effect"] for entry in hidden}
-    told_apart = {entry["effect"] for entry in hidden if entry["chi2_gain_modulus_free"] > _VISIBLE} & set(_ERRORS)
+    told_apart = {entry["effect"] for entry in hidden if (entry["chi2_gain_modulus_free"] or 0.0) > _VISIBLE} & set(
+        _ERRORS
+    )
     told_apart |= {entry["effect"] for entry in hidden if entry["effect"] == "modulus_error"}
     modulus = truth["documents"][0]["youngs_modulus_mpa"]
     kind = next(one["kind"] for one in document["recordings"] if one.get("kind", "frf") != "frf")
