@@ -95,6 +95,11 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
         diagnose_together([made("may"), thick], table, "two skins")
     with pytest.raises(InvalidInput, match="two at least with recordings of kind frf"):
         diagnose_together([made("may"), replace(other, recordings=())], table, "empty")
+    again = replace(made("may"), name="renamed")
+    with pytest.raises(InvalidInput, match=r"renamed: recordings\[0\].*a recording of may: it would count twice"):
+        diagnose_together([made("may"), again], table, "copy")
+    with pytest.raises(InvalidInput, match="it would count twice"):
+        diagnose_fleet({"a": [other], "b": [made("may")], "c": [again]}, table, "copy")
     with pytest.raises(InvalidInput, match="must be 3 at least"):
         diagnose_fleet({"a": [other], "b": [other]}, table, "two")
 

@@ -33,7 +33,7 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
 
 def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant("array")) for _ in range(2)]
+        ids = [sent(server, resonant("array", seed=seed)) for seed in range(2)]
         started = client.skins.diagnose("palm", name="palm since May")
         done = client.diagnoses.wait(started["id"])
         assert (done["state"], done["kind"], done["name"]) == ("done", "skin", "palm since May")
@@ -53,7 +53,7 @@ def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
 
 def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant("array"), f"palm-{number}") for number in range(3)]
+        ids = [sent(server, resonant("array", seed=number), f"palm-{number}") for number in range(3)]
         skins = ["palm-2", "palm-0", "palm-1"]
         done = client.diagnoses.wait(client.fleets.diagnose(skins, "batch 7")["id"])
         assert (done["state"], done["kind"], done["campaign_ids"]) == ("done", "fleet", ids)
@@ -64,7 +64,7 @@ def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
 
 def test_a_killed_server_takes_up_a_diagnosis_of_several(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant(name)) for name in ("array", "again")]
+        ids = [sent(server, resonant(name, seed=seed)) for seed, name in enumerate(("array", "again"))]
         diagnosis_id = client.skins.diagnose("palm")["id"]
         awaited(server, diagnosis_id, "running")
         server.kill()
@@ -77,9 +77,9 @@ def test_one_of_several_that_needs_too_much_memory_fails(tmp_path: Path) -> None
     folder = tmp_path / "data"
     folder.mkdir()
     with running(Place(folder), **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
-        large = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
-        for name in ("one", "two"):
-            sent(server, {**large, "name": name})
+        preloads = [0.5 + 0.01 * step for step in range(100)]
+        for seed, name in enumerate(("one", "two")):
+            sent(server, resonant(name, preloads=preloads, lines=800, seed=seed))
         answer = server.http.post("/v1/skins/palm/diagnosis")
         failed = awaited(server, answer.json()["id"])
         assert (failed["state"], failed["report"]) == ("failed", None)

@@ -53,10 +53,11 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns with FRFs, or skins that are declared otherwise.
+        Fewer than two campaigns with FRFs, skins that are declared otherwise, or recordings that are in two campaigns.
     """
     with_frf = [campaign for campaign in campaigns if any(isinstance(one, FrfRecording) for one in campaign.recordings)]
     _check(with_frf)
+    refuse_copies(with_frf)
     ordered = in_order(with_frf)
     results = []
     for number, campaign in enumerate(ordered):
@@ -109,6 +110,24 @@ def date_of(campaign: Campaign) -> str | None:
     times = [str(entry.recorded_at)[:10] for entry in campaign.recordings if isinstance(entry, FrfRecording)]
     known = [time for time in times if time != "None"]
     return min(known, default=None)
+
+
+def refuse_copies(campaigns: Sequence[Campaign]) -> None:
+    """Raise InvalidInput where a recording is in two campaigns, number for number: it would count twice."""
+    owners: dict[bytes, str] = {}
+    for campaign in campaigns:
+        for place, recording in enumerate(campaign.recordings):
+            if not isinstance(recording, FrfRecording):
+                continue
+            owner = owners.setdefault(_measured(recording), campaign.name)
+            if owner != campaign.name:
+                allowed = f"must not hold the same numbers as a recording of {owner}: it would count twice"
+                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.sensor, allowed)
+
+
+def _measured(recording: FrfRecording) -> bytes:
+    series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
+    return b"".join(b"-" if one is None else one.tobytes() for one in series)
 
 
 def _check(campaigns: Sequence[Campaign]) -> None:

@@ -19,7 +19,7 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.numbers import place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
 from underskin.diagnosis.selection.answers import UNTHOUGHT
-from underskin.diagnosis.several.campaigns import in_order
+from underskin.diagnosis.several.campaigns import in_order, refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.population import STATED, without_departing
@@ -52,10 +52,11 @@ def diagnose_fleet(
 ) -> dict[str, Any]:
     """The report (`report/1`) of a fleet, named `name`; `skins` by their ids, each with its campaigns.
 
-    Raises InvalidInput for fewer than three skins, and for one without campaigns.
+    Raises InvalidInput for fewer than three skins, for one without campaigns, and for recordings in two campaigns.
     """
     if len(skins) < _LEAST_SKINS:
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
+    refuse_copies([campaign for own in skins.values() for campaign in own])
     results: dict[str, DiagnosisResult] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
         with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
