@@ -8,12 +8,7 @@ from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.curve_course import course
-from underskin.surrogate.sigma_table import SigmaTable, load_table
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 @pytest.mark.slow

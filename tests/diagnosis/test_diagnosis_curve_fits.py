@@ -22,15 +22,10 @@ from underskin.diagnosis.validation.residual_noise import keeps_structure
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.recordings.campaign import IndentationRecording, parse
 from underskin.recordings.curve_course import course, touch
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 SUPPORTED = 6
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.fixture(scope="module")

@@ -17,17 +17,12 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
 from underskin.recordings.conditions import curves_of
 from underskin.recordings.curve_course import course
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 RADIUS_MM, MODULUS_MPA, DEPTH_MM, NOISE = 4.0, 1.5, 0.3, 1e-3  # noise of the largest force
 SECONDS, PAUSE = 40.0, 0.2  # of a recording; the share of its way that lies in the air
 Change = Callable[[Floats, Floats], Floats]  # of the travel beyond contact [mm] and the time [s]
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def none(travel: Floats, _: Floats) -> Floats:

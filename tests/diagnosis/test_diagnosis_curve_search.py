@@ -19,14 +19,9 @@ from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import PRIORS
 from underskin.diagnosis.validation.cross_validation import PredictionScore, groups, hold_out
 from underskin.recordings.campaign import Campaign, parse
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 SUPPORTED = 6
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.fixture(scope="module")

@@ -21,11 +21,6 @@ Change = Callable[[CompressionRecording], CompressionRecording]
 MODULUS_MPA = 0.5
 
 
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
-
-
 def pad(name: str, seed: int) -> CompressionRecording:
     strain = np.concatenate([np.linspace(0, 0.1, 60), np.linspace(0.1, 0, 60)])
     force = MODULUS_MPA * 100 * np.pi * strain

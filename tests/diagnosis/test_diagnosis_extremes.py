@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import from_dict
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 EDGE = settings(
     max_examples=150,
@@ -92,11 +92,6 @@ def campaigns(draw: st.DrawFn) -> dict[str, Any]:
         },
         "recordings": recordings,
     }  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.mark.slow

@@ -13,18 +13,13 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.findings import english
 from underskin.findings.lacking import Lack
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, to_dict
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 
 MADE = Made(sensors=3, repeats=2, lines=20)
 LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 Which = Callable[[FrfRecording], bool]
 Change = Callable[[FrfRecording], FrfRecording]
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.fixture(scope="module")

@@ -10,14 +10,9 @@ from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 THREE = Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def frfs(made: Campaign) -> list[FrfRecording]:

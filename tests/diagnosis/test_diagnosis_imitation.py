@@ -10,14 +10,9 @@ from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation.imitation import Imitation, imitation
 from underskin.recordings.campaign import IndentationRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 SUPPORTED = 6
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def imitated(stiffness: float, radii: tuple[float, ...], table: SigmaTable) -> Imitation:

@@ -14,7 +14,7 @@ from rig.recorded import record_lines
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.other_kinds import OtherKind
 from underskin.recordings.campaign import parse
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
 LINES: dict[str, Any] = {
@@ -41,11 +41,6 @@ SPHERE = {
     "force_noise_n": 0.002,
 }
 Effects = Mapping[str, Mapping[str, float]]
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def lines(modulus: float = 16.0, effects: Effects | None = None, seed: int = 5) -> dict[str, Any]:

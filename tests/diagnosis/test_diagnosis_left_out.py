@@ -13,14 +13,9 @@ from underskin.diagnosis.reporting.report import report
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.saving import document
 from underskin.prediction.adopted_model import adopted
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 PLACES = Made(sensors=3, offsets_mm=(-0.9, 0.8), preloads_n=(0.2, 0.5, 1.0, 2.2, 5.0), lines=20, highest_hz=1000.0)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def without(mechanism: str, parameters: Sequence[float], table: SigmaTable) -> dict[str, Any]:

@@ -8,15 +8,10 @@ import pytest
 from tests.support.diagnosis_campaigns import Made, added, campaign
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 MADE = Made(sensors=3, preloads_n=(0.5, 1.2, 2.4), lines=60, line=0.005)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def picked_up(quiet: Campaign, line: Floats, share: float) -> Campaign:

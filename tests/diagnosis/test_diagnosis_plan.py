@@ -22,16 +22,11 @@ from underskin.diagnosis.selection.search import search
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 DRAWS = 400 if os.environ.get("UNDERSKIN_SOAK") == "1" else 40
 TWINS = Made(("moving_contact_edge",), (0.9,), sensors=3, repeats=2, thickness_mm=1.2)
 NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=2, gain=0.01)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 class Left:

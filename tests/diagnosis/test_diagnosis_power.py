@@ -20,15 +20,10 @@ from underskin.diagnosis.validation.power import least_chi2, power
 from underskin.diagnosis.validation.signatures import Signatures
 from underskin.mechanisms import compose
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 QUIET = Made(sensors=1, repeats=2)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def visible(made: Made, table: SigmaTable) -> dict[str, float]:

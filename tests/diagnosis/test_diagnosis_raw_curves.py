@@ -33,11 +33,6 @@ CAMPAIGNS = os.environ.get("UNDERSKIN_CAMPAIGNS")
 RADIUS, MODULUS, ADHESION, SEPARATION, STAGE = 7.5e-6, 1e6, 0.040, 0.075, 3.0  # SI
 
 
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
-
-
 def branch(work: float) -> tuple[Floats, Floats, Floats]:
     """Contact radius, δ and F of JKR's equilibrium, written from the two equations alone."""
     reduced, a = MODULUS / 0.75, np.geomspace(1e-8, 6e-6, 100_001)

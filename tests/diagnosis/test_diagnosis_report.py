@@ -18,15 +18,10 @@ from underskin.cli.app import app
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.mechanisms import CATALOGUE, compose
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, to_dict
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 SHARED = os.environ.get("UNDERSKIN_CAMPAIGNS")
 SENSORS = Made(sensors=3, repeats=2)
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def names(report: dict[str, Any]) -> set[str]:

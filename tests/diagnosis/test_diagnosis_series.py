@@ -9,12 +9,7 @@ import pytest
 from tests.diagnosis.series_campaigns import codes, forces, recorded
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,7 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.select_lines import choose_lines
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.surrogate.sigma_table import SigmaTable, load_table
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 @pytest.fixture(scope="module")

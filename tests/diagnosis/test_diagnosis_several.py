@@ -16,14 +16,9 @@ from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.diagnosis.several.population import population
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 SEPTEMBER, OCTOBER = "2017-09-12T09:00:00Z", "2017-10-20T09:00:00Z"
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def scopes(report: dict[str, Any]) -> dict[str, dict[str, Any]]:

@@ -15,7 +15,7 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 MADE = Made(sensors=3, repeats=2, lines=20)
 SLIPS = {
@@ -23,11 +23,6 @@ SLIPS = {
     *(FindingCode.WEAK, FindingCode.SIGN_FLIPPED),
 }
 Change = Callable[[FrfRecording, int], FrfRecording]
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.fixture(scope="module")

@@ -22,15 +22,10 @@ from underskin.diagnosis.selection.occam_correction import fit_and_plausibility,
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 GAIN = 0.02
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 @pytest.fixture(scope="module")

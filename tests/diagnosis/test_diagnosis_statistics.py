@@ -19,15 +19,10 @@ from underskin.diagnosis.inference.laplace import around_mean, log_box
 from underskin.diagnosis.inference.likelihood import log_likelihoods
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def fitted(

@@ -21,15 +21,10 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, from_dict
 from underskin.recordings.conditions import SkinDescription
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 EXAMPLE = ROOT / "service" / "pages" / "start" / "example" / "2024-11.json"
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def pdms_curve(

@@ -16,12 +16,7 @@ from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.frequency_gp import frequency_bins
 from underskin.diagnosis.selection.recording_gp import GainResidual, ScatterNodes
 from underskin.recordings.campaign import from_dict
-from underskin.surrogate.sigma_table import SigmaTable, load_table
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
+from underskin.surrogate.sigma_table import SigmaTable
 
 
 def rig_report(table: SigmaTable, gain: float, position_mm: float, effects: dict[str, Any]) -> dict[str, Any]:

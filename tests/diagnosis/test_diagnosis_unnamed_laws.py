@@ -29,16 +29,11 @@ from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, Form
 from underskin.prediction.adopted_model import adopted, not_adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, from_dict
 from underskin.recordings.conditions import frf_of
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 
 TRUTH = "unlisted-open-truth.json"
 ALIKE = {"day_time": "time_of_day", "previous_preload": "previous_preload_n", "drift_then_plateau": "saturating"}
-
-
-@pytest.fixture(scope="module")
-def table() -> SigmaTable:
-    return load_table()
 
 
 def changed(made: Campaign, factor: Callable[[FrfRecording, int, Floats], Complexes | complex]) -> Campaign:

@@ -29,8 +29,9 @@ from underskin.diagnosis.selection.kinds_together import Others
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.search import search
-from underskin.diagnosis.selection.unnamed_search import law_of, nearest_law, with_laws
+from underskin.diagnosis.selection.unnamed_search import with_laws
 from underskin.diagnosis.validation import cross_validation
+from underskin.diagnosis.validation.held_out_laws import held_out, of_nearest_law
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation, unseen
 from underskin.diagnosis.validation.platen_seating import without_seating
@@ -42,17 +43,14 @@ from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, Known
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Mask
 
 _KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first that there is gives the verdict
 _FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
 _WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
-_LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -179,7 +177,7 @@ def _work_out(
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
     showing = [entry for entry in ranked if result.shows(entry)]
-    groups = _held_out(problem, result, showing, nothing)
+    groups = held_out(problem, result, showing, nothing)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
     contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
@@ -192,7 +190,7 @@ def _work_out(
         leader = result.answers[0]
         shown = result.shown_or_nothing(leader)
     if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
-        groups = _held_out(problem, result, showing, nothing)
+        groups = held_out(problem, result, showing, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)
@@ -204,7 +202,7 @@ def _work_out(
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
     undescribed = leader.explanation is None and result.law is None
     shape = describe(problem, shown) if undescribed else None
-    begun = begun.with_findings(*(_of_nearest_law(problem, result, nothing) if undescribed else ()))
+    begun = begun.with_findings(*(of_nearest_law(problem, result, nothing) if undescribed else ()))
     return replace(
         begun.with_findings(*above_noise(problem, shown, groups)),
         search=result,
@@ -230,57 +228,6 @@ def _located(
     ranges = region(problem.lines, against_base, axes)
     prediction = whole_prediction(problem, nothing)
     return axes, ranges, effect(problem.lines, prediction, in_region(problem.lines, ranges), gain, levels.level)
-
-
-def _held_out(
-    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
-) -> list[cross_validation.HeldOut]:
-    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
-    law = result.law
-    if result.answers[0].explanation is not None or law is None:
-        return cross_validation.hold_out(
-            problem, ranked, nothing, result.log_prior, cross_validation.groups(problem.lines)
-        )
-    laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
-    both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
-    return cross_validation.hold_out(problem, both, nothing, result.log_prior, _along(problem, law))
-
-
-def _along(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
-    """The rows of thirds along the axis of a law that nobody listed."""
-    if problem.lines.curves:
-        return cross_validation.stretches(problem.lines)
-    leading = law_of(problem, law)
-    ids = [entry.id for entry in problem.lines.campaign.recordings]
-    column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
-    return cross_validation.thirds(problem.lines, column)
-
-
-def _of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation) -> list[Finding]:
-    """What the nearest law that nobody listed is worth, where none is stated."""
-    nearest = nearest_law(problem, result)
-    if nearest is None:
-        return []
-    found = nearest.explanation
-    law = None if found is None else law_of(problem, found)
-    if found is None or law is None:
-        return [Finding(Reason.NO_SIMPLE_LAW, "", "", {"tried": nearest.tried})]
-
-    def the_law(entry: Explanation) -> float:
-        return 0.0 if entry.names == found.names else -np.inf
-
-    groups = cross_validation.hold_out(problem, [found], nothing, the_law, _along(problem, found))
-    before, after = cross_validation.total(groups)
-    if not (np.isfinite(before.rmse_percent) and np.isfinite(after.rmse_percent)):
-        return []
-    arguments = {
-        "tried": nearest.tried,
-        "law": law.spoken.words,
-        "part": "samples" if problem.lines.curves else "recordings",
-        "after_percent": after.rmse_percent,
-        "before_percent": before.rmse_percent,
-    }
-    return [Finding(Reason.NO_SIMPLE_LAW, "", "", arguments)]
 
 
 def _beside_unlisted(

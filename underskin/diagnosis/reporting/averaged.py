@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
@@ -18,7 +18,6 @@ _TWINS = 2.0  # nats by which sets with the one in place of the other differ at 
 _NAMED, _LEAST_NAMED = 0.02, 3  # probability of a group that is listed, and how many are at least
 _ALIKE = 0.5  # of the noise: answers that differ by less predict alike
 _ENOUGH_ALIKE = 0.95
-_QUANTILE = float(ndtri(0.975))
 
 
 def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any]]:
@@ -80,7 +79,7 @@ def d33(search: Search) -> dict[str, Any] | None:
         return None
     stated = [parameter(explanation, place_of(explanation, "d33")) for _, explanation in each]
     middle = np.log([entry["value"] for entry in stated])
-    deviation = np.log([entry["high"] / entry["low"] for entry in stated]) / (2 * _QUANTILE)
+    deviation = np.log([entry["high"] / entry["low"] for entry in stated]) / (2 * SDS_OF_95)
     share = weights / weights.sum()
 
     def quantile(level: float) -> float:

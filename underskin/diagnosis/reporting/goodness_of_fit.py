@@ -4,17 +4,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 
 _FACTOR = "modulus_factor"  # of modulus_error
-_QUANTILE = float(ndtri(0.975))
 
 
 def explains_percent(
@@ -126,7 +124,7 @@ def _product(explanation: Explanation, places: Sequence[int]) -> dict[str, float
     """Of parameters on a logarithmic scale, with the 95 % interval."""
     rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
     middle = float(explanation.point.fit[list(places)].sum())
-    half = _QUANTILE * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
+    half = SDS_OF_95 * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
     return {
         key: rounded(float(np.exp(middle + way * half)), 6) for key, way in (("value", 0), ("low", -1), ("high", 1))
     }

@@ -4,18 +4,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
 from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
 
 _CALLED: Mapping[Kind, str] = {"frf": "the FRFs", "indentation": "the indentations", "compression": "the block"}
 _MODULUS_ERROR = "modulus_error"
-_QUANTILE = float(ndtri(0.975))
 
 
 def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
@@ -40,7 +38,7 @@ def _tolerant(modulus: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
     value = modulus["value"]
     ways = [np.log(modulus[key] / value) for key in ("low", "high")]
     low, high = (
-        value * np.exp(sign * np.hypot(way, _QUANTILE * tolerance)) for sign, way in zip((-1, 1), ways, strict=True)
+        value * np.exp(sign * np.hypot(way, SDS_OF_95 * tolerance)) for sign, way in zip((-1, 1), ways, strict=True)
     )
     return {**modulus, "low": rounded(float(low)), "high": rounded(float(high))}
 

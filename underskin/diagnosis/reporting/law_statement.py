@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.reporting.hints import TURNED, hint
+from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.mechanisms.unnamed.axes import time_zone
@@ -15,7 +15,6 @@ from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
 
-_QUANTILE = float(ndtri(0.975))
 _HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
 _DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle
 
@@ -122,7 +121,7 @@ def _size(leading: LeadingLaw) -> str:
     at, size, deviation = leading.largest()
     law = leading.law
     where = f" {place}" if (place := _where(leading, at)) else ""
-    half = _QUANTILE * deviation
+    half = SDS_OF_95 * deviation
     if law.spoken.acts_on in ("force", "position"):
         unit = "N" if law.spoken.acts_on == "force" else "mm"
         return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}){where}"

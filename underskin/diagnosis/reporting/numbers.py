@@ -11,7 +11,7 @@ from underskin.diagnosis.inference.laplace import levels_covariance
 from underskin.diagnosis.inference.profile import profile_end
 from underskin.mechanisms.parameter import Parameter
 
-_QUANTILE = float(ndtri(0.975))
+SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
@@ -38,7 +38,7 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     else:
         index = best.hypothesis.mean_places.index(place)
         variance = float(explanation.best.covariance[index, index])
-    half_width = _QUANTILE * np.sqrt(max(variance, 0.0))
+    half_width = SDS_OF_95 * np.sqrt(max(variance, 0.0))
     low, high = entry.bounds
     middle = float(point.fit[place])
     ends = [max(middle - half_width, low), min(middle + half_width, high)]
@@ -92,6 +92,6 @@ def _absolute(explanation: Explanation, place: int, multiples: list[float]) -> l
     places = [best.hypothesis.mean_places.index(one) for one in (place, other)]
     deviation = float(np.sqrt(max(best.covariance[np.ix_(places, places)].sum(), 0.0)))
     unit = float(np.exp(explanation.point.fit[other]))
-    factor = np.exp(_QUANTILE * deviation)
+    factor = np.exp(SDS_OF_95 * deviation)
     value = multiples[0] * unit
     return [value, max(value / factor, min(entry.low * unit, value)), min(value * factor, entry.high * unit)]

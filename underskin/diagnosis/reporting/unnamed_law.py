@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import parameter, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, rounded
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.unnamed_search import law_of
 from underskin.diagnosis.validation import cross_validation
@@ -21,7 +20,6 @@ from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.units import Floats
 
-_QUANTILE = float(ndtri(0.975))
 _RIVALS, _LEAST_RIVAL = 5, 0.01
 _PLACES = 41  # along the axis, at which a course is looked at
 _STATED = 21  # of these, at which a smooth one is stated
@@ -159,7 +157,7 @@ def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
     else:
         words = leading.axis.words
         x = leading.axis.levels if len(leading.axis.levels) <= _STATED else np.linspace(low, high, _STATED)
-    change, half = leading.change(x), _QUANTILE * np.sqrt(leading.variance(x))
+    change, half = leading.change(x), SDS_OF_95 * np.sqrt(leading.variance(x))
     ends = zip(x.tolist(), change.tolist(), (change - half).tolist(), (change + half).tolist(), strict=True)
     return [
         {
@@ -220,7 +218,7 @@ def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[di
     amplitudes = [leading.values[name] for name in law.amplitudes]
     size, start = wave(law, leading.values, amplitudes)
     quarter = np.array([start + leading.values["law_period"] / 4])
-    half_width = _QUANTILE * float(np.sqrt(leading.variance(quarter)[0]))
+    half_width = SDS_OF_95 * float(np.sqrt(leading.variance(quarter)[0]))
     ends = {"value": rounded(size), "low": rounded(max(size - half_width, 0.0)), "high": rounded(size + half_width)}
     turn = half_width / max(size, 1e-12) * leading.values["law_period"] / (2 * np.pi)
     begins = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}

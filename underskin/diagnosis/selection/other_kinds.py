@@ -35,9 +35,8 @@ _MODULUS_ERROR, _MODULUS = "modulus_error", ("", "youngs_modulus")
 _MODULUS_SD = 1.5  # of the logarithm of a modulus that nobody declared
 
 Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
-Moments = tuple[
-    float, float, bool
-]  # of a prior: mean, variance, and whether it is flat: then the variance of a normal one as high
+# Of a prior: mean, variance, and whether it is flat: then the variance is that of a normal one as high
+Moments = tuple[float, float, bool]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,13 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.numbers import place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.campaigns import in_order, refuse_copies
@@ -29,7 +28,6 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
-_QUANTILE = float(ndtri(0.975))
 _MODULUS_ERROR = "modulus_error"
 _INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
 
@@ -182,8 +180,8 @@ def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] |
             {
                 "skin": one.skin,
                 "value": rounded(float(np.exp(value))),
-                "low": rounded(float(np.exp(value - _QUANTILE * deviation))),
-                "high": rounded(float(np.exp(value + _QUANTILE * deviation))),
+                "low": rounded(float(np.exp(value - SDS_OF_95 * deviation))),
+                "high": rounded(float(np.exp(value + SDS_OF_95 * deviation))),
             }
             for one, value, deviation in zip(said, found.value, found.deviation, strict=True)
         ],

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.errors import InvalidInput
 from underskin.inversion.invert import Inversion, invert
 from underskin.prediction.adopted_model import AdoptedModel
@@ -151,7 +151,7 @@ def change_in_words(change: Change, names: Sequence[str], dates: Mapping[int, st
     whose = "of all sensors" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     way = "fell" if change.value < 0 else "rose"
     before, after = (dates.get(number, names[number]) for number in (change.since - 1, change.since))
-    low, high = (abs(100 * (change.value + way * 1.96 * change.uncertainty)) for way in (-1, 1))
+    low, high = (abs(100 * (change.value + way * SDS_OF_95 * change.uncertainty)) for way in (-1, 1))
     low, high = sorted((low, high))
     return (
         f"d33 {whose} {way} by {abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g}) between {before} and {after}."

@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
-from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
@@ -17,7 +16,6 @@ from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
-_QUANTILE = float(ndtri(0.975))
 _ALTERNATIVES = 6
 _DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
 
@@ -127,7 +125,7 @@ def _unsure(candidate: Candidate, names: Sequence[str]) -> float:
     for fit in both:
         assert fit is not None
         stated = parameter(fit, place_of(fit, "d33"))
-        deviations.append(float(np.log(stated["high"] / stated["low"])) / (2 * _QUANTILE))
+        deviations.append(float(np.log(stated["high"] / stated["low"])) / (2 * SDS_OF_95))
     return float(np.sqrt(max(deviations[0] ** 2 - deviations[1] ** 2, 0.0)))
 
 
@@ -150,7 +148,7 @@ def _mechanisms(
             parameters = []
             for entry, middle, sd in zip(each[0].parameters, mean, deviation, strict=True):
                 low, high = entry.bounds
-                ends = (middle, max(middle - _QUANTILE * sd, low), min(middle + _QUANTILE * sd, high))
+                ends = (middle, max(middle - SDS_OF_95 * sd, low), min(middle + SDS_OF_95 * sd, high))
                 value = dict(
                     zip(("value", "low", "high"), (rounded(entry.from_fit(float(at))) for at in ends), strict=True)
                 )
@@ -185,7 +183,7 @@ def _aged(changed: Sequence[Change], names: Sequence[str], dates: Mapping[int, s
     for change in changed:
         if change.value > 0:
             continue
-        half = _QUANTILE * change.uncertainty
+        half = SDS_OF_95 * change.uncertainty
         ends = {"value": 100 * change.value, "low": 100 * (change.value - half), "high": 100 * (change.value + half)}
         scope: dict[str, Any] = {
             "campaigns": list(names[change.since :]),

@@ -1,0 +1,11 @@
+"""The table of σ that all tests of the diagnosis read."""
+
+import pytest
+
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+
+@pytest.fixture(scope="session")
+def table() -> SigmaTable:
+    """The one that comes with the library."""
+    return load_table()
