@@ -127,7 +127,7 @@ def _of_frf(
         if beside is None:
             return alone, search(alone, known)
         problem = FittingProblem(alone.lines, table, beside)
-        return problem, search(problem)
+        return problem, search(problem, asked_for=beside.asked_for(problem.lines))
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search
@@ -150,7 +150,7 @@ def _of_curves(
 
     def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
         problem = FittingProblem(rows, table, beside)
-        return problem, search(problem)
+        return problem, search(problem, asked_for=beside.asked_for(rows) if beside else ())
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search

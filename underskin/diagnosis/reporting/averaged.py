@@ -4,13 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, mixture_quantile, parameter, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
@@ -80,19 +78,14 @@ def d33(search: Search) -> dict[str, Any] | None:
     stated = [parameter(explanation, place_of(explanation, "d33")) for _, explanation in each]
     middle = np.log([entry["value"] for entry in stated])
     deviation = np.log([entry["high"] / entry["low"] for entry in stated]) / (2 * SDS_OF_95)
-    share = weights / weights.sum()
-
-    def quantile(level: float) -> float:
-        def beyond(at: float) -> float:
-            return float(share @ ndtr((at - middle) / deviation) - level)
-
-        far = 8 * deviation.max()
-        return float(np.exp(brentq(beyond, middle.min() - far, middle.max() + far)))
-
     if len(stated) == 1:
         return stated[0]
-    ends = {"value": rounded(quantile(0.5)), "low": rounded(quantile(0.025)), "high": rounded(quantile(0.975))}
-    return {"name": "d33", "unit": stated[0]["unit"], **ends}
+    levels = {"value": 0.5, "low": 0.025, "high": 0.975}
+    quantiles = {
+        key: np.exp(mixture_quantile(level, weights / weights.sum(), middle, deviation))
+        for key, level in levels.items()
+    }
+    return {"name": "d33", "unit": stated[0]["unit"], **{key: rounded(float(at)) for key, at in quantiles.items()}}
 
 
 def _stands_on(search: Search, answer: Answer) -> Explanation | None:

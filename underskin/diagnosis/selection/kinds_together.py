@@ -1,7 +1,8 @@
 """Several kinds of recordings in one campaign: explained together, unless they contradict each other.
 
 That curves and FRFs are of one material is a hypothesis like any other: its rival, that each kind has a modulus and
-strengths of its own, has the evidence of the kinds apart and a small prior.
+strengths of its own, has the evidence of the kinds apart, with the same priors of what is missing, and a small prior:
+another elastomer beside the skin's is rarer than a modulus that was declared wrong.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,13 +12,14 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.other_kinds import Beside, OtherKind
+from underskin.diagnosis.selection.curve_knowledge import OtherKind
+from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
-_APART = 0.03  # prior of kinds that are not of one material
+_APART = 3e-3  # prior of kinds that are not of one material
 
 Fitted = Callable[[Beside | None], tuple[FittingProblem, Search]]
 
@@ -62,9 +64,21 @@ class Others:
         )
         problem, together = fitted(beside)
         alone, apart = fitted(None)
-        log_apart = apart.log_total + sum(map(beside.log_evidence_apart, beside.kinds)) + np.log(_APART)
+        log_apart = _log_apart(apart, beside) + np.log(_APART)
         log_together = together.log_total + np.log1p(-_APART)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
         if contradictory > 0.5:
             return Joined(alone, apart, beside, apart, contradictory)
         return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
+
+
+def _log_apart(apart: Search, beside: Beside) -> float:
+    """The logarithm of the sum over what recordings alone say, times what curves say with parameters of their own."""
+    return float(
+        np.logaddexp.reduce(
+            [
+                weight + sum(beside.log_evidence_apart(kind, entry.names, apart.supported) for kind in beside.kinds)
+                for entry, weight in apart.weighed
+            ]
+        )
+    )
