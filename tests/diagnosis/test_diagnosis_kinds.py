@@ -12,7 +12,8 @@ from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.selection.curve_knowledge import OtherKind
+from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
+from underskin.diagnosis.selection.search import search
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -201,7 +202,8 @@ def test_the_likelihood_of_the_curves_has_their_evidence_under_their_prior(table
     document = lines()
     document["recordings"] += curves("compression", BLOCK)
     campaign = parse(document)
-    other = OtherKind(campaign, "compression", table, ())
+    apart = of_curves(campaign, "compression", table, ())
+    other = OtherKind("compression", apart, search(apart).explanations)
     problem = FittingProblem(frf_lines(campaign), table, Beside([other]))
     hypothesis = problem.hypothesis(("modulus_error",), placed=False)
     assert hypothesis.knowledge is not None

@@ -1,13 +1,12 @@
 """What curves of one kind, beside recordings of another, tell of the elastomer that is common to both.
 
-The curves are fitted with the modulus free, once for each subset of the mechanisms that act on both kinds. Mechanisms
-of the curves alone (a stage that gives) are summed over; so are those that an apparent modulus may hide whatever the
-curves look like (friction at the platens).
+The curves are searched with the modulus free, as if they were alone; each subset of the mechanisms that act on both
+kinds then leaves something to be known. Mechanisms of the curves alone (a stage that gives) are summed over; so are
+those that an apparent modulus may hide whatever the curves look like (friction at the platens).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from underskin.units import Floats, to_si
 
 _BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
 _EXTRAPOLATED = 0.7  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_HIDES = 0.5  # prior of what does not show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
 Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
@@ -34,10 +34,10 @@ Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
 class OfCurves:
     """What one subset of the mechanisms that act on both kinds leaves to be known.
 
-    `each` set of mechanisms that holds it and none else but the curves' own, with its log prior times evidence; `mean`
-    (quantities,) and `covariance` of the `quantities` under the most probable one; `tolerance` is the standard
-    deviation by which the logarithm of the modulus may differ from the skin's; `hidden` are by how much the logarithm
-    of the apparent modulus may be too large by mechanisms that do not show, with their probabilities.
+    `each` set of mechanisms that holds it and none else but the curves' own, with its log prior times evidence, that
+    without these first; `mean` (quantities,) and `covariance` of the `quantities` over all of them; `tolerance` is the
+    standard deviation by which the logarithm of the modulus may differ from the skin's; `hidden` are by how much the
+    logarithm of the apparent modulus may be too large by mechanisms that do not show, with their probabilities.
     """
 
     each: tuple[tuple[Explanation, float], ...]
@@ -61,16 +61,13 @@ class OfCurves:
 class OtherKind:
     """The curves of one kind in a campaign that is diagnosed by recordings of another."""
 
-    def __init__(self, campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> None:
-        """Find the contact points with nothing missing, the modulus free."""
-        skin = replace(campaign.skin, youngs_modulus_mpa=None)
-        mechanisms = Known({MODULUS_ERROR, *without})
-        free = replace(campaign, skin=skin)
-        mechanisms.bind(free, table, kind)
-        self.kind = kind
-        self.problem = FittingProblem(replace(curve_lines(free, kind), mechanisms=mechanisms), table)
+    def __init__(self, kind: Kind, problem: FittingProblem, explanations: Sequence[Explanation]) -> None:
+        """Curves with the modulus free (`of_curves`), and the sets of mechanisms that were found to explain them."""
+        self.kind, self.problem = kind, problem
+        self._explanations = {frozenset(entry.names): entry for entry in explanations}
+        mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
         self.supported = tuple(name for name in mechanisms.named if self._supports(name))
-        may_hide = {name: mechanisms[name].hidden_in_modulus(free) for name in self.supported}
+        may_hide = {name: mechanisms[name].hidden_in_modulus(conditions) for name in self.supported}
         self._may_hide = {name: values for name, values in may_hide.items() if values}
         self.found: dict[frozenset[str], OfCurves] = {}
 
@@ -81,20 +78,17 @@ class OtherKind:
             return False
         return True
 
-    @cached_property
-    def nothing(self) -> Explanation:
-        """The base model's fit."""
-        (explanation,) = self.problem.explain([Request(())])
-        assert explanation is not None
-        return explanation
-
-    def told(self, names: Sequence[str], of_both: Sequence[str]) -> OfCurves:
+    def told(self, names: Collection[str], of_both: Sequence[str]) -> OfCurves:
         """Under a set of mechanisms of those that act on both kinds; the curves' own ones may be there beside."""
         key = frozenset(name for name in names if name in self.supported and name in of_both)
         if key not in self.found:
-            alone = [name for name in self.supported if name not in of_both and name not in self._may_hide]
-            self.found[key] = self._tolerant(self._fitted(key, alone), key, of_both)
+            self.found[key] = self._tolerant(self._fitted(key, of_both), key, of_both)
         return self.found[key]
+
+    def tell_all(self, of_both: Sequence[str]) -> None:
+        """Under every set that was found, so that `found` holds them."""
+        for names in tuple(self._explanations):
+            self.told(names, of_both)
 
     def _tolerant(self, told: OfCurves, names: frozenset[str], of_both: Sequence[str]) -> OfCurves:
         """Where a law extrapolates the modulus to no strain: as unsure as a good part of what it takes off."""
@@ -104,35 +98,63 @@ class OtherKind:
         taken_off = float(told.mean[0] - self.told(plain, of_both).mean[0])  # what hides is in both
         return replace(told, tolerance=float(np.hypot(_BATCH, _EXTRAPOLATED * taken_off)))
 
-    def _fitted(self, both: frozenset[str], alone: Sequence[str]) -> OfCurves:
-        sets = [both, *(both | {name} for name in alone)]
-        ordered = [tuple(name for name in self.supported if name in one) for one in sets]
-        fits = self.problem.explain([Request(names, begin=self.nothing.point) for names in ordered])
-        without = fits[0]
-        assert without is not None
+    def _fitted(self, both: frozenset[str], of_both: Sequence[str]) -> OfCurves:
+        alone = {name for name in self.supported if name not in of_both and name not in self._may_hide}
+        without = self._explained(both)
         shown = without.log_evidence + least_evidence(without)
-        each = tuple(  # the set without the curves' own first
-            (fit, fit.log_evidence + log_prior(len(one) - len(both), len(alone)))
-            for one, fit in zip(sets, fits, strict=True)
-            if fit is not None and (fit is without or fit.log_evidence > shown)
+        beside = [
+            entry
+            for names, entry in self._explanations.items()
+            if names > both and names - both <= alone and entry.log_evidence > shown
+        ]
+        each = tuple(
+            (entry, entry.log_evidence + log_prior(len(entry.names) - len(both), len(alone)))
+            for entry in (without, *beside)
         )
-        best = max(each, key=lambda entry: entry[1])[0]
-        quantities, mean, covariance = _posterior(best, both)
+        quantities, mean, covariance = _mixture(each, both)
         hidden = self._hidden()
         values, shares = np.array(hidden).T
         mean[0] -= shares @ values
         covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
         return OfCurves(each, quantities, mean, covariance, hidden=hidden)
 
+    def _explained(self, names: frozenset[str]) -> Explanation:
+        if names not in self._explanations:
+            ordered = tuple(name for name in self.supported if name in names)
+            begin = self._explanations[frozenset()].point
+            (explanation,) = self.problem.explain([Request(ordered, begin=begin, kept=True)])
+            assert explanation is not None
+            self._explanations[names] = explanation
+        return self._explanations[names]
+
     def _hidden(self) -> tuple[tuple[float, float], ...]:
-        """What the apparent modulus may hide, with probabilities: each is there as often as any mechanism."""
+        """What the apparent modulus may hide, with probabilities."""
         hidden = [(0.0, 1.0)]
-        there, nothing = (np.exp(log_prior(size, 1)) for size in (1, 0))
-        share = float(there / (there + nothing))
         for values in self._may_hide.values():
-            each = [(0.0, 1 - share), *((value, share / len(values)) for value in values)]
+            each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
             hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
         return tuple(hidden)
+
+
+def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
+    """The curves of one kind of a campaign, its modulus free; mechanisms `without` which all is to be explained."""
+    mechanisms = Known({MODULUS_ERROR, *without})
+    free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
+    mechanisms.bind(free, table, kind)
+    return FittingProblem(replace(curve_lines(free, kind), mechanisms=mechanisms), table)
+
+
+def _mixture(
+    each: Sequence[tuple[Explanation, float]], both: frozenset[str]
+) -> tuple[tuple[Quantity, ...], Floats, Floats]:
+    """Mean and covariance of what both kinds know, over sets with their log weights."""
+    weights = np.array([weight for _, weight in each])
+    shares = np.exp(weights - np.logaddexp.reduce(weights))
+    posteriors = [_posterior(entry, both) for entry, _ in each]
+    means = np.array([mean for _, mean, _ in posteriors])
+    mean = shares @ means
+    within = np.tensordot(shares, np.array([covariance for _, _, covariance in posteriors]), 1)
+    return posteriors[0][0], mean, within + (shares[:, None] * (means - mean)).T @ (means - mean)
 
 
 def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:

@@ -12,9 +12,10 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.curve_knowledge import OtherKind
+from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
 from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.priors import least_evidence
+from underskin.diagnosis.selection.search import search
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -59,9 +60,7 @@ class Others:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
             return Joined(*fitted(None))
-        beside = Beside(
-            [OtherKind(campaign, kind, self._table, self._without) for kind, campaign in self._campaigns.items()]
-        )
+        beside = Beside([self._searched(kind, campaign) for kind, campaign in self._campaigns.items()])
         problem, together = fitted(beside)
         alone, apart = fitted(None)
         log_apart = _log_apart(apart, beside) + np.log(_APART)
@@ -70,6 +69,10 @@ class Others:
         if contradictory > 0.5:
             return Joined(alone, apart, beside, apart, contradictory)
         return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
+
+    def _searched(self, kind: Kind, campaign: Campaign) -> OtherKind:
+        problem = of_curves(campaign, kind, self._table, self._without)
+        return OtherKind(kind, problem, search(problem).explanations)
 
 
 def _log_apart(apart: Search, beside: Beside) -> float:

@@ -44,6 +44,7 @@ class Beside:
     def _bind(self, lines: Lines) -> None:
         for kind in self.kinds if not self._of_both else ():
             self._of_both[kind.kind] = tuple(name for name in kind.supported if _acts_on(name, lines))
+            kind.tell_all(self._of_both[kind.kind])
 
     def told(self, kind: OtherKind, names: Sequence[str]) -> OfCurves:
         """What curves of a kind say under a set of mechanisms."""
@@ -53,26 +54,16 @@ class Beside:
         """Sets of the mechanisms that act on recordings of both kinds that the curves find the most probable, alone and
         with an error of the modulus: with such a set the recordings of the other kind must be explained too."""
         self._bind(lines)
-        found: dict[frozenset[str], None] = {}
-        for kind in self.kinds:
-            both = self._of_both[kind.kind]
-            ranked = self._ranked(kind, [frozenset(), *(frozenset({name}) for name in both)])
-            ranked = self._ranked(kind, [*ranked, *(ranked[0] | {name} for name in both)])
-            found |= dict.fromkeys(ranked[:_ASKED_FOR])
-        errors = [name for name in (MODULUS_ERROR,) if _acts_on(name, lines)]
-        return [names | further for names in found for further in (set(), set(errors)) if names | further]
+        errors = {name for name in (MODULUS_ERROR,) if _acts_on(name, lines)}
+        found = dict.fromkeys(names for kind in self.kinds for names in self._most_probable(kind))
+        return list(dict.fromkeys(names | further for names in found for further in (frozenset[str](), errors)))
 
-    def _ranked(self, kind: OtherKind, sets: Sequence[frozenset[str]]) -> list[frozenset[str]]:
-        """Those within reach of the most probable by the curves alone, which comes first."""
+    def _most_probable(self, kind: OtherKind) -> list[frozenset[str]]:
+        """The sets by the curves alone, as far as they count."""
         both = len(self._of_both[kind.kind])
-        weights = {
-            names: self.told(kind, sorted(names)).log_weight + log_prior(len(names), both)
-            for names in dict.fromkeys(sets)
-        }
-        best = max(weights.values())
-        return sorted(
-            (names for names in weights if weights[names] > best - _BEHIND), key=lambda names: -weights[names]
-        )
+        weights = {names: told.log_weight + log_prior(len(names), both) for names, told in kind.found.items()}
+        ranked = sorted(weights, key=lambda names: -weights[names])
+        return [names for names in ranked[:_ASKED_FOR] if weights[names] > weights[ranked[0]] - _BEHIND]
 
     def log_evidence_apart(self, kind: OtherKind, names: Sequence[str], supported: int) -> float:
         """Of the curves of a kind with a material of their own, where recordings of another kind have a set of

@@ -47,7 +47,7 @@ def search(
         _explain(problem, explanations, singles[:1])
         singles = [Request(request.names, begin=explanations[frozenset()].point) for request in singles[1:]]
     _explain(problem, explanations, singles)
-    beside = [Request(tuple(name for name in catalogue if name in one)) for one in asked_for if len(one) > 1]
+    beside = [Request(tuple(name for name in catalogue if name in one), kept=True) for one in asked_for if len(one) > 1]
     tried |= {frozenset(request.names) for request in beside}
     _explain(problem, explanations, beside)
     integrated: Explanations = {}
