@@ -20,9 +20,11 @@ from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
+_ALSO = 2  # answers of recordings alone whose sets are tried together with those of the curves
 _APART = 3e-3  # prior of kinds that are not of one material
 
-Fitted = Callable[[Beside | None], tuple[FittingProblem, Search]]
+# Recordings explained beside the curves of other kinds, with sets that are to be among those tried; or alone
+Fitted = Callable[[Beside | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
 
 
 @dataclass(frozen=True)
@@ -59,10 +61,11 @@ class Others:
     def joined(self, fitted: Fitted) -> Joined:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
-            return Joined(*fitted(None))
+            return Joined(*fitted(None, ()))
         beside = Beside([self._searched(kind, campaign) for kind, campaign in self._campaigns.items()])
-        problem, together = fitted(beside)
-        alone, apart = fitted(None)
+        alone, apart = fitted(None, ())
+        best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
+        problem, together = fitted(beside, beside.asked_for(alone.lines, best))
         log_apart = _log_apart(apart, beside) + np.log(_APART)
         log_together = together.log_total + np.log1p(-_APART)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))

@@ -50,13 +50,15 @@ class Beside:
         """What curves of a kind say under a set of mechanisms."""
         return kind.told(names, self._of_both[kind.kind])
 
-    def asked_for(self, lines: Lines) -> list[frozenset[str]]:
-        """Sets of the mechanisms that act on recordings of both kinds that the curves find the most probable, alone and
-        with an error of the modulus: with such a set the recordings of the other kind must be explained too."""
+    def asked_for(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
+        """Sets by which recordings of both kinds may be explained: what the curves find the most probable, by itself or
+        with an error of the modulus, and with the sets that explain the other recordings `alone`."""
         self._bind(lines)
-        errors = {name for name in (MODULUS_ERROR,) if _acts_on(name, lines)}
+        nothing: frozenset[str] = frozenset()
+        errors = frozenset(name for name in (MODULUS_ERROR,) if _acts_on(name, lines))
         found = dict.fromkeys(names for kind in self.kinds for names in self._most_probable(kind))
-        return list(dict.fromkeys(names | further for names in found for further in (frozenset[str](), errors)))
+        each = [names | own | further for names in found for own in (nothing, *alone) for further in (nothing, errors)]
+        return [names for names in dict.fromkeys(each) if len(names) <= LARGEST]
 
     def _most_probable(self, kind: OtherKind) -> list[frozenset[str]]:
         """The sets by the curves alone, as far as they count."""
