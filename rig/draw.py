@@ -136,7 +136,7 @@ def _skin(
             random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"]
         )
     suitable = [array for array in arrays if math.prod(array) > 1] if effects & _NEEDS_SENSORS else arrays
-    columns, rows = suitable[random.integers(len(suitable))]
+    columns, rows = suitable[int(random.integers(len(suitable)))]
     pitch = 8.0 if prototype else float(f"{max(3.0, 2.2 * skin['sensor_radius_mm']) * random.uniform(1, 1.8):.2g}")
     skin |= {
         "d33_pc_per_n": evenly_in_log(random, 8, 30),
