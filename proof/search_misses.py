@@ -14,6 +14,7 @@ from typing import Any
 
 from proof.cases import DrawnCase
 from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
+from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
 from rig.wide_tails import WIDE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
@@ -27,7 +28,6 @@ from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import load_table
 
 SEED, COUNT = 64203, 480
-LOST = 1.0  # nats of evidence times prior
 _HIDES = ("single", "pair")
 
 Result = dict[str, Any]
@@ -100,11 +100,6 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
     again = [problem.explain([request])[0] for request in requests]
     each = integrated([begun, *(entry for entry in again if entry is not None)])
     return max(each, key=lambda entry: entry.log_evidence)
-
-
-def is_miss(entry: Result) -> bool:
-    """Whether the hidden set would have led."""
-    return entry["lost"] is not None and entry["lost"] > LOST
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from proof.cases import DrawnCase
-from proof.search_misses import compared, is_miss
+from proof.search_misses import compared
+from proof.text_wide import is_miss
 from proof.true_starts import true_values
 from rig.wide_tails import WIDE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem

@@ -9,11 +9,15 @@ from scipy.special import ndtr
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.over_spread import over_spread
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
+from underskin.diagnosis.inference.unseen import Normals, beside, together
+from underskin.diagnosis.reporting.numbers import place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.selection.priors import UNSEEN_ODDS
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
+_WORTH_MORE = 0.03  # of the probability, below which what may be there besides an answer is left out
 _TWINS = 2.0  # nats by which sets with the one in place of the other differ at most
 _NAMED, _LEAST_NAMED = 0.02, 3  # probability of a group that is listed, and how many are at least
 _ALIKE = 0.5  # of the noise: answers that differ by less predict alike
@@ -66,33 +70,52 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
     return pairs
 
 
-def d33(search: Search) -> dict[str, Any] | None:
-    """The median and the 95 % interval of d33 over all answers that have one, each with its probability; None where
-    what no answer explains is more probable than all of them."""
+def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
+    """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
+    may be there besides without showing; None where what no answer explains is more probable than all of them."""
     each = [
         (answer.probability, explanation)
         for answer in search.answers
         if answer.probability > _COUNTS and (explanation := _stands_on(search, answer)) is not None
     ]
-    weights = np.array([probability for probability, _ in each])
-    if weights.sum() < 0.5:
+    total = sum(probability for probability, _ in each)
+    if total < 0.5:
         return None
-    stated = [parameter(explanation, place_of(explanation, "d33")) for _, explanation in each]
-    middle = np.log([entry["value"] for entry in stated])
-    deviation = np.log([entry["high"] / entry["low"] for entry in stated]) / (2 * SDS_OF_95)
-    share = weights / weights.sum()
+    mixture = together(
+        [_d33_under(search, problem, explanation, probability).times(probability) for probability, explanation in each]
+    )
+    share = mixture.share / mixture.share.sum()
 
     def quantile(level: float) -> float:
         def beyond(at: float) -> float:
-            return float(share @ ndtr((at - middle) / deviation) - level)
+            return float(share @ ndtr((at - mixture.mean) / mixture.deviation) - level)
 
-        far = 8 * deviation.max()
-        return float(np.exp(brentq(beyond, middle.min() - far, middle.max() + far)))
+        far = 8 * mixture.deviation.max()
+        return float(np.exp(brentq(beyond, mixture.mean.min() - far, mixture.mean.max() + far)))
 
-    if len(stated) == 1:
-        return stated[0]
+    entry = each[0][1].model.parameters[place_of(each[0][1], "d33")]
     ends = {"value": rounded(quantile(0.5)), "low": rounded(quantile(0.025)), "high": rounded(quantile(0.975))}
-    return {"name": "d33", "unit": stated[0]["unit"], **ends}
+    return {"name": "d33", "unit": entry.unit, **ends}
+
+
+def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:
+    """ln d33 under an answer, and with one more mechanism that does not show; the shares sum to 1."""
+    place = place_of(explanation, "d33")
+    best = explanation.best
+    own = over_spread(best, place)
+    if own is None:
+        index = best.hypothesis.mean_places.index(place)
+        deviation = np.sqrt(best.covariance[index, index])
+        own = Normals(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))
+    several = [own]
+    if probability > _WORTH_MORE:
+        known = {frozenset(answer.names) for answer in search.answers}
+        others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
+        odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
+        more = [beside(problem, explanation, name, "d33") for name in others if name not in explanation.names]
+        several += [found.times(odds) for found in more if found is not None]
+    mixture = together(several)
+    return mixture.times(1 / float(mixture.share.sum()))
 
 
 def _stands_on(search: Search, answer: Answer) -> Explanation | None:
