@@ -41,8 +41,8 @@ class Normal:
 class HeavyTailed(Normal):
     """Student's t distribution with three degrees of freedom on the fit coordinate, `sd` its scale.
 
-    For strengths of which the usual ones are known: about a normal one near the mean, but three scales from it twelve
-    times as likely, since rigs differ by more than who knows some of them expects.
+    For strengths of which the usual ones are known: much like a normal one near the mean, but more than three scales
+    from it is twenty times as likely, since rigs differ by more than who knows some of them expects.
     """
 
     freedom: ClassVar[float] = 3.0
