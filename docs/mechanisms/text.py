@@ -38,8 +38,9 @@ Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a p
 exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the
 table are continued along its tangent, sensors further than 8 thicknesses from the contact feel nothing, and both are
 marked: `valid` says which rows are inside as declared, `inside` which are at the parameters at hand. Every
-parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact. Beside its own parameters
-every model of FRFs has the nuisances
+parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact. A *heavy-tailed* prior is
+Student's t distribution with three degrees of freedom on it, with this scale: some rigs go far beyond what is usual.
+Beside its own parameters every model of FRFs has the nuisances
 
 """
 
