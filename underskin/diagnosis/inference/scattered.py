@@ -24,8 +24,8 @@ def with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points])
 
 
 def hardly_scatters(evidence: Evidence) -> bool:
-    """Whether the positioning scatter that a parent needed is less than any rig's here: what was added explains it."""
-    return float(evidence.point.covariance[POSITION]) < POSITION_PRIOR.low
+    """Whether the positioning scatter that a parent needed is less than is usual here: what was added may explain it."""
+    return float(evidence.point.covariance[POSITION]) < POSITION_PRIOR.middle
 
 
 def without_scatter(points: Points) -> Points:
