@@ -10,6 +10,7 @@ from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves
 from rig.recorded import campaign
+from rig.wide_tails import USUAL, WIDE
 
 
 class Case(Protocol):
@@ -48,15 +49,21 @@ class DrawnCase:
     seed: int
     number: int
     what: str | None = None
+    tails: str = USUAL
 
     @property
     def name(self) -> str:
         """Seed, number and what was asked for."""
-        return f"{self.seed}-{self.number:04d}-{self.what or 'any'}"
+        return f"{self.seed}-{self.number:04d}-{self.what or 'any'}{'-wide' if self.tails == WIDE else ''}"
+
+    @property
+    def description(self) -> dict[str, Any]:
+        """The experiment (`experiment/1`), with what it hides."""
+        return drawn(self.seed, self.number, self.what, self.tails)
 
     def document(self) -> dict[str, Any]:
         """What the rig records, without its truth."""
-        return campaign(record(drawn(self.seed, self.number, self.what)))
+        return campaign(record(self.description))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 from proof.cases import DrawnCase
 from proof.judge import judge
 from proof.stored import Work, digest_of, of_each, reports, sources, stored
-from rig.draw import drawn, record
+from rig.draw import record
 from rig.truth import truth_of_lines
 
 SEED = 51726
@@ -41,5 +41,5 @@ def _judge(work: Work, cases: list[DrawnCase], progress: Callable[[int, int], No
 
 def truth(work: Work, version: str, case: DrawnCase) -> dict[str, Any]:
     """What the rig knows of a drawn campaign."""
-    described = drawn(case.seed, case.number, case.what)
+    described = case.description
     return stored(work.folder / "truths", digest_of([described, version]), lambda: truth_of_lines(record(described)))

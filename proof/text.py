@@ -14,6 +14,7 @@ from proof.text_curves import curves, quiet_curves
 from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_unlisted import alarms, hidden, left_out
+from proof.text_wide import coverage, search_misses, sensitivity
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -48,6 +49,9 @@ def document(parts: Mapping[str, Result]) -> str:
         "quiet_unlisted": alarms,
         "left_out": left_out,
         "joint": joint,
+        "coverage": coverage,
+        "search": search_misses,
+        "sensitivity": sensitivity,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -7,6 +7,9 @@ from typing import Annotated
 import typer
 import yaml
 
+from rig.effects import FRF
+from rig.wide_tails import TAILS, USUAL
+
 rig = typer.Typer(no_args_is_help=True, help="Try an experiment on a virtual rig before building it.")
 
 OutputDir = Annotated[Path, typer.Option(help="Folder to write; made where it does not exist.")]
@@ -47,11 +50,20 @@ def draw(
     kind: Annotated[
         str, typer.Option(help="frf, indentation (raw curves), compression, or joint (NNNN-1.json, NNNN-2.json …).")
     ] = "frf",
+    tails: Annotated[
+        str, typer.Option(help="usual, or of kind frf wide: more scatter, fewer sensors, fainter and stronger effects.")
+    ] = USUAL,
 ) -> None:
     """Random campaigns with hidden effects, to test a diagnosis on: campaigns/NNNN.json and truth.json."""
     from rig.drawn_campaign import HIDES, JOINT, documents_and_truth
 
-    for option, value, allowed in (("--kind", kind, tuple(HIDES)), ("--what", what, (None, *HIDES.get(kind, ())))):
+    possible = TAILS if kind == FRF else (USUAL,)
+    given = (
+        ("--kind", kind, tuple(HIDES)),
+        ("--what", what, (None, *HIDES.get(kind, ()))),
+        ("--tails", tails, possible),
+    )
+    for option, value, allowed in given:
         if value not in allowed:
             names = ", ".join(name for name in allowed if name)
             raise typer.BadParameter(f"{value!r}: must be one of {names}", param_hint=option)
@@ -60,7 +72,7 @@ def draw(
     truths = {}
     for number in range(count):
         name = f"{number:04d}"
-        documents, truths[name] = documents_and_truth(seed, number, kind, what)
+        documents, truths[name] = documents_and_truth(seed, number, kind, what, tails)
         for order, document in enumerate(documents, start=1):
             file = f"{name}-{order}.json" if kind == JOINT else f"{name}.json"
             (folder / file).write_text(json.dumps(document) + "\n", encoding="utf-8")

@@ -1,15 +1,17 @@
 """Random experiments of kind frf like a lab's that hide no, one, two or uncatalogued effects; fixed by seed and number.
 
 Skins, arrays, preloads, noise and the effects' strengths are drawn from ranges that labs have, strengths uniformly in
-their logarithm, from subtle to strong. An experiment whose contact is outside the rig's range is drawn again.
+their logarithm, from subtle to strong. An experiment whose contact is outside the rig's range is drawn again. With
+wide tails (`rig.wide_tails`) scatter and strengths go beyond that, and arrays of two sensors are frequent.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from rig import wide_tails
 from rig.description import parse
 from rig.effects import EFFECTS, FRF, UNCATALOGUED
 from rig.errors import RigError
@@ -43,15 +45,22 @@ _NEEDS_WIDE = {
 }  # fmt: skip
 
 
-def drawn(seed: int, number: int, what: str | None = None) -> dict[str, Any]:
-    """Description of random experiment `number` of a seed; if `what` it hides is not given, it is drawn too."""
+def drawn(seed: int, number: int, what: str | None = None, tails: str = wide_tails.USUAL) -> dict[str, Any]:
+    """Description of random experiment `number` of a seed; if `what` it hides is not given, it is drawn too.
+
+    `tails` are one of `wide_tails.TAILS`.
+    """
+    wide = tails == wide_tails.WIDE
     random = np.random.default_rng([seed, number, 17])
     hidden = str(random.choice(list(SHARES), p=list(SHARES.values()))) if what is None else what
     for _ in range(200):
         names = _names(random, hidden)
         sought = set(names) if set(names) & set(CATALOGUED) else {*names, str(random.choice(CATALOGUED))}
-        description = random_description(random, f"drawn {seed}/{number}", sought)
-        ranges = of_frf(description)
+        title = f"drawn {seed}/{number}"
+        description = random_description(random, title, sought, wide_tails.ARRAYS if wide else _ARRAYS)
+        if wide:
+            description["noise"] |= wide_tails.scatter(random)
+        ranges = (wide_tails.of_frf if wide else of_frf)(description)
         description["effects"] = {name: drawn_parameters(random, name, ranges) for name in names}
         if _feasible(description):
             return description
@@ -86,9 +95,12 @@ def _names(random: np.random.Generator, what: str) -> list[str]:
             return names
 
 
-def random_description(random: np.random.Generator, name: str, effects: set[str]) -> dict[str, Any]:
-    """The description, as yet without effects, of a random experiment of kind frf that suits the named effects."""
-    skin, spacing = _skin(random, effects)
+def random_description(
+    random: np.random.Generator, name: str, effects: set[str], arrays: Sequence[tuple[int, int]] = _ARRAYS
+) -> dict[str, Any]:
+    """The description, as yet without effects, of a random experiment of kind frf that suits the named effects, its
+    sensors in one of the `arrays` (columns, rows)."""
+    skin, spacing = _skin(random, effects, arrays)
     high = bool(effects & _NEEDS_HIGH_LINES) or random.random() < 0.4
     return {
         "schema": SCHEMA,
@@ -110,7 +122,9 @@ def random_description(random: np.random.Generator, name: str, effects: set[str]
     }
 
 
-def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any], float]:
+def _skin(
+    random: np.random.Generator, effects: set[str], arrays: Sequence[tuple[int, int]]
+) -> tuple[dict[str, Any], float]:
     """A skin, in a third of cases the prototype's, and its pitch."""
     wide = bool(effects & _NEEDS_WIDE)
     prototype = random.random() < (0.05 if wide else 0.3)
@@ -121,8 +135,8 @@ def _skin(random: np.random.Generator, effects: set[str]) -> tuple[dict[str, Any
         skin["sensor_radius_mm"] = evenly_in_log(
             random, max(0.5, 0.25 * skin["thickness_mm"]), 1.3 * skin["thickness_mm"]
         )
-    arrays = [array for array in _ARRAYS if math.prod(array) >= 4] if effects & _NEEDS_SENSORS else list(_ARRAYS)
-    columns, rows = arrays[random.integers(len(arrays))]
+    suitable = [array for array in arrays if math.prod(array) > 1] if effects & _NEEDS_SENSORS else arrays
+    columns, rows = suitable[int(random.integers(len(suitable)))]
     pitch = 8.0 if prototype else float(f"{max(3.0, 2.2 * skin['sensor_radius_mm']) * random.uniform(1, 1.8):.2g}")
     skin |= {
         "d33_pc_per_n": evenly_in_log(random, 8, 30),

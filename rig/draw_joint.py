@@ -18,6 +18,7 @@ from rig.joint_campaign import CurveSet, Hidden, Joint, JointDocument
 from rig.recorded import record_lines
 from rig.strengths import drawn_parameters, of_frf
 from rig.strengths import evenly_in_log as _log
+from rig.wide_tails import scatter
 
 _OFF = ("modulus_error", "thickness_error", "strain_stiffening", "layered_contact")
 COMPANIONS = (
@@ -79,10 +80,7 @@ def frf_description(random: np.random.Generator, name: str, skin: str, sought: s
     """The description of FRFs of a skin that suits the effects sought, with wider scatter than a lone campaign's."""
     description = random_description(random, name, sought)
     description["skin"]["id"] = skin
-    description["noise"] |= {
-        "gain": _log(random, 0.005, 0.08),
-        "position_mm": _log(random, 0.02, 0.5) if random.random() < 0.5 else 0.0,
-    }
+    description["noise"] |= scatter(random)
     return description
 
 

@@ -9,6 +9,7 @@ from rig.elastomer import campaign_of_curves
 from rig.joint import WHAT, drawn_joint
 from rig.recorded import campaign
 from rig.truth import truth_of_curves, truth_of_lines
+from rig.wide_tails import USUAL
 
 JOINT = "joint"
 HIDES: dict[str, tuple[str, ...]] = {  # kinds, and what may be asked for of each
@@ -21,12 +22,13 @@ HIDES: dict[str, tuple[str, ...]] = {  # kinds, and what may be asked for of eac
 Documents = tuple[list[dict[str, Any]], dict[str, Any]]
 
 
-def documents_and_truth(seed: int, number: int, kind: str, what: str | None) -> Documents:
-    """The campaigns (`campaign/1`) of random experiment `number` of a seed, of kind joint several, and the truth."""
+def documents_and_truth(seed: int, number: int, kind: str, what: str | None, tails: str = USUAL) -> Documents:
+    """The campaigns (`campaign/1`) of random experiment `number` of a seed, of kind joint several, and the truth; other
+    `tails` than the usual are those of kind frf."""
     if kind == JOINT:
         return drawn_joint(seed, number, what)
     if kind == FRF:
-        lines = record(drawn(seed, number, what))
+        lines = record(drawn(seed, number, what, tails))
         return [campaign(lines)], truth_of_lines(lines)
     experiment, curves = drawn_curves(seed, number, kind, what)
     return [campaign_of_curves(experiment, curves)], truth_of_curves(experiment, curves)

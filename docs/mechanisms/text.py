@@ -8,7 +8,7 @@ import numpy as np
 from docs.mechanisms.signatures import shown
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
-from underskin.mechanisms import Mechanism, Normal, Parameter
+from underskin.mechanisms import HeavyTailed, Mechanism, Normal, Parameter
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.registry import built_in
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -38,8 +38,9 @@ Where a mechanism leaves the table's ground (ν < 0.5, a yielding glue line, a p
 exact linear layer's plus what finite strain adds in the table at the mechanism's own a and L. Contacts beyond the
 table are continued along its tangent, sensors further than 8 thicknesses from the contact feel nothing, and both are
 marked: `valid` says which rows are inside as declared, `inside` which are at the parameters at hand. Every
-parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact. Beside its own parameters
-every model of FRFs has the nuisances
+parameter's fit coordinate is its value, or its logarithm, and all derivatives are exact. A *heavy-tailed* prior is
+Student's t distribution with three degrees of freedom on it, with this scale: some rigs go far beyond what is usual.
+Beside its own parameters every model of FRFs has the nuisances
 
 """
 
@@ -119,9 +120,11 @@ def _parameters(parameters: tuple[Parameter, ...], *, with_shown: bool) -> str:
 def _prior(entry: Parameter) -> str:
     if not isinstance(entry.prior, Normal):
         return "even" if entry.scale == "linear" else "even in the logarithm"
+    heavy = isinstance(entry.prior, HeavyTailed)
     if entry.scale == "linear":
-        return f"normal, {entry.prior.mean:g} ± {entry.prior.sd:g}"
-    return f"log-normal, {np.exp(entry.prior.mean):.3g}, factor {np.exp(entry.prior.sd):.3g}"
+        return f"{'heavy-tailed' if heavy else 'normal'}, {entry.prior.mean:g} ± {entry.prior.sd:g}"
+    usual, factor = np.exp([entry.prior.mean, entry.prior.sd])
+    return f"{'heavy-tailed in the logarithm' if heavy else 'log-normal'}, {usual:.3g}, factor {factor:.3g}"
 
 
 def _silicones() -> str:

@@ -107,7 +107,7 @@ def best_of(name: str, made: Made, table: SigmaTable) -> tuple[FittingProblem, E
 
 def density_with(found: Explanation, place: int, value: float) -> float:
     """The log posterior density with one parameter held and the others fitted, from starts all over an ageing's law."""
-    held = Fitter([found.best.hypothesis], held=[place])
+    held = Fitter([found.best.hypothesis], held=[(place,)])
     best = -np.inf
     for onset, saturation in itertools.product(np.log([10.0, 100.0, 1000.0]), (0.0, 0.5, 0.95)):
         fit = found.point.fit.copy()

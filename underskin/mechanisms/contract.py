@@ -19,7 +19,7 @@ from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.models.nuisances import FRF_NUISANCES
 from underskin.mechanisms.models.response import joined
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
@@ -140,11 +140,17 @@ def _check_parameter(mechanism: Mechanism, entry: Any) -> None:
     require("high", entry.low < entry.high, f"must be above low, {entry.low!r}")
     require("limit", entry.limit is None or isinstance(entry.limit, int | float), "must be a number or None")
     require("reason", isinstance(entry.reason, str) and entry.reason.strip(), "must be a text")
-    require("prior", isinstance(entry.prior, Normal | Uniform), "must be Normal(mean, sd) or Uniform()")
+    require(
+        "prior",
+        isinstance(entry.prior, Normal | Uniform),
+        "must be Normal(mean, sd), HeavyTailed(mean, sd) or Uniform()",
+    )
     if isinstance(entry.prior, Normal):
         good = _is_finite(entry.prior.mean) and _is_finite(entry.prior.sd) and entry.prior.sd > 0
         with np.errstate(divide="ignore"):
             require("prior", good and np.isfinite(entry.log_prior(entry.start)), "must have mass within the bounds")
+    heavy = entry.moves_covariance and isinstance(entry.prior, HeavyTailed)
+    require("prior", not heavy, "must be Normal(mean, sd) or Uniform() where it does not act on the mean")
     allowed = ("line_variance",) if mechanism.stage is Stage.ADDED_CHARGE else ("mean", "gain_spread")
     require("acts_on", entry.acts_on in allowed, f"must be {' or '.join(allowed)}")
     require("acts_on", entry.moves_covariance != mechanism.moves_predictions, "must fit moves_predictions")

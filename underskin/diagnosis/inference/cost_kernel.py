@@ -132,7 +132,7 @@ def log_plateaus(covariance: Floats, plateaus: Floats) -> float:
 
 @compiled(
     "void(int64[::1], float64[:, ::1], boolean[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
-    "float64[:, ::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+    "float64[:, ::1], float64[:, ::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
 )
 def log_priors(
     owner: NDArray[np.int64],
@@ -142,6 +142,7 @@ def log_priors(
     high: Floats,
     precision: Floats,
     centre: Floats,
+    freedom: Floats,
     height: Floats,
     covariances: Floats,
     plateaus: Floats,
@@ -150,8 +151,9 @@ def log_priors(
     """The logarithms of the prior densities, added to `each` (points, sets).
 
     Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
-    within bounds; of the covariance's coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high,
-    fall_low, fall_high and the logarithm of the area (parameters, 5).
+    within bounds, or one of Student's t with so many degrees of `freedom`, where these are finite; of the covariance's
+    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the logarithm
+    of the area (parameters, 5).
     """
     for point in range(len(fit)):
         of = owner[point]
@@ -161,6 +163,8 @@ def log_priors(
                 value = fit[point, place]
                 if value < low[of, place] or value > high[of, place]:
                     of_mean = -np.inf
-                of_mean -= 0.5 * precision[of, place] * (value - centre[of, place]) ** 2
+                square = precision[of, place] * (value - centre[of, place]) ** 2
+                tail = freedom[of, place]
+                of_mean -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
         for number in range(covariances.shape[1]):
             each[point, number] += of_mean + log_plateaus(covariances[point, number], plateaus)

@@ -117,7 +117,7 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
     """
     places = [_loosest(entry) for entry in evidence]
     known = [place for place in places if place is not None]
-    held = Fitter([entry.hypothesis for entry in evidence], held=known)
+    held = Fitter([entry.hypothesis for entry in evidence], held=[(place,) for place in known])
     integrals = []
     for number, (entry, place) in enumerate(zip(evidence, known, strict=True)):
         low, high = held.low[number, place], held.high[number, place]

@@ -4,7 +4,7 @@ Every set is fitted without positioning scatter and, where that could show, with
 two under their prior.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -19,8 +19,9 @@ from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.inference.least_squares import plain_least_squares
 from underskin.diagnosis.inference.likelihood import Curvature
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
-from underskin.diagnosis.inference.points import Points
+from underskin.diagnosis.inference.points import Points, alone, stacked
 from underskin.diagnosis.inference.position_curvature import curvature
+from underskin.diagnosis.inference.scattered import groups, hardly_scatters, with_scatter, without_scatter
 from underskin.diagnosis.inference.starts import Beginning, best_starts
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
@@ -150,8 +151,8 @@ class FittingProblem:
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
         also_placed: dict[int, Points] = {}
         fitted = _fitted(plain, starts, requests, best)
-        alone = {number: improved for number, improved, _ in fitted if requests[number].parent is None}
-        matters = self._position_matters(plain, alone)
+        parentless = {number: improved for number, improved, _ in fitted if requests[number].parent is None}
+        matters = self._position_matters(plain, parentless)
         for number, improved, evidence in fitted:
             parent = requests[number].parent
             if evidence is None and parent is not None and parent.placed <= 0.5:
@@ -161,13 +162,19 @@ class FittingProblem:
                 fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
             if also:
                 also_placed[number] = improved
-        placed_starts |= _with_scatter(placed, also_placed)
+        placed_starts |= with_scatter(placed, also_placed)
         best = min([best, *(evidence.cost for own in fits for _, evidence in own)])
-        for number, _, evidence in _fitted(placed, placed_starts, requests, best):
-            if evidence is not None:
-                fits[number].append((float(log_priors[1]), evidence))
-            elif np.isfinite(requests[number].target(True)):
+        scattering = _fitted(placed, placed_starts, requests, best)
+        _add(fits, scattering, log_priors[1])
+        for number, _, evidence in scattering:
+            if evidence is None and np.isfinite(requests[number].target(True)):
                 fits[number].clear()
+        also_plain = {
+            number: without_scatter(improved)
+            for number, improved, evidence in scattering
+            if number in scattered and evidence is not None and hardly_scatters(evidence)
+        }
+        _add(fits, _fitted(plain, also_plain, requests, best), log_priors[0])
         return [Explanation.of(own) if own else None for own in fits]
 
     def refit(self, explanations: Sequence[Explanation]) -> list[Explanation | None]:
@@ -197,9 +204,9 @@ class FittingProblem:
         matters = dict.fromkeys(points, False)
         if self.lines.curves:
             return matters
-        for members in _groups(points, hypotheses):
+        for members in groups(points, hypotheses):
             fitter = Fitter([hypotheses[number] for number in members])
-            together = _stacked([points[number] for number in members])
+            together = stacked([points[number] for number in members])
             products = fitter.products(together, slopes=False, place=True)
             if products.place_slopes is not None:
                 first = (products.place_slopes**2).sum(axis=0) / (products.level**2 + 1e-300)
@@ -231,9 +238,9 @@ def _fitted(
     """Of each hypothesis that has starts: its number, the starts improved, and the evidence of the best; None where
     that does not gain on its parent, or is hopeless beside the others and the `best` cost so far."""
     fits: list[tuple[int, Points, Evidence | None]] = []
-    for members in _groups(starts, hypotheses):
+    for members in groups(starts, hypotheses):
         fitter = Fitter([hypotheses[number] for number in members])
-        points = _stacked([starts[number] for number in members])
+        points = stacked([starts[number] for number in members])
         gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
         least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
         kept = [requests[number].kept or len(requests[number].names) <= least for number in members]
@@ -250,30 +257,14 @@ def _fitted(
             owners = improved.points.owner[shown].tolist()
             evidence = dict(zip(owners, around(fitter, improved[np.array(shown)]), strict=True))
         for owner, number in enumerate(members):
-            fits.append((number, _alone(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
+            fits.append((number, alone(improved.points, owner, fitter.counts[owner]), evidence.get(owner)))
     return fits
-
-
-def _alone(points: Points, owner: int, count: int) -> Points:
-    """The points of one of several hypotheses, as those of it alone."""
-    own = points[points.owner == owner]
-    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.bend)
-
-
-def _stacked(points: Sequence[Points]) -> Points:
-    """Points of several hypotheses, of the first, the second and so on, in this order."""
-    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
-    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
-    for number, entry in enumerate(points):
-        fit[owner == number, : entry.fit.shape[1]] = entry.fit
-    covariance, bend = (np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "bend"))
-    return Points(owner, fit, covariance, bend)
 
 
 def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -> dict[int, Points]:
     """Where the fits of requests begin."""
     starts: dict[int, Points] = {}
-    for members in _groups(hypotheses, hypotheses):
+    for members in groups(hypotheses, hypotheses):
         beginnings = []
         for number in members:
             parent, begin = requests[number].parent, requests[number].begin
@@ -288,21 +279,12 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
     return starts
 
 
-def _with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points]) -> dict[int, Points]:
-    """For hypotheses with positioning scatter, from the points of those without it."""
-    starts: dict[int, Points] = {}
-    for members in _groups(points, hypotheses):
-        fitter = Fitter([hypotheses[number] for number in members])
-        begun = fitter.with_scatter(_stacked([points[number] for number in members]))
-        starts |= {number: _alone(begun, owner, fitter.counts[owner]) for owner, number in enumerate(members)}
-    return starts
-
-
-def _groups(
-    numbers: Iterable[int], hypotheses: Sequence[Hypothesis] | Mapping[int, Hypothesis]
-) -> Collection[list[int]]:
-    """Which of these hypotheses can be evaluated together."""
-    groups: dict[object, list[int]] = {}
-    for number in numbers:
-        groups.setdefault(hypotheses[number].group(number), []).append(number)
-    return groups.values()
+def _add(
+    fits: Sequence[list[tuple[float, Evidence]]],
+    fitted: Iterable[tuple[int, Points, Evidence | None]],
+    log_prior: float,
+) -> None:
+    """Add the evidence that there is to each hypothesis' fits."""
+    for number, _, evidence in fitted:
+        if evidence is not None:
+            fits[number].append((float(log_prior), evidence))

@@ -81,12 +81,12 @@ class Hypothesis:
 
     @cached_property
     def priors(self) -> Floats:
-        """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), and the logarithm of their
-        height (3, parameters)."""
+        """Of the model's parameters' priors precision and centre (see `curvature_of_prior`), the logarithm of their
+        height, and the degrees of freedom of their tails (4, parameters)."""
         rows = []
         for entry in self.model.parameters:
-            (precision, centre), start = curvature_of_prior(entry), entry.start
-            rows.append((precision, centre, entry.log_prior(start) + 0.5 * precision * (start - centre) ** 2))
+            freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
+            rows.append((*curvature_of_prior(entry), entry.log_height, freedom))
         return np.array(rows).T
 
     @cached_property
@@ -140,8 +140,8 @@ class FitPoint:
 def _as_plateau(entry: Parameter) -> Plateau:
     """A parameter's prior within its bounds, normalised there."""
     if isinstance(entry.prior, Normal):
-        peak = entry.log_prior(entry.start) + 0.5 * ((entry.start - entry.prior.mean) / entry.prior.sd) ** 2
-        return Plateau(entry.prior.mean, entry.prior.mean, entry.prior.sd, entry.prior.sd, float(np.exp(-peak)))
+        area = float(np.exp(-entry.log_height))
+        return Plateau(entry.prior.mean, entry.prior.mean, entry.prior.sd, entry.prior.sd, area)
     low, high = entry.bounds
     return Plateau(low, high, 1.0, 1.0, high - low)
 

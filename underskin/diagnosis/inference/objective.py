@@ -4,7 +4,7 @@ What only enters the covariance (gain and position scatter, line level, and a me
 Newton steps on the likelihood of the predictions at hand, which costs no model evaluation.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from underskin.diagnosis.inference.products import Products, joined
 from underskin.diagnosis.noise.noise_levels import SeveralLevels
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.models.frf_models import FrfModels
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
 SMOOTH = 2  # of curves, which have no place
@@ -34,9 +34,9 @@ _BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that en
 class Evaluator:
     """Evaluates points of hypotheses of the same recordings, which have the same covariance parameters."""
 
-    def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[int] | None = None) -> None:
-        """Prepare the names and bounds; the parameters at `held`, one of each hypothesis, stay where a point has them,
-        and have no prior."""
+    def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[Collection[int]] | None = None) -> None:
+        """Prepare the names and bounds; the parameters of each hypothesis at `held` stay where a point has them, and
+        have no prior."""
         self.hypotheses = tuple(hypotheses)
         first = hypotheses[0]
         self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
@@ -48,13 +48,15 @@ class Evaluator:
         shape = len(hypotheses), max(self.counts)
         self.free = np.zeros(shape, dtype=bool)
         self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
+        self._freedom = np.full(shape, np.inf)
         self._log_prior_height = np.zeros(len(hypotheses))
         for number, hypothesis in enumerate(hypotheses):
-            places = [place for place in hypothesis.mean_places if held is None or place != held[number]]
+            places = [place for place in hypothesis.mean_places if held is None or place not in held[number]]
             self.free[number, places] = True
             self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
-            self._precision[number, places], self._centre[number, places], height = hypothesis.priors[:, places]
-            self._log_prior_height[number] = height.sum()
+            of_priors = hypothesis.priors[:, places]
+            self._precision[number, places], self._centre[number, places] = of_priors[:2]
+            self._log_prior_height[number], self._freedom[number, places] = of_priors[2].sum(), of_priors[3]
         self._range = self.high - self.low
         each = [entry.knowledge for entry in hypotheses]
         self._known = KnowledgeOfSeveral(each, shape[1]) if any(one is not None for one in each) else None
@@ -178,8 +180,9 @@ class Evaluator:
                 return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
         covariances = contiguous(covariances)
         each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend)
-        bounds = self.free, self.low, self.high, self._precision, self._centre, self._log_prior_height
-        log_priors(points.owner, contiguous(points.fit), *bounds, covariances, self._covariance_prior, each)
+        bounds = self.free, self.low, self.high, self._precision, self._centre
+        heights = self._freedom, self._log_prior_height
+        log_priors(points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, each)
         if self._known is not None:
             each += self._known.log_densities(points)[:, None]
         return -each
@@ -197,15 +200,24 @@ class Evaluator:
         information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, bend, at.growth)
         owner = at.points.owner
         free = self.free[owner]
-        precision = self._precision[owner]
+        away = at.points.fit - self._centre[owner]
+        precision = self._prior_precision(owner, away)
         if self._known is not None:
             of_others, towards = self._known.equations(at.points)
             information, gradient = information + of_others, gradient + towards
-        gradient = np.where(free, gradient - precision * (at.points.fit - self._centre[owner]), 0.0)
+        gradient = np.where(free, gradient - precision * away, 0.0)
         information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
         diagonal = np.arange(free.shape[1])
         information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
         return information, gradient
+
+    def _prior_precision(self, owner: Indices, away: Floats) -> Floats:
+        """What a quadratic with the prior's gradient has for its precision, so far `away` from the centres (points,
+        parameters): less and less in heavy tails."""
+        precision, freedom = self._precision[owner], self._freedom[owner]
+        with np.errstate(invalid="ignore"):
+            weight = (freedom + 1) / (freedom + precision * away**2)
+        return np.where(np.isfinite(freedom), weight, 1.0) * precision
 
     def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
         """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.

@@ -1,5 +1,6 @@
 """Points of several hypotheses, one after another, and what was worked out there."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,22 @@ def together(one: Points, other: Points) -> Points:
     """The points of both, which are of one hypothesis."""
     names = "owner", "fit", "covariance", "bend"
     return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
+
+
+def alone(points: Points, owner: int, count: int) -> Points:
+    """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
+    own = points[points.owner == owner]
+    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.bend)
+
+
+def stacked(points: Sequence[Points]) -> Points:
+    """Points of several hypotheses, of the first, the second and so on, in this order."""
+    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
+    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
+    for number, entry in enumerate(points):
+        fit[owner == number, : entry.fit.shape[1]] = entry.fit
+    covariance, bend = (np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "bend"))
+    return Points(owner, fit, covariance, bend)
 
 
 @dataclass(frozen=True)

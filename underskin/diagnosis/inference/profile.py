@@ -30,7 +30,7 @@ def profile_end(evidence: Evidence, place: int, limit: float) -> float | None:
     entry = evidence.hypothesis.model.parameters[place]
     middle = float(evidence.point.fit[place])
     values = np.linspace(np.clip(limit, *entry.bounds), middle, _STRIDES, endpoint=False)
-    held = Fitter([evidence.hypothesis], held=[place])
+    held = Fitter([evidence.hypothesis], held=[(place,)])
     begun = held.evaluate(held_points(held, [evidence], [place], [0] * _STRIDES, values))
     fitted = held.descend(held.settle(begun, 1), 1)
     priors = np.array([entry.log_prior(value) for value in values.tolist()])

@@ -1,8 +1,9 @@
 """Priors of the noise that every hypothesis shares.
 
-- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside,
-  more slowly downwards, since a careful rig is better than 1 %;
-- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm;
+- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside to
+  a tenth at 0.3 and at 11 %: a careful rig is better than 1 %, a poor one worse than 5 %;
+- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, falling off outside
+  to a tenth at 0.02 and at 0.6 mm;
 - line noise: its level as estimated from the lines' roughness, times a factor near 1.
 """
 
@@ -13,8 +14,8 @@ import numpy as np
 from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
 from underskin.units import Floats
 
-GAIN_FALL = (0.35, 0.12)  # sd of the logarithm below and above
-POSITION_FALL = (0.15, 0.15)  # the same of positions
+GAIN_FALL = (0.6, 0.35)  # sd of the logarithm below and above
+POSITION_FALL = (0.4, 0.3)  # the same of positions
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,8 @@ START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
 # No rig's: something that nobody named moves the recordings
-UNUSUAL_GAIN = Plateau.of((0.08, 0.5), (0.12, 0.12))
-UNUSUAL_POSITION = Plateau.of((0.4e-3, 2e-3), (0.15, 0.15))
+UNUSUAL_GAIN = Plateau.of((0.12, 0.5), (0.12, 0.12))
+UNUSUAL_POSITION = Plateau.of((0.6e-3, 2e-3), (0.15, 0.15))
 
 
 def level_prior(log_level_sd: float) -> Plateau:

@@ -7,11 +7,16 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.over_spread import over_spread
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, mixture_quantile, parameter, place_of, rounded
+from underskin.diagnosis.inference.unseen import Normals, beside, together
+from underskin.diagnosis.reporting.law_level import law_levels
+from underskin.diagnosis.reporting.numbers import mixture_quantile, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
+_WORTH_MORE = 0.03  # of the probability, below which what may be there besides an answer is left out
 _TWINS = 2.0  # nats by which sets with the one in place of the other differ at most
 _NAMED, _LEAST_NAMED = 0.02, 3  # probability of a group that is listed, and how many are at least
 _ALIKE = 0.5  # of the noise: answers that differ by less predict alike
@@ -64,32 +69,59 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
     return pairs
 
 
-def d33(search: Search) -> dict[str, Any] | None:
-    """The median and the 95 % interval of d33 over all answers that have one, each with its probability; None where
-    what no answer explains is more probable than all of them."""
-    each = [
-        (answer.probability, explanation)
-        for answer in search.answers
-        if answer.probability > _COUNTS and (explanation := _stands_on(search, answer)) is not None
-    ]
-    weights = np.array([probability for probability, _ in each])
-    if weights.sum() < 0.5:
+def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
+    """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
+    may be there besides without showing; None where what no answer explains is more probable than all of them."""
+    each = [pair for answer in search.answers for pair in _stand_on(search, answer) if pair[0] > _COUNTS]
+    total = sum(probability for probability, _ in each)
+    if total < 0.5:
         return None
-    stated = [parameter(explanation, place_of(explanation, "d33")) for _, explanation in each]
-    middle = np.log([entry["value"] for entry in stated])
-    deviation = np.log([entry["high"] / entry["low"] for entry in stated]) / (2 * SDS_OF_95)
-    if len(stated) == 1:
-        return stated[0]
+    mixture = together(
+        [_d33_under(search, problem, explanation, probability).times(probability) for probability, explanation in each]
+    )
+    shares = mixture.share / mixture.share.sum()
     levels = {"value": 0.5, "low": 0.025, "high": 0.975}
-    quantiles = {
-        key: np.exp(mixture_quantile(level, weights / weights.sum(), middle, deviation))
-        for key, level in levels.items()
-    }
-    return {"name": "d33", "unit": stated[0]["unit"], **{key: rounded(float(at)) for key, at in quantiles.items()}}
+    ends = {key: mixture_quantile(level, shares, mixture.mean, mixture.deviation) for key, level in levels.items()}
+    entry = each[0][1].model.parameters[place_of(each[0][1], "d33")]
+    return {"name": "d33", "unit": entry.unit, **{key: rounded(float(np.exp(at))) for key, at in ends.items()}}
 
 
-def _stands_on(search: Search, answer: Answer) -> Explanation | None:
-    return answer.explanation if answer.explanation is not None else search.law
+def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:
+    """ln d33 under an answer, at each level that a law of it may refer to, and with one more mechanism that does not
+    show; the shares sum to 1."""
+    place = place_of(explanation, "d33")
+    best = explanation.best
+    own = over_spread(best, place)
+    if own is None:
+        index = best.hypothesis.mean_places.index(place)
+        deviation = np.sqrt(best.covariance[index, index])
+        own = Normals(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))
+    levels = law_levels(problem, explanation)
+    several = [Normals(own.share / len(levels), own.mean + level, own.deviation) for level in levels.tolist()]
+    if probability > _WORTH_MORE:
+        known = {frozenset(answer.names) for answer in search.answers}
+        others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
+        odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
+        more = [beside(problem, explanation, name, "d33") for name in others if name not in explanation.names]
+        several += [found.times(odds * _as_unseen(found)) for found in more if found is not None]
+    mixture = together(several)
+    return mixture.times(1 / float(mixture.share.sum()))
+
+
+def _as_unseen(found: Normals) -> float:
+    """The factor that takes from a mechanism's shares what it would show by: no set of the answers holds it."""
+    return min(1.0, float(np.exp(SHOWS) / found.share.sum()))
+
+
+def _stand_on(search: Search, answer: Answer) -> list[tuple[float, Explanation]]:
+    """The explanations of an answer, each with its probability: of `none_of_these` all laws that nobody listed which
+    show, as they may have the same course and differ by what is d33."""
+    if answer.explanation is not None:
+        return [(answer.probability, answer.explanation)]
+    laws = [entry for entry in search.laws if search.shows(entry)]
+    weights = np.array([search.log_weight(entry) for entry in laws])
+    shares = np.exp(weights - np.logaddexp.reduce(weights)) if laws else weights
+    return [(answer.probability * float(share), entry) for share, entry in zip(shares, laws, strict=True)]
 
 
 def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict[str, Any] | None:

@@ -222,7 +222,7 @@ def _d33(
 
     `quotable`: one answer `stands`, d33 is plausible, and the answer fits the recordings to their noise.
     """
-    d33 = None if problem.lines.curves else averaged.d33(search)
+    d33 = None if problem.lines.curves else averaged.d33(search, problem)
     if d33 is None:
         return None, []
     implausible = plausibility.implausibility(d33["value"])

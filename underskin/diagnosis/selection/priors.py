@@ -11,6 +11,7 @@ from underskin.diagnosis.inference.explanation import Explanation
 # "Nothing" stands for all that does not show as well, which is every other campaign.
 PRIORS = {"nothing_missing": 0.6, "one": 0.252, "two": 0.1, "three": 0.012, "four": 0.001, "none_of_these": 0.035}
 LARGEST = 4  # mechanisms in a set; four only where several kinds of recordings ask for them
+UNSEEN_ODDS = 1.5  # that one more mechanism is there than shows, in what it may do to d33; on the virtual rig about 1.4
 SHOWS = 0.7  # nats of evidence that each mechanism of a set must bring
 _SHOWS_ON_CURVES = 5.0  # the same where neighbouring samples may share what no noise model knows
 

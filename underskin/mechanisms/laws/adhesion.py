@@ -8,7 +8,7 @@ import numpy as np
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions
 from underskin.recordings.curve_course import course
@@ -16,7 +16,7 @@ from underskin.units import to_si
 
 _REASON = "0.04 J/m² is thermodynamic for silicone; rate effects and soft gels raise it to some J/m²"
 _OF_FRF = Parameter(
-    "work_of_adhesion", "J/m²", 1e-3, 20.0, Normal(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
+    "work_of_adhesion", "J/m²", 1e-3, 20.0, HeavyTailed(-1.6, 1.3), "log", limit=0.0, shown=0.5, reason=_REASON
 )
 _WORK = replace(
     _OF_FRF, low=1e-6, high=30.0, prior=Normal(-3.0, 3.0)

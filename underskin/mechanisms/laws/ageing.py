@@ -5,7 +5,7 @@ import numpy as np
 from underskin.autodiff import Differentiated, chain, log
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.conditions import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
@@ -34,7 +34,7 @@ class Ageing(Mechanism):
     needs = "load_cycles of every recording, not all the same"
     needs_fields = ("load_cycles",)
     parameters_stated = (
-        Parameter("loss", "-", 0.0, 0.95, Normal(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=_LOSS),
+        Parameter("loss", "-", 0.0, 0.95, HeavyTailed(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=_LOSS),
         Parameter("onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=_ONSET),
         Parameter("saturation", "-", 0.0, 0.95, Uniform(), "linear", limit=None, shown=0.0, reason=_SATURATION),
     )

@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _MASS = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
 _DAMPING = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"
@@ -31,7 +31,7 @@ class ContactResonance(Mechanism):
     axes = ("frequency_hz", "phase", "preload_n", "indenter_radius_mm")
     needs_stiffness = True
     parameters_stated = (
-        Parameter("tip_mass", "g", 0.01, 2000.0, Normal(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=_MASS),
+        Parameter("tip_mass", "g", 0.01, 2000.0, HeavyTailed(0.7, 1.8), "log", limit=0.0, shown=2.0, reason=_MASS),
         Parameter("damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=_DAMPING),
     )
 

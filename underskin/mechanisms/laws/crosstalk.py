@@ -5,7 +5,7 @@ import numpy as np
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import frf_design
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.conditions import Conditions
 from underskin.units import to_si
 
@@ -32,7 +32,7 @@ class Crosstalk(Mechanism):
     needs_fields = ("sensor",)
     figure = ("position_mm",)
     parameters_stated = (
-        Parameter("fraction", "-", 0.0, 0.6, Normal(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=_REASON),
+        Parameter("fraction", "-", 0.0, 0.6, HeavyTailed(0.0, 0.15), "linear", limit=0.0, shown=0.1, reason=_REASON),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

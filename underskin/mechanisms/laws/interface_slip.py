@@ -4,7 +4,7 @@ import math
 
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "(G_glue/G) (h/t): a tape 0.1 mm thick, 1000 times softer, has 0.02; above 50 no effect"
 
@@ -28,7 +28,7 @@ class InterfaceSlip(Mechanism):
     figure = ("preload_n", "position_mm")
     parameters_stated = (
         Parameter(
-            "glue_stiffness", "-", 0.01, 50.0, Normal(-0.3, 1.5), "log", limit=math.inf, shown=0.3, reason=_REASON
+            "glue_stiffness", "-", 0.01, 50.0, HeavyTailed(-0.3, 1.5), "log", limit=math.inf, shown=0.3, reason=_REASON
         ),
     )
 

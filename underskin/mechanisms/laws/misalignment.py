@@ -7,7 +7,7 @@ import numpy as np
 from underskin.autodiff import Differentiated
 from underskin.errors import conflicting
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.conditions import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0
@@ -44,7 +44,9 @@ class Misalignment(Mechanism):
         directed = offsets(conditions).any() or any(other.needs_neighbours for other in others)
         shown, low = ({"offset_x": 0.6, "offset_y": 0.3}, -_LARGEST_MM) if directed else ({"offset": 0.7}, 0.0)
         return tuple(
-            Parameter(name, "mm", low, _LARGEST_MM, Normal(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON)
+            Parameter(
+                name, "mm", low, _LARGEST_MM, HeavyTailed(0.0, 0.7), "linear", limit=0.0, shown=value, reason=_REASON
+            )
             for name, value in shown.items()
         )
 

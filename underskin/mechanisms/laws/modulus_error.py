@@ -3,7 +3,7 @@
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.conditions import Conditions
 
 _REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"
@@ -26,7 +26,9 @@ class ModulusError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared youngs_modulus_mpa"
     parameters_stated = (
-        Parameter("modulus_factor", "-", 0.25, 4.0, Normal(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=_REASON),
+        Parameter(
+            "modulus_factor", "-", 0.25, 4.0, HeavyTailed(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=_REASON
+        ),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, chain
 from underskin.mechanisms.base import Mechanism, Stage, Values
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _SLOPE = "the paper's array, 14 to 22 pC/N from 1 to 3 N, needs 5 to 6 per MPa; ceramics about -0.01"
 _SATURATION = "no saturation has been published; 1 MPa is ten times the stress of a firm touch"
@@ -26,10 +26,26 @@ class PreloadDependentD33(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm", "sensor")
     parameters_stated = (
         Parameter(
-            "stress_coefficient", "1/MPa", -8.0, 15.0, Normal(0.0, 3.0), "linear", limit=0.0, shown=2.0, reason=_SLOPE
+            "stress_coefficient",
+            "1/MPa",
+            -8.0,
+            15.0,
+            HeavyTailed(0.0, 3.0),
+            "linear",
+            limit=0.0,
+            shown=2.0,
+            reason=_SLOPE,
         ),
         Parameter(
-            "saturation_stress", "MPa", 0.02, 20.0, Normal(0.0, 1.5), "log", limit=None, shown=1.0, reason=_SATURATION
+            "saturation_stress",
+            "MPa",
+            0.02,
+            20.0,
+            Normal(0.0, 1.5),
+            "log",
+            limit=None,
+            shown=1.0,
+            reason=_SATURATION,
         ),
     )
 

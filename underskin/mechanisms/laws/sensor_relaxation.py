@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 
 _REFERENCE = 30.0  # Hz
 _EXPONENT = "tan δ of PVDF and its copolymers is 0.02 to 0.2, and n is 2/π of it"
@@ -28,10 +28,18 @@ class SensorRelaxation(Mechanism):
     order = 20
     axes = ("frequency_hz", "phase")
     parameters_stated = (
-        Parameter("exponent", "-", 0.0, 0.4, Normal(0.0, 0.08), "linear", limit=0.0, shown=0.03, reason=_EXPONENT),
-        Parameter("step", "-", 0.0, 3.0, Normal(0.0, 0.4), "linear", limit=0.0, shown=0.1, reason=_STEP),
+        Parameter("exponent", "-", 0.0, 0.4, HeavyTailed(0.0, 0.08), "linear", limit=0.0, shown=0.03, reason=_EXPONENT),
+        Parameter("step", "-", 0.0, 3.0, HeavyTailed(0.0, 0.4), "linear", limit=0.0, shown=0.1, reason=_STEP),
         Parameter(
-            "step_frequency", "Hz", 0.05, 3000.0, Normal(3.0, 1.5), "log", limit=None, shown=20.0, reason=_FREQUENCY
+            "step_frequency",
+            "Hz",
+            0.05,
+            3000.0,
+            Normal(3.0, 1.5),
+            "log",
+            limit=None,
+            shown=20.0,
+            reason=_FREQUENCY,
         ),
     )
 

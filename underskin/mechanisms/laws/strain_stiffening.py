@@ -8,7 +8,7 @@ from underskin.autodiff import Differentiated, chain, exp, log, where
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
-from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.recordings.conditions import Conditions
 from underskin.units import Array
 
@@ -23,7 +23,7 @@ _COEFFICIENT = Parameter(
     unit="-",
     low=0.0,
     high=40.0,
-    prior=Normal(1.0, 4.0),
+    prior=HeavyTailed(1.0, 4.0),
     scale="linear",
     limit=0.0,
     shown=5.0,

@@ -2,7 +2,7 @@
 
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "a cast layer differs from its mould by shrinkage, meniscus and tilt: some to 20 percent"
 
@@ -21,7 +21,9 @@ class ThicknessError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     largest_stretch = 1.55
     parameters_stated = (
-        Parameter("thickness_factor", "-", 0.65, 1.55, Normal(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=_REASON),
+        Parameter(
+            "thickness_factor", "-", 0.65, 1.55, HeavyTailed(0.0, 0.12), "log", limit=1.0, shown=0.9, reason=_REASON
+        ),
     )
 
     def on_declared(self, contacts: Contacts, values: Values) -> None:

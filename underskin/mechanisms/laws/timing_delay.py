@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
 _REASON = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
 
@@ -26,7 +26,9 @@ class TimingDelay(Mechanism):
     axes = ("phase", "frequency_hz")
     figure = ("phase",)
     parameters_stated = (
-        Parameter("delay", "µs", -5000.0, 5000.0, Normal(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=_REASON),
+        Parameter(
+            "delay", "µs", -5000.0, 5000.0, HeavyTailed(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=_REASON
+        ),
     )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:

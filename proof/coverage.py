@@ -1,0 +1,73 @@
+"""Whether the d33 that a report states, averaged over the answers left, holds the true one in its 95 % interval.
+
+Campaigns of the virtual rig with wide tails (`rig/wide_tails.py`) and the rig's usual mixture of what is hidden.
+`python -m proof.coverage --seed N --count K` prints the table for another seed.
+"""
+
+import argparse
+import math
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from proof.cases import DrawnCase
+from proof.stored import Work, reports
+from proof.text_wide import by_subset
+from rig.wide_tails import WIDE
+
+SEED, COUNT = 60417, 480
+_SDS_OF_95 = 1.96
+
+
+def judge_coverage(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    """What each campaign's report states of d33."""
+    return _judge(work, SEED, min(work.count or COUNT, COUNT), progress)
+
+
+def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    cases = [DrawnCase(seed, number, tails=WIDE) for number in range(count)]
+    answers = reports(work, cases, progress)
+    return {"seed": seed, "judged": [held(case, report) for case, report in zip(cases, answers, strict=True)]}
+
+
+def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
+    """Whether the interval holds the true d33; `off` is by how many of its standard deviations the value is off. None
+    where no d33 is stated."""
+    description = case.description
+    stated, skin = report.get("d33"), description["skin"]
+    true, array = skin["d33_pc_per_n"], skin["array"]
+    off = None
+    if stated is not None:
+        sd = math.log(stated["high"] / stated["low"]) / (2 * _SDS_OF_95)
+        off = math.log(stated["value"] / true) / sd
+    return {
+        "name": case.name,
+        "hidden": sorted(description["effects"]),
+        "verdict": report["verdict"],
+        "named": [entry["name"] for entry in report["mechanisms"]],
+        "sensors": array["columns"] * array["rows"],
+        "quotable": bool(stated and stated["quotable"]),
+        "held": None if stated is None else bool(stated["low"] <= true <= stated["high"]),
+        "off": off,
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="proof.coverage", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--count", type=int, required=True)
+    given = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        result = _judge(Work(Path(folder)), given.seed, given.count, lambda *_: None)
+    print(by_subset(result["judged"]))
+    for entry in result["judged"]:
+        if entry["held"] is False:
+            hidden, named = (" + ".join(entry[key]) or "nothing" for key in ("hidden", "named"))
+            off = f"{entry['off']:+.1f} deviations"
+            print(f"{entry['name']}: {hidden}; {entry['verdict']}, {named}; {entry['sensors']} sensors, off by {off}")
+
+
+if __name__ == "__main__":
+    main()

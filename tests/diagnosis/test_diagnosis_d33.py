@@ -1,0 +1,97 @@
+"""The stated d33 counts what does not show: an effect that changes it alone, few sensors, a law's unknown level."""
+
+import numpy as np
+import pytest
+
+from proof.cases import DrawnCase
+from rig.wide_tails import WIDE
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.diagnosis.inference.over_spread import over_spread
+from underskin.diagnosis.inference.unseen import Normals, beside
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.numbers import parameter, place_of
+from underskin.recordings.campaign import parse
+from underskin.surrogate.sigma_table import SigmaTable
+
+# One sphere on one sensor's centre, over a narrow range of preloads: nearly everything is a factor on d33
+CENTRED = Made(sensors=1, spheres_mm=(6.0,), preloads_n=(0.9, 1.0, 1.1, 1.2), repeats=3)
+
+
+def problem(made: Made, table: SigmaTable) -> FittingProblem:
+    return FittingProblem(lines(campaign(made, table)), table)
+
+
+def spread_of(mixture: Normals) -> float:
+    share = mixture.share / mixture.share.sum()
+    mean = share @ mixture.mean
+    return float(np.sqrt(share @ (mixture.deviation**2 + (mixture.mean - mean) ** 2)))
+
+
+def test_an_effect_that_only_changes_d33_leaves_the_evidence_and_moves_d33(table: SigmaTable) -> None:
+    fitting = problem(CENTRED, table)
+    (nothing,) = fitting.explain([Request(())])
+    assert nothing is not None
+    found = beside(fitting, nothing, "thickness_error", "d33")
+    assert found is not None
+    assert found.share.sum() == pytest.approx(1.0, abs=0.4)
+    assert np.ptp(found.mean) > 0.2
+    assert beside(fitting, nothing, "sensor_spread", "d33") is None  # one sensor
+    assert beside(fitting, nothing, "mains_pickup", "d33") is None  # moves no prediction
+
+
+def test_an_effect_that_would_show_is_not_there_unseen(table: SigmaTable) -> None:
+    """Over spheres of two sizes, preloads to ten times and places beside the sensor, a wrong thickness is no factor."""
+    wide = Made(preloads_n=(0.3, 1.0, 3.0), spheres_mm=(4.0, 8.0), offsets_mm=(0.0, 0.8, 1.6), gain=0.005)
+    fitting = problem(wide, table)
+    (nothing,) = fitting.explain([Request(())])
+    assert nothing is not None
+    found = beside(fitting, nothing, "thickness_error", "d33")
+    assert found is None or found.share.sum() < 0.5
+    assert found is None or np.ptp(found.mean) < 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.94, 1.06])
+def test_the_stated_d33_holds_the_true_one_beside_an_effect_that_does_not_show(
+    factor: float, table: SigmaTable
+) -> None:
+    """The fit alone excludes it."""
+    hidden = Made(**{**vars(CENTRED), "mechanisms": ("thickness_error",), "parameters": (factor,)})
+    report = diagnosis_report(campaign(hidden, table), table)
+    assert report["mechanisms"] == []
+    assert report["d33"]["low"] < hidden.d33_pc_per_n < report["d33"]["high"]
+    (nothing,) = problem(hidden, table).explain([Request(())])
+    assert nothing is not None
+    stated = parameter(nothing, place_of(nothing, "d33"))
+    assert not stated["low"] < hidden.d33_pc_per_n < stated["high"]
+
+
+@pytest.mark.slow
+def test_two_sensors_leave_d33_more_open_than_their_most_probable_spread(table: SigmaTable) -> None:
+    """32 sensors determine the spread, and the integral over it is the normal distribution at its best value."""
+    ratios = []
+    for sensors in (2, 32):
+        made = Made(mechanisms=("sensor_spread",), parameters=(0.15,), sensors=sensors, preloads_n=(0.5, 1.0, 2.0))
+        fitting = problem(made, table)
+        (found,) = fitting.explain([Request(("sensor_spread",))])
+        assert found is not None
+        place = place_of(found, "d33")
+        index = found.best.hypothesis.mean_places.index(place)
+        mixture = over_spread(found.best, place)
+        assert mixture is not None
+        assert mixture.share.sum() == pytest.approx(1.0)
+        ratios.append(spread_of(mixture) / np.sqrt(found.best.covariance[index, index]))
+    assert ratios[0] > 1.3
+    assert ratios[1] == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.slow
+def test_a_resonance_of_no_list_may_leave_either_end_of_the_band(table: SigmaTable) -> None:
+    """A loose part takes 18 % from all that is below its frequency or adds it above: the lines do not tell which."""
+    case = DrawnCase(900010, 72, None, WIDE)
+    assert list(case.description["effects"]) == ["rattle"]
+    report = diagnosis_report(parse(case.document()), table)
+    assert report["verdict"] == "unexplained"
+    assert report["d33"]["low"] < case.description["skin"]["d33_pc_per_n"] < report["d33"]["high"]

@@ -1,0 +1,44 @@
+"""Misses of the search: told where the hidden set was left out, and none where scatter of position misled it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pytest
+
+from proof.cases import DrawnCase
+from proof.search_misses import compared
+from proof.text_wide import is_miss
+from proof.true_starts import true_values
+from rig.wide_tails import WIDE
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.search import search
+
+MISLED = DrawnCase(900002, 29, "pair", WIDE)  # of a wrong thickness and gains of sensors, which alone look like scatter
+
+
+@pytest.mark.slow
+def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> None:
+    entry = compared(MISLED)
+    assert entry["found"] == entry["truth"] == ["sensor_spread", "thickness_error"]
+    assert not is_miss(entry)
+    assert abs(entry["lost_own"]) < 1.0
+
+
+@pytest.mark.slow
+def test_a_search_that_leaves_the_hidden_set_out_misses_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def shorter(problem: FittingProblem, known: Sequence[Explanation]) -> Search:
+        found = search(problem, known)
+        return replace(found, explanations=tuple(entry for entry in found.explanations if len(entry.names) < 2))
+
+    monkeypatch.setattr("proof.search_misses.search", shorter)
+    entry = compared(MISLED)
+    assert is_miss(entry)
+    assert entry["lost_own"] is None
+
+
+def test_true_values_are_in_the_terms_of_the_catalogue() -> None:
+    assert true_values("timing_delay", {"delay_us": 12.0}) == {"delay": 12.0}
+    assert true_values("misalignment", {"x_mm": 0.3, "y_mm": -0.4})["offset"] == pytest.approx(0.5)
+    assert true_values("ageing", {"law": "log", "rate": 0.2, "cycles": 500.0})["saturation"] == 0.0
+    assert true_values("layered_contact", {}) == {}

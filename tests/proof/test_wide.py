@@ -1,0 +1,72 @@
+"""Campaigns with wide tails, and the diagnosis under other priors: what is drawn, judged and put back."""
+
+from contextlib import suppress
+
+import pytest
+
+from proof.cases import DrawnCase
+from proof.coverage import held
+from proof.other_priors import Priors, other_priors
+from proof.text_wide import by_priors, by_subset
+from rig import strengths, wide_tails
+from rig.draw import drawn
+from rig.wide_tails import WIDE
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
+from underskin.diagnosis.selection.priors import PRIORS
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.campaign import parse
+
+
+def test_wide_tails_go_beyond_the_usual_ones_and_have_arrays_of_two() -> None:
+    usual, wide = ([drawn(11, number, "none", tails) for number in range(120)] for tails in ("usual", WIDE))
+    assert max(one["noise"]["gain"] for one in usual) <= 0.05 < max(one["noise"]["gain"] for one in wide) <= 0.08
+    assert max(one["noise"]["position_mm"] for one in wide) > 0.4
+    arrays = [one["skin"]["array"] for one in wide]
+    assert 0.3 < sum(one["columns"] * one["rows"] == 2 for one in arrays) / len(arrays) < 0.6
+    for name, ranges in strengths.of_frf(usual[0]).items():
+        for parameter, (low, high) in ranges.items():
+            lowest, highest = wide_tails.of_frf(usual[0])[name][parameter]
+            assert lowest <= low < high <= highest
+
+
+def test_a_case_of_wide_tails_has_a_name_of_its_own() -> None:
+    usual, wide = DrawnCase(11, 3, "none"), DrawnCase(11, 3, "none", WIDE)
+    assert usual.name != wide.name
+    assert usual.document() != wide.document()
+
+
+@pytest.mark.parametrize(("low", "high", "expected"), [(9.0, 11.0, True), (10.5, 11.0, False)])
+def test_an_interval_holds_the_true_d33_or_does_not(low: float, high: float, expected: bool) -> None:
+    case = DrawnCase(11, 3, "none", WIDE)
+    true = case.description["skin"]["d33_pc_per_n"]
+    stated = {"low": low * true / 10, "high": high * true / 10, "value": true, "quotable": True}
+    entry = held(case, {"verdict": "no_mismatch", "mechanisms": [], "d33": stated})
+    assert entry["held"] is expected
+    assert entry["off"] == pytest.approx(0.0)
+    assert held(case, {"verdict": "unexplained", "mechanisms": [], "d33": None})["held"] is None
+
+
+def test_other_priors_last_as_long_as_their_context() -> None:
+    campaign = parse(DrawnCase(11, 3, "none", WIDE).document())
+    mechanism = CATALOGUE["thickness_error"]
+    before = GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters_beside((), campaign, "frf")
+    with suppress(KeyError), other_priors(Priors(scatter=2.0, strengths=0.5, nothing=0.45)):
+        assert GAIN_PRIOR.high - GAIN_PRIOR.middle == pytest.approx(2 * (before[0][1] - GAIN_PRIOR.middle))
+        assert PRIORS["nothing_missing"] == 0.45
+        assert sum(PRIORS.values()) == pytest.approx(sum(before[1].values()))
+        (narrow,) = mechanism.parameters_beside((), campaign, "frf")
+        assert narrow.quantile(0.75) == pytest.approx(before[2][0].quantile(0.75) / 2, rel=0.05)
+        raise KeyError
+    assert before == (GAIN_PRIOR.row, dict(PRIORS), mechanism.parameters_beside((), campaign, "frf"))
+
+
+def test_tables_count_what_they_say() -> None:
+    entry = {"hidden": [], "verdict": "explained", "quotable": True, "sensors": 2, "held": True}
+    shown = by_subset([entry, {**entry, "held": False, "hidden": ["rattle"]}, {**entry, "held": None}])
+    assert "| all | 1 of 2" in shown
+    assert "| physics outside the catalogue hidden | 0 of 1" in shown
+    assert "| two sensors, nothing or effects of the catalogue hidden | 1 of 1" in shown
+    one = {"hidden": ["ageing"], "visible": True, "right": True, "alarm": True, "held": False}
+    quiet = {"hidden": [], "visible": True, "right": False, "alarm": True, "held": True}
+    row = by_priors({"own": [one, quiet]}).splitlines()[2]
+    assert [cell.split(":")[0].strip() for cell in row.split("|")[2:5]] == ["1 of 1", "1 of 1", "1 of 2"]
