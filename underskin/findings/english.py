@@ -79,6 +79,7 @@ ENGLISH: Mapping[Reason, Words] = {
     "place beside the sensor) lies beyond the tables: left out",
     Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
     "prediction is the table's edge",
+    Reason.CONTACTS_KEPT: sentences.contacts_kept,
     Reason.BEYOND_TABLE: "{limit}",
     Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
     "beyond measure",

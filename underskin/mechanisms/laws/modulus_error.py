@@ -6,6 +6,7 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import Conditions
 
+LARGEST_FACTOR = 4.0  # true over declared, or the inverse: beyond, another unit or material is more likely
 _REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"
 
 
@@ -26,7 +27,17 @@ class ModulusError(Mechanism):
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     needs = "a declared youngs_modulus_mpa"
     parameters_stated = (
-        Parameter("modulus_factor", "-", 0.25, 4.0, Normal(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=_REASON),
+        Parameter(
+            "modulus_factor",
+            "-",
+            1 / LARGEST_FACTOR,
+            LARGEST_FACTOR,
+            Normal(0.0, 0.6),
+            "log",
+            limit=1.0,
+            shown=0.7,
+            reason=_REASON,
+        ),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
