@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from proof import concealed, joint, left_out, own_curves, own_rig, paper_array, real, unlisted
+from proof import concealed, joint, left_out, own_curves, own_rig, paper_array, real, unlisted, wrong_modulus
 from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
@@ -88,6 +88,7 @@ PARTS: dict[str, Part] = {
     "quiet_unlisted": unlisted.judge_quiet_unlisted,
     "left_out": left_out.judge_left_out,
     "joint": joint.judge_joint,
+    "wrong_modulus": wrong_modulus.judge_wrong_modulus,
 }
 
 

@@ -14,6 +14,7 @@ from proof.text_curves import curves, quiet_curves
 from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_unlisted import alarms, hidden, left_out
+from proof.text_wrong_modulus import wrong_modulus
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -48,6 +49,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "quiet_unlisted": alarms,
         "left_out": left_out,
         "joint": joint,
+        "wrong_modulus": wrong_modulus,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -13,8 +13,8 @@ from underskin.units import Floats
 class Inspected:
     """The recordings that can be used and the findings; what is `lacking` where nothing can be concluded from them.
 
-    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `beyond` are the ids of those
-    whose contacts lie beyond the tables as declared, and within them by a plausible modulus.
+    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `beyond` are the ids of
+    those whose contacts lie beyond the tables as declared, and within them by a plausible modulus.
     """
 
     campaign: Campaign

@@ -53,15 +53,19 @@ def within_tables(
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
         return inside, beyond, [none_inside, *_possible_unit_errors(whole, table)]
-    return inside, beyond, [
-        Finding(
-            Reason.OUT_OF_TABLES_DECLARED,
-            entries[number].id,
-            "preload_n",
-            {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
-        )
-        for number in np.flatnonzero(~(inside | beyond))
-    ]
+    return (
+        inside,
+        beyond,
+        [
+            Finding(
+                Reason.OUT_OF_TABLES_DECLARED,
+                entries[number].id,
+                "preload_n",
+                {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
+            )
+            for number in np.flatnonzero(~(inside | beyond))
+        ],
+    )
 
 
 def _inside(model: Model, recordings: int) -> Mask:

@@ -7,7 +7,7 @@ from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.conditions import Conditions
 
 LARGEST_FACTOR = 4.0  # true over declared, or the inverse: beyond, another unit or material is more likely
-_REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"
+_REASON = "E from a durometer, a data sheet or another cure is off by tens of percent, at times by a factor of 2 to 4"
 
 
 class ModulusError(Mechanism):

@@ -6,9 +6,9 @@ shape puts there, by its Hankel integral (underskin/physics/hankel_transform.py)
 
     σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
 
-A contact beyond the table is reported in `inside`. Beyond its L it is continued along the tangent, beyond its a/h along
-the tangent over 1/a², as which the pressure under a wide contact falls; beyond the profile's end, r/h = 8, the stress is
-0 (below 1e-6 of its peak).
+A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond its
+a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to a/h =
+4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of its peak).
 """
 
 from functools import cached_property, lru_cache
