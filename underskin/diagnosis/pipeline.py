@@ -121,6 +121,8 @@ def _of_frf(
     joined: Joined | None = None
     while not inspected.lacking:
         joined = _searched(inspected, table, mechanisms, others)
+        if not inspected.beyond:
+            break
         kept = inspected.beyond & within_as_found(joined.problem, joined.search)
         if kept == inspected.beyond:
             break

@@ -20,7 +20,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_si
 
-_ENOUGH = 0.5  # of the contacts within the tables: then a slip is worth naming
+_ENOUGH = 0.5  # of the contacts within the tables: then a slip, or a wrong modulus, is worth naming
 
 Mask = NDArray[np.bool_]
 Undo = Callable[[Campaign, float], Campaign]
@@ -32,7 +32,7 @@ def within_tables(
     """Which contacts lie within the tables as declared, which others are kept, and the findings on the rest.
 
     `kept` are the recordings whose contacts are known to lie within the tables; None: where a plausible modulus brings
-    them there.
+    them there. Where none lies within as declared, that modulus must bring most of them there.
     """
     inside = _inside(model, len(entries))
     whole = replace(campaign, recordings=tuple(entries))
@@ -40,7 +40,9 @@ def within_tables(
     if not inside.all():
         stiffest = _skin_times("youngs_modulus_mpa")(whole, LARGEST_FACTOR)
         known = np.array([kept is None or entry.id in kept for entry in entries])
-        beyond = ~inside & known & _inside(compose((), stiffest, table, "frf"), len(entries))
+        reached = _inside(compose((), stiffest, table, "frf"), len(entries))
+        if inside.any() or reached.mean() > _ENOUGH:
+            beyond = ~inside & known & reached
     skin = campaign.skin
     assert skin.thickness_mm is not None
     assert skin.youngs_modulus_mpa is not None
