@@ -36,13 +36,11 @@ def within_tables(
     """
     inside = _inside(model, len(entries))
     whole = replace(campaign, recordings=tuple(entries))
-    beyond = np.zeros_like(inside)
-    if not inside.all():
-        stiffest = _skin_times("youngs_modulus_mpa")(whole, LARGEST_FACTOR)
-        known = np.array([kept is None or entry.id in kept for entry in entries])
-        reached = _inside(compose((), stiffest, table, "frf"), len(entries))
-        if inside.any() or reached.mean() > _ENOUGH:
-            beyond = ~inside & known & reached
+    beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(whole, table)
+    if not inside.any() and beyond.mean() <= _ENOUGH:
+        beyond[:] = False
+    if kept is not None:
+        beyond &= [entry.id in kept for entry in entries]
     skin = campaign.skin
     assert skin.thickness_mm is not None
     assert skin.youngs_modulus_mpa is not None
@@ -55,24 +53,27 @@ def within_tables(
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
         return inside, beyond, [none_inside, *_possible_unit_errors(whole, table)]
-    return (
-        inside,
-        beyond,
-        [
-            Finding(
-                Reason.OUT_OF_TABLES_DECLARED,
-                entries[number].id,
-                "preload_n",
-                {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
-            )
-            for number in np.flatnonzero(~(inside | beyond))
-        ],
-    )
+    left_out = [
+        Finding(
+            Reason.OUT_OF_TABLES_DECLARED,
+            entries[number].id,
+            "preload_n",
+            {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
+        )
+        for number in np.flatnonzero(~(inside | beyond))
+    ]
+    return inside, beyond, left_out
 
 
 def _inside(model: Model, recordings: int) -> Mask:
     inside: Mask = model.valid[np.searchsorted(model.recording, np.arange(recordings))]
     return inside
+
+
+def _inside_where_stiffest(campaign: Campaign, table: SigmaTable) -> Mask:
+    """Which contacts lie within the tables by the largest modulus that is plausible: contacts are narrowest then."""
+    stiffest = _skin_times("youngs_modulus_mpa")(campaign, LARGEST_FACTOR)
+    return _inside(compose((), stiffest, table, "frf"), len(campaign.recordings))
 
 
 def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:
