@@ -79,11 +79,11 @@ def test_contacts_kept_are_told(made: Campaign, table: SigmaTable) -> None:
 @pytest.mark.slow
 def test_a_campaign_of_which_no_contact_lies_within_is_explained(table: SigmaTable) -> None:
     hard = campaign(replace(WIDE, preloads_n=(1.0, 1.25, 1.5, 1.8), spheres_mm=(4.0,), repeats=2), table)
-    report = diagnosis_report(declared(hard, 0.3), table)
+    report = diagnosis_report(declared(hard, TRUE_MPA / 3.3), table)
     assert report["verdict"] != "insufficient_data"
     assert "modulus_error" in {name for group in report["presence"][:1] for name in group["mechanisms"]}
     (kept,) = (entry for entry in report["findings"] if entry["code"] == "contacts_kept")
-    assert "16 of 16 contacts" in kept["statement"]
+    assert "32 of 32 contacts" in kept["statement"]
 
 
 @pytest.mark.slow
