@@ -18,6 +18,7 @@ from proof import (
     search_misses,
     sensitivity,
     unlisted,
+    wrong_modulus,
 )
 from proof.cases import DrawnCase, MadeCase
 from proof.stored import Work, of_each, reports, sources, stored
@@ -103,6 +104,7 @@ PARTS: dict[str, Part] = {
     "search": search_misses.judge_search,
     "coverage": coverage.judge_coverage,
     "sensitivity": sensitivity.judge_sensitivity,
+    "wrong_modulus": wrong_modulus.judge_wrong_modulus,
 }
 
 

@@ -15,6 +15,7 @@ from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_unlisted import alarms, hidden, left_out
 from proof.text_wide import coverage, search_misses, sensitivity
+from proof.text_wrong_modulus import wrong_modulus
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -52,6 +53,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "coverage": coverage,
         "search": search_misses,
         "sensitivity": sensitivity,
+        "wrong_modulus": wrong_modulus,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -20,6 +20,7 @@ from tests.mechanisms.mechanism_contacts import (
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted, table
 from tests.support.oracle import NEEDS_ORACLE
 from tests.support.sphere_contact import SphereOnLayer
+from underskin.mechanisms import compose
 from underskin.physics import hertz
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import hertz_transform, normal_stress, punch_transform
@@ -41,6 +42,24 @@ def test_a_moving_edge_has_the_published_ratios() -> None:
         recording = linear_contact(a)
         moving = level(["moving_contact_edge"], recording, mobile_fraction=1.0)
         assert (moving / level([], recording)).real == pytest.approx(ratio, abs=6e-4)
+
+
+def test_a_contact_wider_than_the_table_is_continued_as_wide_contacts_transmit() -> None:
+    """The pressure under a contact that is wide beside the thickness falls as 1/a²."""
+    for a, allowed in ((3.0, 1e-4), (3.2, 2e-3), (3.6, 1e-2), (4.2, 3e-2)):
+        exact = normal_stress(transmission, hertz_transform, a, RHO)
+        assert level([], linear_contact(a)).real == pytest.approx(float(exact), rel=allowed)
+
+
+def test_a_contact_wider_than_the_table_has_the_derivative_of_its_continuation() -> None:
+    model = compose(["modulus_error"], campaign([linear_contact(3.5)]), table())
+    fit = np.array([entry.start for entry in model.parameters])
+    step = np.zeros_like(fit)
+    step[[entry.name for entry in model.parameters].index("modulus_factor")] = 1e-5
+    there = model.predict(fit)
+    beside = model.predict(fit + step).value - model.predict(fit - step).value
+    assert not there.inside.any()
+    assert there.slopes[step > 0][0] == pytest.approx(beside / 2e-5, rel=1e-6)
 
 
 def test_half_a_moving_edge_is_half_way() -> None:

@@ -10,6 +10,7 @@ import scipy
 
 import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.data.inspected import Inspected
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
 from underskin.diagnosis.localisation.effect_size import EffectSize, effect
@@ -25,7 +26,8 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.kinds_together import Others
+from underskin.diagnosis.selection.contacts_beyond import within_as_found
+from underskin.diagnosis.selection.kinds_together import Joined, Others
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.search import search
@@ -116,10 +118,25 @@ def _of_frf(
 ) -> DiagnosisResult:
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
+    joined: Joined | None = None
+    while not inspected.lacking:
+        joined = _searched(inspected, table, mechanisms, others)
+        if not inspected.beyond:
+            break
+        kept = inspected.beyond & within_as_found(joined.problem, joined.search)
+        if kept == inspected.beyond:
+            break
+        inspected = inspect(replace(campaign, recordings=frf), table, kept)
     begun = begun.with_findings(*inspected.findings)
-    if inspected.lacking:
+    if joined is None or inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
+    problem, result = joined.problem, joined.search
+    result = replace(result, laws=tuple(with_laws(problem, result)))
+    return _work_out(replace(begun, joined=joined), problem, result, progress, limits)
 
+
+def _searched(inspected: Inspected, table: SigmaTable, mechanisms: Known, others: Others) -> Joined:
+    """The search on FRFs, with what other kinds tell."""
     alone, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
 
     def fitted(beside: Beside | None, asked_for: Sequence[frozenset[str]]) -> tuple[FittingProblem, Search]:
@@ -129,10 +146,7 @@ def _of_frf(
         problem = FittingProblem(alone.lines, table, beside)
         return problem, search(problem, asked_for=asked_for)
 
-    joined = others.joined(fitted)
-    problem, result = joined.problem, joined.search
-    result = replace(result, laws=tuple(with_laws(problem, result)))
-    return _work_out(replace(begun, joined=joined), problem, result, progress, limits)
+    return others.joined(fitted)
 
 
 def _of_curves(

@@ -78,7 +78,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.OUT_OF_TABLES_DECLARED: "its contact (radius {radius_mm:.3g} mm on a layer of {thickness_mm:g} mm, at its "
     "place beside the sensor) lies beyond the tables: left out",
     Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
-    "prediction is the table's edge",
+    "prediction is continued from the table's edge",
+    Reason.CONTACTS_KEPT: sentences.contacts_kept,
     Reason.BEYOND_TABLE: "{limit}",
     Reason.PLACE_BEYOND_TABLE: "its position is farther from the sensor than the table reaches, or its lines scatter "
     "beyond measure",

@@ -13,10 +13,12 @@ from underskin.units import Floats
 class Inspected:
     """The recordings that can be used and the findings; what is `lacking` where nothing can be concluded from them.
 
-    `uneven` is how uneven the noise of the lines of time series is, by the recording's id.
+    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `beyond` are the ids of
+    those whose contacts lie beyond the tables as declared, and within them by a plausible modulus.
     """
 
     campaign: Campaign
     findings: Sequence[Finding]
     lacking: Lacking | None = None
     uneven: Mapping[str, Floats] = field(default_factory=dict)
+    beyond: frozenset[str] = frozenset()

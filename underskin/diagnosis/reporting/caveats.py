@@ -11,6 +11,7 @@ _DECISIVE = (
     *(FindingCode.SENSORS_EXCHANGED, FindingCode.WEAK, FindingCode.CONJUGATED, FindingCode.GAIN_STEPS),
     FindingCode.WARM_UP,
     *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
+    FindingCode.CONTACTS_KEPT,
     *(FindingCode.IMPLAUSIBLE_D33, FindingCode.DUPLICATED_RECORDING),
     *(FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.NO_SIMPLE_LAW),
     FindingCode.IMITATED,

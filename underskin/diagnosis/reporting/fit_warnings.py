@@ -17,10 +17,10 @@ _STIFFENS = ("strain_stiffening", "compressible_layer")  # with depth, as a laye
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """Parameters at their bounds, recordings beyond the tables, noise that is larger than the lines' own, and a layer
-    that could not be tried."""
+    """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
+    lines' own, and a layer that could not be tried."""
     found = [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
-    return [*found, *_of_unknown_thickness(problem, explanation)]
+    return [*found, *_kept(problem, explanation), *_of_unknown_thickness(problem, explanation)]
 
 
 def _at_bounds(explanation: Explanation) -> list[Finding]:
@@ -49,6 +49,26 @@ def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Fi
         Finding(Reason.OUT_OF_TABLES_FITTED, entries[number].id, "preload_n", {"answer": answer})
         for number in outside.tolist()
     ]
+
+
+def _kept(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    """On contacts that lie within the tables as found, and beyond them as declared."""
+    if problem.kind != "frf":
+        return []
+    best, skin = explanation.best, problem.lines.campaign.skin
+    kept = np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~explanation.model.valid])
+    if not len(kept):
+        return []
+    assert skin.youngs_modulus_mpa is not None
+    factor = dict(zip([entry.name for entry in explanation.model.parameters], explanation.point.fit, strict=True))
+    arguments = {
+        "contacts": len(kept),
+        "recordings": problem.lines.recordings,
+        "declared_mpa": skin.youngs_modulus_mpa,
+        "found_mpa": skin.youngs_modulus_mpa * float(np.exp(factor.get("modulus_factor", 0.0))),
+        "answer": in_words([in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]),
+    }
+    return [Finding(Reason.CONTACTS_KEPT, "", "skin.youngs_modulus_mpa", arguments)]
 
 
 def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:

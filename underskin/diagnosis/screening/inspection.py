@@ -4,7 +4,7 @@ Recordings that contradict the others (copies, reversed signs, units off by 1000
 findings. They are left out of the diagnosis, or corrected where the error is plain (a sensor of reversed sign).
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,18 +33,24 @@ _SAME = 1e-4  # relative difference of copies: files round numbers to some digit
 _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
 
 
-def inspect(campaign: Campaign, table: SigmaTable) -> Inspected:
-    """The campaign without what cannot be used, reversed sensors put right, and the findings."""
+def inspect(campaign: Campaign, table: SigmaTable, kept: Collection[str] | None = None) -> Inspected:
+    """The campaign without what cannot be used, reversed sensors put right, and the findings.
+
+    Of the recordings whose contacts lie beyond the tables as declared, those `kept` stay (ids); None: all that a
+    plausible modulus brings within.
+    """
     recorded = frf_recordings(campaign) if campaign.recordings else ()
     series = as_lines(recorded, units_checked=campaign.units_checked)
     if series.doubtful:
         return _inspected(campaign, [], series.doubtful, _impossible(series.doubtful, confirmable=True))
-    inspected = _inspect_lines(campaign, series.entries, table)
+    inspected = _inspect_lines(campaign, series.entries, table, kept)
     findings = as_given(recorded, [*series.findings, *inspected.findings])
     return replace(inspected, findings=findings, uneven=series.uneven)
 
 
-def _inspect_lines(campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> Inspected:
+def _inspect_lines(
+    campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable, kept: Collection[str] | None
+) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
     entries, copies = _without_copies(with_lines)
     off, unit_errors = single_unit_errors(entries)
@@ -62,12 +68,13 @@ def _inspect_lines(campaign: Campaign, recorded: Sequence[FrfRecording], table: 
     findings += [*_constant_axes(entries), *faint_oscillation(entries)]
     entries, of_phase = in_one_convention(entries)
     entries, of_sensors = without_exchanges(campaign, entries, table)
-    consistent = against_model(campaign, entries, table)
+    consistent = against_model(campaign, entries, table, kept)
     findings += [*of_phase, *of_sensors, *consistent.findings]
     if consistent.lacking is not None:
         return _inspected(campaign, consistent.entries, findings, consistent.lacking)
     entries, of_levels = without_level_slips(campaign, consistent.entries, table)
-    return _inspected(campaign, entries, [*findings, *of_levels])
+    inspected = _inspected(campaign, entries, [*findings, *of_levels])
+    return replace(inspected, beyond=consistent.beyond & {entry.id for entry in entries})
 
 
 def _inspected(

@@ -4,6 +4,7 @@ Only the level of each recording over the prediction of the base model is compar
 a response, or where little is predicted (near a zero crossing), have none.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,21 +34,28 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Consistent:
-    """The recordings that can be used, reversed ones put right, the findings, and what is `lacking` where none can."""
+    """The recordings that can be used, reversed ones put right, the findings, and what is `lacking` where none can.
+
+    `beyond` are the ids of those whose contacts lie beyond the tables as declared.
+    """
 
     entries: list[FrfRecording]
     findings: list[Finding]
     lacking: Lacking | None = None
+    beyond: frozenset[str] = frozenset()
 
 
-def against_model(campaign: Campaign, entries: list[FrfRecording], table: SigmaTable) -> Consistent:
-    """The recordings held against the base model."""
+def against_model(
+    campaign: Campaign, entries: list[FrfRecording], table: SigmaTable, kept: Collection[str] | None
+) -> Consistent:
+    """The recordings held against the base model; `kept` as for `within_tables`."""
     unresponsive, variance = no_response(entries)
     if unresponsive.all():
         finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(entries)})
         return Consistent([], [finding], Lacking(Lack.NO_RESPONSE))
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
-    inside, findings = within_tables(campaign, entries, model, table)
+    inside, beyond, findings = within_tables(campaign, entries, model, table, kept)
+    inside |= beyond
     ratio, expected = _apparent(entries, model, inside & ~unresponsive)
     lost, dead_findings = dead(entries, unresponsive & inside, variance, expected)
     findings += dead_findings
@@ -63,7 +71,8 @@ def against_model(campaign: Campaign, entries: list[FrfRecording], table: SigmaT
     findings += [*off_findings, *_of_all(ratio, campaign.skin.d33_pc_per_n), *found.findings]
     usable &= found.signs != 0
     entries = [_reversed(entry) if sign < 0 else entry for entry, sign in zip(entries, found.signs, strict=True)]
-    return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings)
+    far = frozenset(entry.id for entry, chosen in zip(entries, usable & beyond, strict=True) if chosen)
+    return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings, beyond=far)
 
 
 def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats]:

@@ -1,6 +1,11 @@
-"""Which contacts lie within the tables as declared, and the slip of units that would explain that none does."""
+"""Which contacts lie within the tables as declared, and the slip of units that would explain that none does.
 
-from collections.abc import Callable
+Where the declared modulus is too small, contacts are computed wider and harder pressed than they were. Those that a
+plausible modulus brings within the tables are not left out before the fit has told E; until then they are predicted by
+continuation of the tables (mechanisms/models/off_centre_response.py).
+"""
+
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -8,23 +13,34 @@ from numpy.typing import NDArray
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.laws.modulus_error import LARGEST_FACTOR
 from underskin.mechanisms.models.composed import Model, compose
 from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_si
 
-_ENOUGH = 0.5  # of the contacts within the tables: then a slip is worth naming
+_ENOUGH = 0.5  # of the contacts within the tables: then a slip, or a wrong modulus, is worth naming
 
 Mask = NDArray[np.bool_]
 Undo = Callable[[Campaign, float], Campaign]
 
 
 def within_tables(
-    campaign: Campaign, entries: list[FrfRecording], model: Model, table: SigmaTable
-) -> tuple[Mask, list[Finding]]:
-    """Which contacts lie within the tables as declared, and the findings on the others."""
+    campaign: Campaign, entries: list[FrfRecording], model: Model, table: SigmaTable, kept: Collection[str] | None
+) -> tuple[Mask, Mask, list[Finding]]:
+    """Which contacts lie within the tables as declared, which others are kept, and the findings on the rest.
+
+    `kept` are the recordings whose contacts are known to lie within the tables; None: where a plausible modulus brings
+    them there. Where none lies within as declared, that modulus must bring most of them there.
+    """
     inside = _inside(model, len(entries))
+    whole = replace(campaign, recordings=tuple(entries))
+    beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(whole, table)
+    if not inside.any() and beyond.mean() <= _ENOUGH:
+        beyond[:] = False
+    if kept is not None:
+        beyond &= [entry.id in kept for entry in entries]
     skin = campaign.skin
     assert skin.thickness_mm is not None
     assert skin.youngs_modulus_mpa is not None
@@ -32,25 +48,32 @@ def within_tables(
     sphere = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries])
     modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
     radius_mm = 1e3 * hertz.contact_radius(force, sphere, modulus, skin.poisson_ratio)
-    if not inside.any():
+    if not (inside | beyond).any():
         ratios = radius_mm / skin.thickness_mm
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
-        return inside, [none_inside, *_possible_unit_errors(replace(campaign, recordings=tuple(entries)), table)]
-    return inside, [
+        return inside, beyond, [none_inside, *_possible_unit_errors(whole, table)]
+    left_out = [
         Finding(
             Reason.OUT_OF_TABLES_DECLARED,
             entries[number].id,
             "preload_n",
             {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
         )
-        for number in np.flatnonzero(~inside)
+        for number in np.flatnonzero(~(inside | beyond))
     ]
+    return inside, beyond, left_out
 
 
 def _inside(model: Model, recordings: int) -> Mask:
     inside: Mask = model.valid[np.searchsorted(model.recording, np.arange(recordings))]
     return inside
+
+
+def _inside_where_stiffest(campaign: Campaign, table: SigmaTable) -> Mask:
+    """Which contacts lie within the tables by the largest modulus that is plausible: contacts are narrowest then."""
+    stiffest = _skin_times("youngs_modulus_mpa")(campaign, LARGEST_FACTOR)
+    return _inside(compose((), stiffest, table, "frf"), len(campaign.recordings))
 
 
 def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:

@@ -6,7 +6,8 @@ from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 from underskin.recordings.conditions import Conditions
 
-_REASON = "E from a durometer, a data sheet or another cure is off by tens of percent"
+LARGEST_FACTOR = 4.0  # true over declared, or the inverse: beyond, another unit or material is more likely
+_REASON = "E from a durometer, a data sheet or another cure is off by tens of percent, at times by a factor of 2 to 4"
 
 
 class ModulusError(Mechanism):
@@ -27,7 +28,15 @@ class ModulusError(Mechanism):
     needs = "a declared youngs_modulus_mpa"
     parameters_stated = (
         Parameter(
-            "modulus_factor", "-", 0.25, 4.0, HeavyTailed(0.0, 0.35), "log", limit=1.0, shown=0.7, reason=_REASON
+            "modulus_factor",
+            "-",
+            1 / LARGEST_FACTOR,
+            LARGEST_FACTOR,
+            HeavyTailed(0.0, 0.35),
+            "log",
+            limit=1.0,
+            shown=0.7,
+            reason=_REASON,
         ),
     )
 

@@ -1,0 +1,96 @@
+"""A declared modulus that is wrong by a factor of 2 to 4, and contacts that it puts beyond the tables."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.screening.inspection import inspect
+from underskin.recordings.campaign import Campaign, frf_recordings
+from underskin.surrogate.sigma_table import SigmaTable
+
+TRUE_MPA = 1.2
+WIDE = Made(
+    modulus_mpa=TRUE_MPA,
+    thickness_mm=1.5,
+    preloads_n=(0.25, 0.5, 1.0, 1.9),
+    spheres_mm=(4.0, 8.0),
+    offsets_mm=(0.0, 1.0),  # which tell a wrong place from a wrong modulus
+)
+
+
+@pytest.fixture(scope="module")
+def made(table: SigmaTable) -> Campaign:
+    return campaign(WIDE, table)
+
+
+def declared(made: Campaign, modulus_mpa: float) -> Campaign:
+    return replace(made, skin=replace(made.skin, youngs_modulus_mpa=modulus_mpa))
+
+
+def stated(report: dict[str, Any], name: str) -> dict[str, Any]:
+    (found,) = (entry for one in report["mechanisms"] for entry in one["parameters"] if entry["name"] == name)
+    return dict(found)
+
+
+def codes(report: dict[str, Any]) -> list[str]:
+    return [entry["code"] for entry in report["findings"]]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [3.3, 0.4])
+def test_a_factor_beyond_two_is_named_and_found(factor: float, made: Campaign, table: SigmaTable) -> None:
+    report = diagnosis_report(declared(made, TRUE_MPA / factor), table)
+    assert "modulus_error" in {entry["name"] for entry in report["mechanisms"]}
+    found = stated(report, "modulus_factor")
+    assert found["low"] <= factor <= found["high"]
+    assert found["value"] == pytest.approx(factor, rel=0.1)
+
+
+def test_contacts_that_a_plausible_modulus_brings_within_the_tables_stay(made: Campaign, table: SigmaTable) -> None:
+    """L = F/(R²E) of 1.9 N on 4 mm is 0.1 at 1.2 MPa, the tables' end; at a quarter of that 0.4."""
+    every = {entry.id for entry in made.recordings}
+    right = inspect(declared(made, 1.01 * TRUE_MPA), table)
+    assert not right.beyond
+    soft = inspect(declared(made, TRUE_MPA / 3.3), table)
+    assert {entry.id for entry in soft.campaign.recordings} == every
+    entries = frf_recordings(soft.campaign)
+    loads = {entry.id: entry.preload_n / (entry.indenter_radius_mm**2 * TRUE_MPA / 3.3) for entry in entries}
+    assert soft.beyond == {name for name, load in loads.items() if load > 0.1}
+    some = sorted(soft.beyond)[:2]
+    kept = inspect(declared(made, TRUE_MPA / 3.3), table, some)
+    assert kept.beyond == set(some)
+    assert {entry.id for entry in kept.campaign.recordings} == every - soft.beyond | set(some)
+    left_out = {entry.recording for entry in kept.findings if entry.code == "out_of_domain"}
+    assert left_out == soft.beyond - set(some)
+
+
+@pytest.mark.slow
+def test_contacts_kept_are_told(made: Campaign, table: SigmaTable) -> None:
+    report = diagnosis_report(declared(made, TRUE_MPA / 3.3), table)
+    (kept,) = (entry for entry in report["findings"] if entry["code"] == "contacts_kept")
+    assert "out_of_domain" not in codes(report)
+    assert "8 of 32 contacts lie beyond the tables" in kept["statement"]
+    assert kept["statement"][1:] in report["statement"]
+
+
+@pytest.mark.slow
+def test_a_campaign_of_which_no_contact_lies_within_is_explained(table: SigmaTable) -> None:
+    hard = campaign(replace(WIDE, preloads_n=(1.0, 1.25, 1.5, 1.8), spheres_mm=(4.0,), repeats=2), table)
+    report = diagnosis_report(declared(hard, TRUE_MPA / 3.3), table)
+    assert report["verdict"] != "insufficient_data"
+    assert "modulus_error" in {name for group in report["presence"][:1] for name in group["mechanisms"]}
+    (kept,) = (entry for entry in report["findings"] if entry["code"] == "contacts_kept")
+    assert "32 of 32 contacts" in kept["statement"]
+
+
+@pytest.mark.slow
+def test_where_the_modulus_is_right_contacts_beyond_the_tables_are_left_out(table: SigmaTable) -> None:
+    """L up to 0.17, as declared: no answer that stands brings these within."""
+    made = campaign(replace(WIDE, preloads_n=(0.25, 0.5, 1.0, 3.2)), table)
+    report = diagnosis_report(made, table)
+    assert report["verdict"] == "no_mismatch"
+    assert codes(report).count("out_of_domain") == 4
+    assert "contacts_kept" not in codes(report)
