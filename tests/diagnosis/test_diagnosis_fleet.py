@@ -38,6 +38,7 @@ def sisters(count: int) -> dict[str, list[Campaign]]:
     return {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(count)}
 
 
+@pytest.mark.slow
 def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_the_others(table: SigmaTable) -> None:
     fleet = diagnose_fleet(sisters(2) | {"weak": [made("weak", seed=40, d33=9.0)]}, table, "batch")
     d33 = population(fleet, "d33")
@@ -50,6 +51,7 @@ def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_t
     assert all(entry["low"] < truth[entry["skin"]] < entry["high"] for entry in d33["skins"])
 
 
+@pytest.mark.slow
 def test_of_many_skins_two_that_depart_are_named(table: SigmaTable) -> None:
     skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in range(5)}
     skins |= {"weak": [made("c8", seed=40, d33=9.0)], "strong": [made("c9", seed=41, d33=20.0)]}
@@ -71,26 +73,29 @@ def test_a_skin_of_another_modulus_departs_in_that_while_its_d33_stays(table: Si
         assert own["low"] < truth < own["high"]
 
 
+@pytest.mark.slow
 def test_a_skin_of_another_thickness_departs_in_that(table: SigmaTable) -> None:
-    thick = made("thick", seed=40, effects={"thickness_error": {"factor": 1.2}})
-    fleet = diagnose_fleet(sisters(3) | {"thick": [thick]}, table, "batch")
-    assert departures(fleet) == {"thick"}
-    assert likeliest(fleet, "thick") == "thickness"
+    thin = made("thin", seed=40, effects={"thickness_error": {"factor": 0.8}})
+    fleet = diagnose_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
+    assert departures(fleet) == {"thin"}
+    assert likeliest(fleet, "thin") == "thickness"
     (entry,) = fleet["mechanisms"]
-    assert (entry["name"], entry["scope"]) == ("thickness_error", {"skins": ["thick"]})
-    own = next(one for one in population(fleet, "thickness")["skins"] if one["skin"] == "thick")
-    assert own["low"] < 1.2 * 2.5 < own["high"]
+    assert (entry["name"], entry["scope"]) == ("thickness_error", {"skins": ["thin"]})
+    own = next(one for one in population(fleet, "thickness")["skins"] if one["skin"] == "thin")
+    assert own["low"] < 0.8 * 2.5 < own["high"]
 
 
+@pytest.mark.slow
 def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: SigmaTable) -> None:
-    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, modulus=7.0)] for n in range(3)}
+    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, modulus=32.0)] for n in range(3)}
     fleet = diagnose_fleet(skins, table, "batch")
     assert departures(fleet) == set()
     (entry,) = fleet["mechanisms"]
     assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
-    assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(7.0, rel=0.15)
+    assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(32.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable) -> None:
     skins = {
         f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=d33, modulus=modulus)]
@@ -104,10 +109,10 @@ def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable)
 
 @pytest.mark.slow
 def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
-    """Alone its interval is wider than with them, and over twenty draws the pooled one holds the true d33."""
+    """Alone its interval is wider than with them, and over ten draws the pooled one holds the true d33."""
     fewer, held = [], []
     three = sisters(3)
-    for seed in range(20):
+    for seed in range(10):
         whole = made("few", seed=60 + seed)
         few = replace(whole, recordings=whole.recordings[:2])
         fleet = diagnose_fleet(three | {"few": [few]}, table, "batch")
@@ -115,10 +120,11 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: Sigma
         held.append(own["low"] < 14.0 < own["high"])
         alone = report(diagnose(few, table))["d33"]
         fewer.append(alone is None or own["high"] / own["low"] < alone["high"] / alone["low"])
-    assert sum(held) >= 17  # of 20 at 95 %: less is as probable as 0.3 %
+    assert sum(held) >= 8  # less is as probable as 1 %, at 95 % each
     assert np.mean(fewer) > 0.5
 
 
+@pytest.mark.slow
 def test_strengths_of_a_mechanism_that_all_have_are_a_population(table: SigmaTable) -> None:
     skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, effects=HEAVY_TIP)] for n in range(3)}
     fleet = diagnose_fleet(skins, table, "batch")

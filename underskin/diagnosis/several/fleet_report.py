@@ -47,7 +47,9 @@ def fleet_report(
     undescribed = {skin: one.undescribed for skin, one in fleet.candidates.items()}
     unexplained = [skin for skin, share in undescribed.items() if share > STATED]
     described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
-    probability = 1 - described if unexplained else fleet.common.probability * described
+    wrongly = max(fleet.declared_wrongly.values(), default=0.0)
+    declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
+    probability = 1 - described if unexplained else fleet.common.probability * declared * described
     d33 = next(entry for entry in populations if entry["parameter"] == D33)
     return {
         "schema": SCHEMA,
