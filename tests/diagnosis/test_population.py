@@ -16,7 +16,7 @@ SPREADS = (Spread(0.03, 2.0), Spread(0.03, 2.0))
 
 def states(mean: Floats, covariance: Floats) -> list[State]:
     """Of a skin whose recordings say this of two quantities; it may depart in either."""
-    precision = np.linalg.inv(covariance)
+    precision: Floats = np.linalg.inv(covariance).astype(np.float64)
     said = Knowledge(precision, precision @ mean, float(-0.5 * mean @ precision @ mean))
     far = np.eye(2) * FAR**2
     return [State(REGULAR, said, np.zeros(2)), State("first", said, far[0]), State("second", said, far[1])]
@@ -95,7 +95,7 @@ def test_a_posterior_and_its_likelihood_say_the_same() -> None:
     random = np.random.default_rng(1)
     spread = random.normal(size=(3, 3))
     precision, centre, mean = np.array([1.0, 4.0, 2.0]), random.normal(size=3), random.normal(size=3)
-    covariance = np.linalg.inv(np.diag(precision) + spread @ spread.T + np.eye(3))
+    covariance: Floats = np.linalg.inv(np.diag(precision) + spread @ spread.T + np.eye(3)).astype(np.float64)
     said = of_posterior(-3.2, mean, covariance, centre, precision)
     again, of_it = posterior(said, centre, precision)
     assert np.allclose(again, mean)

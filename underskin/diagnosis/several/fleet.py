@@ -30,7 +30,7 @@ _LEAST_SKINS = 3
 _DECLARED = (0.02, 0.01)  # deviations of ln of the make's E and thickness about the declared ones
 # Pieces of one cure and of one poled film differ by some percent; a mould's thickness is held
 _FAR_OFF = 2.0  # deviations by which skins must be off together for an error of what is declared of all to be looked at
-_SPREADS = (Spread(0.03, 2.0), Spread(0.01, 1.0), Spread(0.03, 2.0))
+SPREADS = (Spread(0.03, 2.0), Spread(0.01, 1.0), Spread(0.03, 2.0))
 
 
 def diagnose_fleet(
@@ -112,7 +112,7 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     makes, errors = _makes(best.skins, odds)
     if best.error:
         makes, errors = [makes[errors.index(best.error)]], [best.error]
-    pooled = populations(states, makes, _SPREADS)
+    pooled = populations(states, makes, SPREADS)
     declared_wrongly = {
         error: float(share * shares.max()) for error, share in zip(errors, pooled.makes, strict=True) if error
     }
@@ -125,7 +125,7 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
     means, variances = (np.array([one[part] for one in each if one is not None]) for part in (0, 1))
     if len(means) < len(skins):
         return 0.0, 0.0
-    precision = 1 / (variances + _SPREADS[row].usual ** 2)
+    precision = 1 / (variances + SPREADS[row].usual ** 2)
     return float(precision @ means / precision.sum()), float(precision.sum() ** -0.5)
 
 
