@@ -71,8 +71,8 @@ def _of_skins(entries: Sequence[Result]) -> str:
     return (
         f"Of {len(entries)} fleets of three to six skins {len(odd)} have one that departs in E, thickness or d33. It "
         f"is named in {_of(visible)} of those in which that shows. An ideal diagnosis, which owns the rig's equations "
-        f"and noise but not the make's mean and spread, names {_of(told)} of all; of these the departing skin is named in "
-        f"{_of(ideal)}. Another skin is said to depart in {_of(false)} of the fleets; the pooled d33 is held by its "
+        f"and noise but not the make's mean and spread, names {_of(told)} of all; of these the departing skin is named "
+        f"in {_of(ideal)}. Another skin is said to depart in {_of(false)} of the fleets; the pooled d33 is held by its "
         f"interval in {_of(held)}.\n"
     )
 
