@@ -18,13 +18,13 @@ def recorded(
 
 
 def document(
-    effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0
+    effects: Effects, *, columns: int, preloads_n: Sequence[float], lines: int, position_mm: float = 0.0, seed: int = 5
 ) -> dict[str, Any]:
     """The same as `campaign/1`."""
     description = {
         "schema": "experiment/1",
         "name": "bench",
-        "seed": 5,
+        "seed": seed,
         "kind": "frf",
         "skin": {
             "thickness_mm": 2.5,

@@ -33,6 +33,7 @@ SECTIONS = {
     "mechanisms": "Predictions of composed mechanisms",
     "diagnosis": "A whole diagnosis",
     AGAINST: "A whole diagnosis beside an earlier revision",
+    "fleet": "Ten skins as a fleet",
     "waits": "What a reader waits for",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
@@ -56,6 +57,7 @@ main thread is Chromium's, from the start of the page on, with plotly's script i
     AGAINST: """Processor time on one core, in turns, medians over the rounds and the campaigns: those of the folder
 that `UNDERSKIN_CAMPAIGNS` names, and those of `bench diagnosis`. Laws that nobody listed may take half as long
 again.""",
+    "fleet": "Skins of the virtual rig with nothing missing, in one process with one BLAS thread, files not counted.",
     "waits": """The server and its workers have one core, and Chromium runs beside them; a worker is ready before each
 click. The files are campaigns of 64 recordings × 60 lines, whose reports are the same to the byte for one process and
 two.""",

@@ -8,13 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+from proof.ideal_fleet import departures
 from proof.judge import answer
 from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, sources, stored
-from rig.joint import WHAT, drawn_joint
+from rig.joint import WHAT, drawn_joint, joint_campaigns
 
 SEED, COUNT = 36518, 150
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
+_STATED = 0.5  # probability of a departure that is stated
 _ERRORS = ("modulus_error", "thickness_error", "strain_stiffening")
 
 Report = Mapping[str, Any]
@@ -38,6 +40,9 @@ def _one(number: int, what: str) -> dict[str, Any]:
     hidden = [entry for entry in truth["hidden"] if entry["identifiable"]]
     head = {"name": truth["name"], "what": what, "hidden": [entry["effect"] for entry in truth["hidden"]]}
     told = {"dates": _dates, "skins": _skins}.get(what, _kinds)(documents, truth, hidden)
+    if what == "skins":
+        ideal = departures(joint_campaigns(SEED, number, what))
+        told["ideal"] = sorted(skin for skin, probability in ideal.items() if probability > _STATED)
     return {**head, **told}
 
 
@@ -99,7 +104,7 @@ def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
 
     campaigns = {str(document["skin"]["id"]): [from_dict(document)[0]] for document in documents}
     fleet = diagnose_fleet(campaigns, load_table(), truth["name"])
-    departing = {entry["departs"] for entry in hidden if entry["departs"]}
+    departing = {entry["departs"] for entry in truth["hidden"] if entry["departs"]}
     stated = {one["skin"] for entry in fleet["population"] for one in entry["departures"]}
     stated |= {
         skin
@@ -112,6 +117,7 @@ def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
     known = {entry["skin"]: next(iter(entry["d33_pc_per_n"].values())) for entry in truth["documents"]}
     return {
         "departs": sorted(departing),
+        "identifiable": sorted(entry["departs"] for entry in hidden if entry["departs"]),
         "stated": sorted(stated),
         "d33_held": [d33[skin]["low"] <= value <= d33[skin]["high"] for skin, value in known.items() if skin in d33],
     }

@@ -60,12 +60,20 @@ def _of_dates(entries: Sequence[Result]) -> str:
 
 
 def _of_skins(entries: Sequence[Result]) -> str:
-    departing = [set(entry["departs"]) <= set(entry["stated"]) for entry in entries if entry["departs"]]
+    """An ideal diagnosis that owns the rig's equations names the departing skin too, or not: `ideal`."""
+    odd = [entry for entry in entries if entry["departs"]]
+    named = [set(entry["departs"]) <= set(entry["stated"]) for entry in odd]
+    visible = [one for entry, one in zip(odd, named, strict=True) if entry["identifiable"]]
+    told = [set(entry["departs"]) <= set(entry["ideal"]) for entry in odd]
+    ideal = [one for one, able in zip(named, told, strict=True) if able]
     false = [bool(set(entry["stated"]) - set(entry["departs"])) for entry in entries]
     held = [one for entry in entries for one in entry["d33_held"]]
     return (
-        f"Of {len(entries)} fleets of three skins the one that departs is named in {_of(departing)}; another skin is "
-        f"said to depart in {_of(false)}; the pooled d33 is held by its interval in {_of(held)}.\n"
+        f"Of {len(entries)} fleets of three to six skins {len(odd)} have one that departs in E, thickness or d33. It "
+        f"is named in {_of(visible)} of those in which that shows. An ideal diagnosis, which owns the rig's equations "
+        f"and noise but not the make's mean and spread, names {_of(told)} of all; of these the departing skin is named "
+        f"in {_of(ideal)}. Another skin is said to depart in {_of(false)} of the fleets; the pooled d33 is held by its "
+        f"interval in {_of(held)}.\n"
     )
 
 

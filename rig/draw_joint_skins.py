@@ -1,4 +1,4 @@
-"""Random campaigns of three skins of one make: E and d33 are of a population, and one skin may depart in one thing."""
+"""Random campaigns of three to six skins of one make: E and d33 are of a population, and one may depart in one."""
 
 import math
 from copy import deepcopy
@@ -13,19 +13,20 @@ from rig.joint_campaign import D33_DEPARTURE, Hidden, Joint, JointDocument, Popu
 from rig.recorded import record_lines
 from rig.strengths import evenly_in_log as _log
 
-_SKINS = 3
+_SKINS, _THREE = (4, 5, 6), 0.5  # how many skins, where not three
 _DEPARTURES = {"nothing": 0.4, "modulus_error": 0.2, D33_DEPARTURE: 0.2, "thickness_error": 0.2}
 _SIZES = {"modulus_error": (1.3, 2.5), D33_DEPARTURE: (1.15, 2.0), "thickness_error": (1.08, 1.3)}
 _SD = (0.01, 0.1)
 _LEAST_SDS = 4.0  # by which E or d33 departs
 
 
-def three_skins(random: np.random.Generator, name: str, make: str) -> Joint:
-    """FRFs of three skins of one make, one of them with few recordings; the make's E is declared for all."""
+def skins_of_one_make(random: np.random.Generator, name: str, make: str) -> Joint:
+    """FRFs of three to six skins of one make, one of them with few recordings; the make's E is declared for all."""
     common = frf_description(random, name, make, {"modulus_error", str(random.choice(CATALOGUED))})
     skin, sds = common["skin"], {"modulus_error": _log(random, *_SD), D33_DEPARTURE: _log(random, *_SD)}
     departure = str(random.choice(list(_DEPARTURES), p=list(_DEPARTURES.values())))
-    odd, few = (int(random.integers(_SKINS)) for _ in range(2))
+    count = 3 if random.random() < _THREE else int(random.choice(_SKINS))
+    odd, few = (int(random.integers(count)) for _ in range(2))
     size = _size(random, departure, sds.get(departure, 0.0))
     if departure in ("modulus_error", "thickness_error"):
         design_for_both(skin, departure, size)
@@ -33,7 +34,7 @@ def three_skins(random: np.random.Generator, name: str, make: str) -> Joint:
         skin["youngs_modulus_mpa"], sds["modulus_error"], skin["d33_pc_per_n"], sds[D33_DEPARTURE]
     )  # fmt: skip
     descriptions = []
-    for number in range(_SKINS):
+    for number in range(count):
         departs = departure if number == odd else "nothing"
         description = _skin(random, common, population, departs, size)
         description["name"] = f"{name}, skin {number + 1}"

@@ -12,7 +12,7 @@ import numpy as np
 from rig import checks
 from rig.draw_joint import beside_a_block, beside_indentations
 from rig.draw_joint_dates import two_dates
-from rig.draw_joint_skins import three_skins
+from rig.draw_joint_skins import skins_of_one_make
 from rig.errors import RigError
 from rig.joint_campaign import Joint
 from rig.joint_truth import joint_truth
@@ -21,7 +21,7 @@ _DRAWN = {
     "compression": beside_a_block,
     "indentation": beside_indentations,
     "dates": two_dates,
-    "skins": three_skins,
+    "skins": skins_of_one_make,
 }  # fmt: skip
 WHAT = tuple(_DRAWN)
 _TRIES = 200

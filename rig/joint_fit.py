@@ -69,13 +69,17 @@ def _descend(problem: "_Problem", start: Floats) -> tuple[float, Floats]:
 
 def deviation(parts: Sequence[Part], priors: Mapping[str, Prior], name: str) -> float:
     """Standard deviation of a parameter by the information where all of them are 0, which is the truth."""
+    return float(np.sqrt(covariance(parts, priors, (name,))[0, 0]))
+
+
+def covariance(parts: Sequence[Part], priors: Mapping[str, Prior], names: Sequence[str]) -> Floats:
+    """Covariance of parameters (names, names) by the information where all of them are 0, which is the truth."""
     problem = _Problem(parts, priors)
     here = np.zeros(len(problem.names))
     ahead, behind = problem.jacobian(here, _STEP), problem.jacobian(here, -_STEP)
     derivative = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)  # the other may step over a jump of a curve
-    covariance = np.linalg.inv(derivative.T @ derivative)
-    at = problem.names.index(name)
-    return float(np.sqrt(covariance[at, at]))
+    places = [problem.names.index(name) for name in names]
+    return np.asarray(np.linalg.inv(derivative.T @ derivative)[np.ix_(places, places)])
 
 
 class _Problem:

@@ -8,7 +8,7 @@ import numpy as np
 from rig.effects import Values
 from rig.joint_campaign import D33_DEPARTURE, Hidden, Joint, JointDocument, Population
 from rig.joint_curves import CurvePart
-from rig.joint_fit import Part, Prior
+from rig.joint_fit import Part, Prior, covariance
 from rig.joint_lines import LinesPart
 from rig.layer import Floats
 
@@ -81,6 +81,14 @@ def hypothesis(
             name = f"{joint.documents[documents[0]].skin}/modulus"
             priors[name] = replace(priors[name], sd=sd)
     return parts, priors
+
+
+def skin_covariance(document: JointDocument) -> Floats:
+    """Covariance of ln E, ln h and ln d33 by the FRFs of one skin alone, all else known (3, 3)."""
+    skin = document.skin
+    gains = {f"{skin}/gain {sensor[0]}": Prior(0.0, _SENSOR) for sensor in document.experiment.skin.sensors}
+    names = [f"{skin}/{name}" for name in ("modulus", "thickness", "d33")]
+    return covariance([_lines(document, None, free=False)], gains, names)
 
 
 def _left(effects: dict[str, Values], without: Hidden | None) -> dict[str, Values]:

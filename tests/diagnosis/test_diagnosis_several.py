@@ -13,7 +13,6 @@ from tests.support.skins import HEAVY_TIP, document, made
 from underskin.cli.app import app
 from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
-from underskin.diagnosis.several.population import population
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
@@ -97,47 +96,6 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
         diagnose_fleet({"a": [other], "b": [made("may")], "c": [again]}, table, "copy")
     with pytest.raises(InvalidInput, match="must be 3 at least"):
         diagnose_fleet({"a": [other], "b": [other]}, table, "two")
-
-
-def test_a_skin_that_departs_is_named_and_tells_nothing_of_the_others(table: SigmaTable) -> None:
-    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in range(5)}
-    skins["weak"] = [made("c9", seed=40, d33=9.0)]
-    report = diagnose_fleet(skins, table, "batch")
-    (d33,) = [entry for entry in report["population"] if entry["parameter"] == "d33"]
-    assert [entry["skin"] for entry in d33["departures"]] == ["weak"]
-    assert d33["mean"] == pytest.approx(14.4, rel=0.03)
-    assert d33["sd"] < 1.5
-    assert "weak departs in d33" in report["statement"]
-    assert report["verdict"] == "explained"
-    (modulus,) = [entry for entry in report["population"] if entry["parameter"] == "youngs_modulus"]
-    assert all(entry["low"] < 16.0 < entry["high"] for entry in modulus["skins"])
-
-
-def test_a_skin_of_which_little_was_recorded_leans_on_its_sisters(table: SigmaTable) -> None:
-    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n)] for n in range(4)}
-    whole = made("few", seed=30)
-    skins["few"] = [replace(whole, recordings=whole.recordings[:6])]
-    report = diagnose_fleet(skins, table, "batch")
-    (d33,) = [entry for entry in report["population"] if entry["parameter"] == "d33"]
-    pooled = next(entry for entry in d33["skins"] if entry["skin"] == "few")
-    others = [entry for entry in d33["skins"] if entry["skin"] != "few"]
-    assert pooled["low"] < 14.0 < pooled["high"]
-    widest = max(entry["high"] / entry["low"] for entry in others)
-    assert pooled["high"] / pooled["low"] < 1.5 * widest
-
-
-def test_pooling_shrinks_by_how_sure_each_is_and_covers() -> None:
-    """Of 400 populations the 95 % intervals of the pooled values hold the true ones in 90 to 98 %."""
-    random = np.random.default_rng(3)
-    held, narrower = [], []
-    for _ in range(400):
-        true = random.normal(2.0, 0.08, 8)
-        s = random.uniform(0.02, 0.3, 8)
-        found = population(random.normal(true, s), s)
-        held += (np.abs(found.value - true) < 1.96 * found.deviation).tolist()
-        narrower += (found.deviation < s).tolist()
-    assert 0.90 < np.mean(held) < 0.98
-    assert np.mean(narrower) > 0.9
 
 
 def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:

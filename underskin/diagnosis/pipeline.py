@@ -213,7 +213,7 @@ def _work_out(
         return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
     if leader.explanation is nothing and problem.kind == "frf" and problem.lines.recordings < _LEAST_TO_AGREE:
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
-        return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few))
+        return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
     shape = describe(problem, shown) if undescribed else None
     begun = begun.with_findings(*(of_nearest_law(problem, result, nothing) if undescribed else ()))

@@ -23,6 +23,7 @@ from underskin.diagnosis.inference.points import Points, alone, stacked
 from underskin.diagnosis.inference.position_curvature import curvature
 from underskin.diagnosis.inference.scattered import groups, hardly_scatters, with_scatter, without_scatter
 from underskin.diagnosis.inference.starts import Beginning, best_starts
+from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, Plateau
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import Model, compose
@@ -106,11 +107,14 @@ Beside = Callable[[Model, Lines], Knowledge | None]
 class FittingProblem:
     """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
-    def __init__(self, lines: Lines, table: SigmaTable, beside: Beside | None = None) -> None:
+    def __init__(
+        self, lines: Lines, table: SigmaTable, beside: Beside | None = None, gain: Plateau = GAIN_PRIOR
+    ) -> None:
         """Collapse, and work out how σ bends; curves are not collapsed and have no place. `beside` says what recordings
-        of other kinds know of a model's parameters."""
+        of other kinds know of a model's parameters; `gain` is the prior of the gain scatter's logarithm."""
         self.lines = lines
         self.beside = beside
+        self.gain = gain
         self.kind = kind = lines.kind
         self.table = table
         self.collapsed = lines.collapsed() if kind == "frf" else lines
@@ -128,7 +132,7 @@ class FittingProblem:
                 lines = self.lines if whole else self.collapsed
                 model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
                 known = None if self.beside is None else self.beside(model, lines)
-                other = Hypothesis(model, lines, self.curvature, placed, knowledge=known)
+                other = Hypothesis(model, lines, self.curvature, placed, gain=self.gain, knowledge=known)
             self._hypotheses[key] = replace(other, placed=placed)
         return self._hypotheses[key]
 

@@ -52,6 +52,7 @@ class DiagnosisResult:
     provenance: Mapping[str, Any]
     lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
+    few: Search | None = None  # in its place where recordings agree with the model but are too few to say so alone
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)

@@ -1,8 +1,8 @@
-"""Skins of one make: their moduli, d33 and the strengths of their mechanisms as populations, and which skin departs.
+"""Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
 
 Each skin speaks by its latest campaign that can be used. The set of mechanisms that all have in common is found over
-all skins (common_set.py), and what each says of a quantity is pooled (population.py), so that a skin of which little
-was recorded leans on its sisters.
+all skins (common_set.py), and what each says of its E, thickness and d33 (skin.py) is pooled (population.py), so that a
+skin of which little was recorded leans on its sisters.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -11,34 +11,26 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, place_of, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
-from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.selection.priors import log_prior
+from underskin.diagnosis.several.bench_gain import gain_priors
 from underskin.diagnosis.several.campaigns import in_order, refuse_copies
-from underskin.diagnosis.several.common_set import CommonSet, common_set
+from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.population import STATED, without_departing
+from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
+from underskin.diagnosis.several.population import Make, Spread, populations
+from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
+from underskin.diagnosis.several.strengths import of_strengths
 from underskin.errors import InvalidInput
-from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
-_MODULUS_ERROR = "modulus_error"
-_INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
-
-
-@dataclass(frozen=True)
-class _Said:
-    """What one skin says of one quantity: the logarithm, and its standard deviation."""
-
-    skin: str
-    log_value: float
-    deviation: float
+_DECLARED = (0.02, 0.01)  # deviations of ln of the make's E and thickness about the declared ones
+# Pieces of one cure and of one poled film differ by some percent; a mould's thickness is held
+_FAR_OFF = 2.0  # deviations by which skins must be off together for an error of what is declared of all to be looked at
+SPREADS = (Spread(0.03, 2.0), Spread(0.01, 1.0), Spread(0.03, 2.0))
 
 
 def diagnose_fleet(
@@ -62,229 +54,91 @@ def diagnose_fleet(
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
         results[skin] = _latest(with_frf, table, without)
         progress((number + 1) / (len(skins) + 1))
-    usable = {skin: result for skin, result in results.items() if result.search is not None}
-    lacking = [skin for skin in skins if skin not in usable]
+    campaigns_named = [campaign.name for own in skins.values() for campaign in own]
     candidates = {
-        skin: Candidate(result.problem, result.search)
-        for skin, result in usable.items()
-        if result.problem is not None and result.search is not None
+        skin: Candidate(result.problem, search)
+        for skin, result in results.items()
+        if result.problem is not None and (search := result.search or result.few) is not None
     }
-    if not candidates:
-        return {**report(next(iter(results.values()))), "campaign": name, "campaigns": _names(skins)}
-    found = common_set(list(candidates.values()), min(one.search.supported for one in candidates.values()))
-    fits = {
-        skin: fit
-        for (skin, candidate), names in zip(candidates.items(), found.sets, strict=True)
-        if (fit := candidate.explained(frozenset(names))) is not None
-    }
-    populations = [
-        entry for entry in (_of_d33(fits), _of_modulus(candidates, fits), *_of_strengths(fits)) if entry is not None
-    ]
-    undescribed = {skin: one.undescribed for skin, one in candidates.items()}
-    return _document(name, skins, usable, found, undescribed, lacking, populations)
-
-
-def _names(skins: Mapping[str, Sequence[Campaign]]) -> list[str]:
-    return [campaign.name for own in skins.values() for campaign in own]
+    if len(candidates) < _LEAST_SKINS:
+        lacking = next(skin for skin in skins if skin not in candidates)
+        return {**report(results[lacking]), "campaign": name, "campaigns": campaigns_named}
+    return fleet_report(name, campaigns_named, results, _found(candidates))
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
-    """The diagnosis of the latest campaign that says anything, else of the first."""
+    """The diagnosis of the latest campaign that says something alone, else of the latest that does beside others."""
+    found: list[DiagnosisResult] = []
     for campaign in in_order(campaigns)[::-1]:
-        result = diagnose(campaign, table, without=without)
-        if result.search is not None:
-            break
-    return result
+        found.append(diagnose(campaign, table, without=without))
+        if found[-1].search is not None:
+            return found[-1]
+    return next((result for result in found if result.few is not None), found[0])
 
 
-def _of_d33(fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
-    each = {skin: _of_place(fit, place_of(fit, "d33")) for skin, fit in fits.items()}
-    return _population("d33", "pC/N", [_Said(skin, *found) for skin, found in each.items() if found is not None])
+@dataclass(frozen=True)
+class _Attempt:
+    """The skins looked at about what is declared, or with an `error` of that in all of them."""
+
+    error: str
+    skins: Sequence[FleetSkin]
+    common: CommonSet
+    log_weight: float
 
 
-def _of_modulus(candidates: Mapping[str, Candidate], fits: Mapping[str, Explanation]) -> dict[str, Any] | None:
-    """E where the modulus is free beside each skin's set."""
-    said = []
-    for skin, fit in fits.items():
-        problem = candidates[skin].problem
-        declared = problem.lines.campaign.skin.youngs_modulus_mpa
-        free = None if declared is None else _with_modulus(problem, fit)
-        if declared is None or free is None or _MODULUS_ERROR in candidates[skin].search.unsupported:
-            continue
-        place = own_places(free.names, free.best.hypothesis.lines)[_MODULUS_ERROR].start
-        found = _of_place(free, place)
-        if found is not None:
-            said.append(_Said(skin, found[0] + float(np.log(declared)), found[1]))
-    return _population("youngs_modulus", "MPa", said)
+def _found(candidates: Mapping[str, Candidate]) -> Fleet:
+    """Of the usable skins."""
+    each = list(candidates.values())
+    sets, gains = sets_of(each), gain_priors(each)
+    supported = min(one.search.supported for one in each)
+    odds = log_prior(1, supported) - log_prior(0, supported)
 
+    def attempt(error: str, centre: tuple[float, float], log_prior_weight: float) -> _Attempt:
+        skins = [FleetSkin(one, with_smaller(sets), gain, centre) for one, gain in zip(each, gains, strict=True)]
+        common = common_set(skins, sets, supported)
+        return _Attempt(error, skins, common, common.log_evidence + log_prior_weight)
 
-def _with_modulus(problem: FittingProblem, explanation: Explanation) -> Explanation | None:
-    if _MODULUS_ERROR in explanation.names:
-        return explanation
-    names = {*explanation.names, _MODULUS_ERROR}
-    catalogue = problem.lines.mechanisms.named
-    if any(name not in catalogue for name in names):
-        return None
-    (found,) = problem.explain([Request(tuple(name for name in catalogue if name in names))])
-    return found
-
-
-def _of_strengths(fits: Mapping[str, Explanation]) -> list[dict[str, Any] | None]:
-    """Of the positive parameters of mechanisms that at least three skins have."""
-    said: dict[tuple[str, str, str], list[_Said]] = {}
-    for skin, fit in fits.items():
-        for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
-            for place in range(places.start, places.stop):
-                entry = fit.model.parameters[place]
-                if entry.scale != "log" or entry.moves_covariance or mechanism == _MODULUS_ERROR:
-                    continue
-                found = _of_place(fit, place)
-                if found is not None:
-                    key = (mechanism, entry.name, entry.unit)
-                    said.setdefault(key, []).append(_Said(skin, *found))
-    return [_population(f"{mechanism}.{name}", unit, own) for (mechanism, name, unit), own in said.items()]
-
-
-def _of_place(explanation: Explanation, place: int) -> tuple[float, float] | None:
-    """Mean and standard deviation of a parameter on a logarithmic scale by the recordings alone, the prior taken out;
-    None where they say next to nothing."""
-    hypothesis = explanation.best.hypothesis
-    row = hypothesis.mean_places.index(place)
-    after = 1 / float(explanation.best.covariance[row, row])
-    prior, centre = curvature_of_prior(explanation.model.parameters[place])
-    precision = after - prior
-    if precision < _INFORMS * prior:
-        return None
-    mean = (after * float(explanation.point.fit[place]) - prior * centre) / precision
-    return float(mean), float(precision**-0.5)
-
-
-def _population(name: str, unit: str, said: Sequence[_Said]) -> dict[str, Any] | None:
-    if len(said) < _LEAST_SKINS:
-        return None
-    values = np.array([one.log_value for one in said])
-    deviations = np.array([max(one.deviation, 1e-4) for one in said])
-    found = without_departing(values, deviations)
-    mean = float(np.exp(found.mean))
-    return {
-        "parameter": name,
-        "unit": unit,
-        "mean": rounded(mean),
-        "sd": rounded(mean * found.spread, 3),
-        "departures": [
-            {"skin": one.skin, "value": rounded(float(np.exp(one.log_value))), "probability": round(float(share), 3)}
-            for one, share in zip(said, found.departs, strict=True)
-            if share > STATED
-        ],
-        "skins": [
-            {
-                "skin": one.skin,
-                "value": rounded(float(np.exp(value))),
-                "low": rounded(float(np.exp(value - SDS_OF_95 * deviation))),
-                "high": rounded(float(np.exp(value + SDS_OF_95 * deviation))),
-            }
-            for one, value, deviation in zip(said, found.value, found.deviation, strict=True)
-        ],
+    attempts = [attempt("", (0.0, 0.0), 0.0)]
+    for row, error in enumerate(ERRORS):
+        off, deviation = _off(attempts[0].skins, row, error)
+        if abs(off) > _FAR_OFF * max(deviation, _DECLARED[row]):
+            centre = (off, 0.0) if row == 0 else (0.0, off)
+            occam = np.log(deviation / FAR[row]) - 0.5 * (off / FAR[row]) ** 2
+            attempts.append(attempt(error, centre, odds + float(occam)))
+    weights = np.array([one.log_weight for one in attempts])
+    shares = np.exp(weights - np.logaddexp.reduce(weights))
+    best = attempts[int(np.argmax(shares))]
+    states = [skin.states(own) for skin, own in zip(best.skins, best.common.from_sisters, strict=True)]
+    makes, errors = _makes(best.skins, odds)
+    if best.error:
+        makes, errors = [makes[errors.index(best.error)]], [best.error]
+    pooled = populations(states, makes, SPREADS)
+    declared_wrongly = {
+        error: float(share * shares.max()) for error, share in zip(errors, pooled.makes, strict=True) if error
     }
+    return Fleet(candidates, best.common, pooled, declared_wrongly, of_strengths(candidates, best.common))
 
 
-def _document(
-    name: str,
-    skins: Mapping[str, Sequence[Campaign]],
-    usable: Mapping[str, DiagnosisResult],
-    found: CommonSet,
-    undescribed: Mapping[str, float],
-    lacking: Sequence[str],
-    populations: Sequence[Mapping[str, Any]],
-) -> dict[str, Any]:
-    reports = {skin: report(result) for skin, result in usable.items()}
-    by_mechanism: dict[str, list[str]] = {}
-    present: dict[str, list[float]] = {}
-    for skin, names, share in zip(usable, found.sets, found.each, strict=True):
-        for mechanism in names:
-            by_mechanism.setdefault(mechanism, []).append(skin)
-            present.setdefault(mechanism, []).append(share)
-    departures = [(entry, one) for entry in populations for one in entry["departures"]]
-    unexplained = [skin for skin, share in undescribed.items() if share > 0.5]
-    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
-    probability = 1 - described if unexplained else found.probability * described
-    verdict = _verdict(probability, bool(by_mechanism or departures), unexplained)
-    mechanisms: list[dict[str, Any]] = [
-        {
-            "name": mechanism,
-            "probability": round(float(np.mean(present[mechanism])), 3),
-            "parameters": [],
-            "explains_percent": None,
-            "scope": {"skins": where},
-        }
-        for mechanism, where in by_mechanism.items()
-    ]
-    d33 = next((entry for entry in populations if entry["parameter"] == "d33"), None)
-    return {
-        "schema": SCHEMA,
-        "campaign": name,
-        "campaigns": _names(skins),
-        "verdict": verdict,
-        "probability": round(probability, 3),
-        "statement": _statement(probability, by_mechanism, departures, unexplained, lacking, populations),
-        "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
-        "mechanisms": mechanisms,
-        "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
-        "unnamed": None,
-        "alternatives": [],
-        "not_identifiable": [],
-        "findings": [
-            {**finding, "statement": f"{skin}: {finding['statement']}"}
-            for skin, own in reports.items()
-            for finding in own["findings"]
-        ],
-        "fit": None,
-        "power": [],
-        "population": list(populations),
-        "d33": None
-        if d33 is None
-        else {"name": "d33", "unit": "pC/N", "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
-        "next_experiment": None,
-        "provenance": {
-            **next(iter(usable.values())).provenance,
-            "each": [
-                {"skin": skin, "verdict": own["verdict"], "probability": own["probability"]}
-                for skin, own in reports.items()
-            ],
-        },
-    }
+def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
+    """By how much ln of a quantity is off what is declared, if it is the same in all skins, and its deviation."""
+    each = [skin.departing(error) for skin in skins if error in skin.errors]
+    means, variances = (np.array([one[part] for one in each if one is not None]) for part in (0, 1))
+    if len(means) < len(skins):
+        return 0.0, 0.0
+    precision = 1 / (variances + SPREADS[row].usual ** 2)
+    return float(precision @ means / precision.sum()), float(precision.sum() ** -0.5)
 
 
-def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
-    if unexplained:
-        return "unexplained"
-    if probability < EXPLAINED:
-        return "ambiguous"
-    return "explained" if anything else "no_mismatch"
-
-
-def _statement(
-    probability: float,
-    by_mechanism: Mapping[str, Sequence[str]],
-    departures: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
-    unexplained: Sequence[str],
-    lacking: Sequence[str],
-    populations: Sequence[Mapping[str, Any]],
-) -> str:
-    each = [f"{in_words([name])} in {', '.join(where)}" for name, where in by_mechanism.items()]
-    missing = "; ".join(each) or in_words((NOTHING_MISSING,))
-    parts = [f"By skin: {missing} ({in_percent(probability)} probability)."]
-    if unexplained:
-        parts[0] = (
-            f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}."
-        )
-    parts += [
-        f"{one['skin']} departs in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the "
-        f"others have {entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})."
-        for entry, one in departures
-    ]
-    if not departures and populations:
-        parts.append("None is seen to depart from the others.")
-    if lacking:
-        parts.append(f"Nothing could be told of {', '.join(lacking)}.")
-    return " ".join(parts)
+def _makes(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Make], list[str]]:
+    """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
+    declared = np.array([skin.declared for skin in skins])
+    usual = np.hypot([*_DECLARED, D33_PRIOR[1]], declared.std(axis=0) / len(skins) ** 0.5)
+    centre = declared.mean(axis=0) + np.array([0.0, 0.0, D33_PRIOR[0]])
+    makes, errors = [Make(0.0, centre, usual**-2)], [""]
+    for row, error in enumerate(ERRORS):
+        if all(error in skin.errors for skin in skins):
+            loose = usual.copy()
+            loose[row] = FAR[row]
+            makes.append(Make(odds, centre, loose**-2))
+            errors.append(error)
+    return makes, errors

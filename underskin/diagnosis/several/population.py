@@ -1,86 +1,205 @@
-"""A quantity of skins of one make as a population: partial pooling, and which skin departs.
+"""Quantities of skins of one make as populations: what the skins say together, which of them departs, and in what.
 
-x_i ~ N(θ_i, s_i²) is what skin i alone says, θ_i ~ N(μ, τ²) its true value; μ has a flat prior, τ one that is flat up
-to a usual spread and falls off beyond. Sums over a grid of τ; given τ all is normal. A skin departs where what it says
-is better explained by N(μ, τ² + D²), D far larger than the spread, with μ and τ from the others alone.
+A skin's logarithms q (of E, thickness and d33) are normal about the make's μ: q_i ~ N(μ, diag τ²). One that departs has
+a far larger deviation D in one quantity. What a skin's recordings say of q in each of these states is a normal
+likelihood. Given the states and τ all is normal; sums run over a grid of τ and over all sets of departing skins that
+matter, grown by one skin at a time. Fewer than half of the skins depart: the make is what most are.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ndtr
 
-from underskin.units import Floats
+from underskin.diagnosis.inference.knowledge import Knowledge
+from underskin.diagnosis.several.likelihoods import log_integral, of_mean, posterior
+from underskin.units import Floats, Indices
 
-_SPREADS = np.geomspace(2e-3, 1.0, 60)
-_USUAL = 0.1  # of a logarithm: the spread beyond which τ is less and less probable
-STATED = 0.5  # probability of a departure that is stated
-_DEPARTS = 0.05  # prior probability that a skin departs
-_FAR, _LEAST_FAR = 5.0, 0.2  # D in spreads of the others, and at least
+_SOME_DEPARTS = 0.5  # prior probability that any skin of a fleet departs: as likely as not
+_NODES, _STRIDES = 12, 2.7  # of the grid of ln τ, and to how many of its standard deviations it reaches
+_BEHIND = 12.0  # nats behind the best set of departing skins, beyond which one counts no longer
+_MOST_SETS = 200  # with equally many departing skins
+_COUNTS = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
+_LEVELS = (0.5, 0.025, 0.975)
+
+REGULAR = ""  # the departure of a skin that does not depart
 
 
 @dataclass(frozen=True, eq=False)
-class Population:
-    """Mean and spread with standard deviation of the mean; of each skin its pooled value with standard deviation, and
-    the probability that it departs, (skins,)."""
+class State:
+    """What a skin says if it departs so: the name of the departure, the likelihood of the quantities, and the variances
+    of the departure (quantities,)."""
 
-    mean: float
-    mean_deviation: float
-    spread: float
-    value: Floats
-    deviation: Floats
-    departs: Floats
+    departs: str
+    likelihood: Knowledge
+    further: Floats
 
 
-def population(x: Floats, s: Floats) -> Population:
-    """Of what at least two skins say, x with standard deviations s (skins,)."""
-    weights, means, deviations = _mean_by_spread(x, s)
-    mean = float(weights @ means)
-    variance = float(weights @ (deviations**2 + (means - mean) ** 2))
-    spread = float(np.sqrt(weights @ _SPREADS**2))
-    share = _SPREADS[:, None] ** 2 / (_SPREADS[:, None] ** 2 + s**2)  # of a skin's own value in the pooled one
-    pooled = means[:, None] + share * (x - means[:, None])
-    value = weights @ pooled
-    within = share * s**2 + (1 - share) ** 2 * deviations[:, None] ** 2
-    deviation = np.sqrt(weights @ (within + (pooled - value) ** 2))
-    departs = np.array([_departs(x, s, skin) for skin in range(len(x))])
-    return Population(mean, float(np.sqrt(variance)), spread, value, deviation, departs)
+@dataclass(frozen=True, eq=False)
+class Make:
+    """A prior of μ: the logarithm of its probability, centre and precision (quantities,)."""
+
+    log_prior: float
+    centre: Floats
+    precision: Floats
 
 
-def without_departing(x: Floats, s: Floats) -> Population:
-    """The same where those that depart tell nothing of the others, nor the others of them."""
-    every = population(x, s)
-    kept = every.departs <= STATED
-    if kept.all() or kept.sum() < 2:
-        return every
-    others = population(x[kept], s[kept])
-    value, deviation = x.copy(), s.copy()
-    value[kept], deviation[kept] = others.value, others.deviation
-    return replace(others, value=value, deviation=deviation, departs=every.departs)
+@dataclass(frozen=True)
+class Spread:
+    """The prior of τ of one quantity: ln τ is normal about that of `usual` with the standard deviation ln `factor`; a
+    factor of 1 is a known τ."""
+
+    usual: float
+    factor: float
+
+    @property
+    def nodes(self) -> list[tuple[float, float]]:
+        """Values of τ with the logarithms of their weights."""
+        if self.factor == 1:
+            return [(self.usual, 0.0)]
+        deviations = np.linspace(-_STRIDES, _STRIDES, _NODES).tolist()
+        return [(self.usual * self.factor**one, -0.5 * one**2) for one in deviations]
 
 
-def _mean_by_spread(x: Floats, s: Floats) -> tuple[Floats, Floats, Floats]:
-    """The posterior of each τ of the grid, and given it mean and deviation of μ."""
-    precision = 1 / (_SPREADS[:, None] ** 2 + s**2)
-    total = precision.sum(axis=1)
-    means = precision @ x / total
-    chi2 = (precision * (x - means[:, None]) ** 2).sum(axis=1)
-    log_weight = 0.5 * np.log(precision).sum(axis=1) - 0.5 * np.log(total) - 0.5 * chi2
-    log_weight -= np.log1p((_SPREADS / _USUAL) ** 2)
-    log_weight += np.log(_SPREADS)  # the grid is even in the logarithm
-    weights = np.exp(log_weight - np.logaddexp.reduce(log_weight))
-    return weights, means, total**-0.5
+@dataclass(frozen=True, eq=False)
+class Populations:
+    """`mean` and `spread` τ of the make (quantities,), of each skin median and ends of the 95 % interval
+    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ."""
+
+    mean: Floats
+    spread: Floats
+    of_skins: Floats
+    departs: tuple[dict[str, float], ...]
+    makes: Floats
 
 
-def _departs(x: Floats, s: Floats, skin: int) -> float:
-    others = np.arange(len(x)) != skin
-    if others.sum() < 2:
-        return 0.0
-    weights, means, deviations = _mean_by_spread(x[others], s[others])
-    far = np.maximum(_FAR * _SPREADS, _LEAST_FAR)
+def log_odds_of_departure(skins: int) -> float:
+    """The prior log odds that one of so many skins departs."""
+    return float(np.log(np.expm1(-np.log1p(-_SOME_DEPARTS) / skins)))
 
-    def density(further: Floats) -> float:
-        variance = deviations**2 + _SPREADS**2 + s[skin] ** 2 + further**2
-        return float(weights @ (np.exp(-0.5 * (x[skin] - means) ** 2 / variance) / np.sqrt(variance)))
 
-    departing, regular = _DEPARTS * density(far), (1 - _DEPARTS) * density(np.zeros_like(far))
-    return departing / max(departing + regular, 1e-300)
+def populations(skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> Populations:
+    """Of the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
+    return _Fleet(skins, makes, spreads).populations
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Of the posterior: the states of all skins, one prior of μ, the spreads that matter (spreads,), and their
+    probabilities."""
+
+    states: tuple[int, ...]
+    make: Make
+    kept: Indices
+    weights: Floats
+
+
+class _Fleet:
+    def __init__(self, skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> None:
+        self.skins, self.makes = skins, makes
+        nodes = list(product(*(one.nodes for one in spreads)))
+        self.spreads = np.array([[value for value, _ in node] for node in nodes])  # (spreads, quantities)
+        shares = np.array([sum(share for _, share in node) for node in nodes])
+        self.log_shares = shares - np.logaddexp.reduce(shares)
+        # What each skin in each state says of μ, (spreads,) each
+        self.said = [[of_mean(one.likelihood, self.spreads**2 + one.further) for one in own] for own in skins]
+
+    def together(self, states: Sequence[int], without: int | None = None) -> Knowledge:
+        """What the skins in these states say of μ, but for one."""
+        each = [own[state] for number, (own, state) in enumerate(zip(self.said, states, strict=True))
+                if number != without]  # fmt: skip
+        return sum(each[1:], each[0])
+
+    def log_weights(self, states: Sequence[int]) -> Floats:
+        """Of each prior of μ and each spread (makes, spreads)."""
+        odds = log_odds_of_departure(len(self.skins))
+        prior = sum(odds - np.log(len(own) - 1) for own, state in zip(self.skins, states, strict=True) if state)
+        said = self.together(states)
+        each = [one.log_prior + log_integral(said, one.centre, one.precision) for one in self.makes]
+        return np.asarray(np.array(each) + self.log_shares + prior)
+
+    @cached_property
+    def found(self) -> dict[tuple[int, ...], Floats]:
+        """The states of all skins that matter, with their log weights."""
+        level = {none: self.log_weights(none) for none in [(0,) * len(self.skins)]}
+        found = dict(level)
+        for _ in range((len(self.skins) - 1) // 2):
+            longer = {
+                (*states[:number], other, *states[number + 1 :])
+                for states in level
+                for number, own in enumerate(self.skins)
+                if not states[number]
+                for other in range(1, len(own))
+            }
+            weights = {states: self.log_weights(states) for states in sorted(longer)}
+            totals = {states: float(np.logaddexp.reduce(own, axis=None)) for states, own in weights.items()}
+            best = max(float(np.logaddexp.reduce(own, axis=None)) for own in (*found.values(), *weights.values()))
+            kept = sorted(totals, key=lambda states: -totals[states])[:_MOST_SETS]
+            level = {states: weights[states] for states in kept if totals[states] > best - _BEHIND}
+            found |= level
+        return found
+
+    @cached_property
+    def populations(self) -> Populations:
+        log_weights = np.array(list(self.found.values()))  # (sets, makes, spreads)
+        share = np.exp(log_weights - np.logaddexp.reduce(log_weights, axis=None))
+        of_sets = share.sum(axis=(1, 2))
+        departs = tuple(
+            {
+                state.departs: float(of_sets[[states[number] == place for states in self.found]].sum())
+                for place, state in enumerate(own)
+            }
+            for number, own in enumerate(self.skins)
+        )
+        parts = [
+            _Part(states, make, kept, own[kept])
+            for states, of_makes in zip(self.found, share, strict=True)
+            for make, own in zip(self.makes, of_makes, strict=True)
+            if len(kept := np.flatnonzero(own > _COUNTS))
+        ]
+        weights = np.concatenate([part.weights for part in parts])
+        weights /= weights.sum()
+        mean = np.concatenate([self._mean(part) for part in parts])
+        spread = np.concatenate([self.spreads[part.kept] for part in parts])
+        of_skins = np.array([self._of_skin(number, parts, weights) for number in range(len(self.skins))])
+        return Populations(
+            weights @ mean,
+            np.sqrt(weights @ spread**2),
+            of_skins.transpose(1, 0, 2),
+            departs,
+            share.sum(axis=(0, 2)),
+        )
+
+    def _mean(self, part: _Part) -> Floats:
+        return posterior(self.together(part.states), part.make.centre, part.make.precision)[0][part.kept]
+
+    def _of_skin(self, number: int, parts: Sequence[_Part], weights: Floats) -> Floats:
+        """Median and ends of the 95 % interval of its quantities (3, quantities)."""
+        middles, deviations = [], []
+        for part in parts:
+            state = self.skins[number][part.states[number]]
+            sisters = self.together(part.states, number)
+            mean, covariance = (one[part.kept] for one in posterior(sisters, part.make.centre, part.make.precision))
+            own = self.spreads[part.kept] ** 2 + state.further
+            before = np.linalg.inv(covariance + own[:, None] * np.eye(own.shape[1]))
+            after = np.linalg.inv(before + state.likelihood.precision)
+            towards = state.likelihood.linear + np.einsum("spq,sq->sp", before, mean)
+            middles.append(np.einsum("spq,sq->sp", after, towards))
+            deviations.append(np.sqrt(np.diagonal(after, axis1=1, axis2=2)))
+        middle, deviation = np.concatenate(middles), np.concatenate(deviations)
+        columns = list(zip(middle.T, deviation.T, strict=True))
+        return np.array([[_quantile(level, weights, *column) for column in columns] for level in _LEVELS])
+
+
+def _quantile(level: float, weights: Floats, middle: Floats, deviation: Floats) -> float:
+    """Of a mixture of normal distributions."""
+    far = 8 * float(deviation.max())
+
+    def beyond(at: float) -> float:
+        return float(weights @ ndtr((at - middle) / deviation) - level)
+
+    return float(brentq(beyond, float(middle.min()) - far, float(middle.max()) + far))

@@ -1,0 +1,39 @@
+"""How well an ideal diagnosis could tell which skin of a fleet departs.
+
+It owns the rig's equations and noise, and knows that no mechanism acts: what the recordings of a skin say of ln E, ln h
+and ln d33 is normal about the truth, with the covariance of Fisher's information there. What it does not know is what
+no recording of one skin tells: the make's mean and spread. For these it has the priors of the diagnosis.
+"""
+
+import numpy as np
+
+from rig.joint_campaign import Joint, JointDocument
+from rig.joint_hypotheses import skin_covariance
+from underskin.diagnosis.inference.knowledge import Knowledge
+from underskin.diagnosis.several.fleet import SPREADS
+from underskin.diagnosis.several.population import REGULAR, Make, State, populations
+from underskin.diagnosis.several.skin import FAR, QUANTITIES
+from underskin.units import Floats
+
+_DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what is declared; of d33, about the truth
+
+
+def departures(joint: Joint) -> dict[str, float]:
+    """Of each skin the probability that it departs, at what its recordings are expected to say."""
+    skins = [_states(document) for document in joint.documents]
+    experiment = joint.documents[0].experiment
+    declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
+    make = Make(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
+    found = populations(skins, [make], SPREADS)
+    return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departs, strict=True)}
+
+
+def _states(document: JointDocument) -> list[State]:
+    truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
+    precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
+    said = Knowledge(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
+    further = np.diag(np.square(FAR))
+    return [
+        State(REGULAR, said, np.zeros(len(FAR))),
+        *(State(name, said, row) for name, row in zip(QUANTITIES, further, strict=True)),
+    ]

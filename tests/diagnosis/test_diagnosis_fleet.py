@@ -1,0 +1,136 @@
+"""Skins of one make as a fleet: which departs, and in what; what a skin of few recordings gains by its sisters."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.skins import HEAVY_TIP, made
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.report import report
+from underskin.diagnosis.several.fleet import diagnose_fleet
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import SigmaTable
+
+
+def population(fleet: dict[str, Any], parameter: str) -> dict[str, Any]:
+    (entry,) = [one for one in fleet["population"] if one["parameter"] == parameter]
+    return entry
+
+
+def departures(fleet: dict[str, Any]) -> set[str]:
+    return {one["skin"] for entry in fleet["population"] for one in entry["departures"]}
+
+
+def likeliest(fleet: dict[str, Any], skin: str) -> str:
+    """The quantity in which a skin most probably departs."""
+    each = {
+        entry["parameter"]: one["probability"]
+        for entry in fleet["population"]
+        for one in entry["departures"]
+        if one["skin"] == skin
+    }
+    return max(each, key=lambda parameter: each[parameter])
+
+
+def sisters(count: int) -> dict[str, list[Campaign]]:
+    return {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(count)}
+
+
+@pytest.mark.slow
+def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_the_others(table: SigmaTable) -> None:
+    fleet = diagnose_fleet(sisters(2) | {"weak": [made("weak", seed=40, d33=9.0)]}, table, "batch")
+    d33 = population(fleet, "d33")
+    assert departures(fleet) == {"weak"}
+    assert likeliest(fleet, "weak") == "d33"
+    assert d33["mean"] == pytest.approx(14.0, rel=0.03)
+    assert fleet["verdict"] == "explained"
+    assert "weak departs in d33: " in fleet["statement"]
+    truth = {"skin-0": 14.0, "skin-1": 14.0, "weak": 9.0}
+    assert all(entry["low"] < truth[entry["skin"]] < entry["high"] for entry in d33["skins"])
+
+
+@pytest.mark.slow
+def test_of_many_skins_two_that_depart_are_named(table: SigmaTable) -> None:
+    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in range(5)}
+    skins |= {"weak": [made("c8", seed=40, d33=9.0)], "strong": [made("c9", seed=41, d33=20.0)]}
+    fleet = diagnose_fleet(skins, table, "batch")
+    assert departures(fleet) == {"weak", "strong"}
+    assert population(fleet, "d33")["mean"] == pytest.approx(14.4, rel=0.03)
+
+
+@pytest.mark.slow
+def test_a_skin_of_another_modulus_departs_in_that_while_its_d33_stays(table: SigmaTable) -> None:
+    """What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope."""
+    fleet = diagnose_fleet(sisters(3) | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
+    assert departures(fleet) == {"soft"}
+    assert likeliest(fleet, "soft") == "youngs_modulus"
+    (entry,) = fleet["mechanisms"]
+    assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": ["soft"]})
+    for parameter, truth in (("youngs_modulus", 6.0), ("d33", 14.0)):
+        own = next(one for one in population(fleet, parameter)["skins"] if one["skin"] == "soft")
+        assert own["low"] < truth < own["high"]
+
+
+@pytest.mark.slow
+def test_a_skin_of_another_thickness_departs_in_that(table: SigmaTable) -> None:
+    thin = made("thin", seed=40, effects={"thickness_error": {"factor": 0.8}})
+    fleet = diagnose_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
+    assert departures(fleet) == {"thin"}
+    assert likeliest(fleet, "thin") == "thickness"
+    (entry,) = fleet["mechanisms"]
+    assert (entry["name"], entry["scope"]) == ("thickness_error", {"skins": ["thin"]})
+    own = next(one for one in population(fleet, "thickness")["skins"] if one["skin"] == "thin")
+    assert own["low"] < 0.8 * 2.5 < own["high"]
+
+
+@pytest.mark.slow
+def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: SigmaTable) -> None:
+    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, modulus=32.0)] for n in range(3)}
+    fleet = diagnose_fleet(skins, table, "batch")
+    assert departures(fleet) == set()
+    (entry,) = fleet["mechanisms"]
+    assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
+    assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(32.0, rel=0.1)
+
+
+@pytest.mark.slow
+def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable) -> None:
+    skins = {
+        f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=d33, modulus=modulus)]
+        for n, (d33, modulus) in enumerate([(13.6, 15.5), (14.2, 16.6), (14.0, 16.0), (14.5, 15.8)])
+    }
+    fleet = diagnose_fleet(skins, table, "batch")
+    assert departures(fleet) == set()
+    assert (fleet["verdict"], fleet["mechanisms"]) == ("no_mismatch", [])
+    assert "None is seen to depart" in fleet["statement"]
+
+
+@pytest.mark.slow
+def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
+    """Alone its interval is wider than with them, and over ten draws the pooled one holds the true d33."""
+    fewer, held = [], []
+    three = sisters(3)
+    for seed in range(10):
+        whole = made("few", seed=60 + seed)
+        few = replace(whole, recordings=whole.recordings[:2])
+        fleet = diagnose_fleet(three | {"few": [few]}, table, "batch")
+        own = next(one for one in population(fleet, "d33")["skins"] if one["skin"] == "few")
+        held.append(own["low"] < 14.0 < own["high"])
+        alone = report(diagnose(few, table))["d33"]
+        fewer.append(alone is None or own["high"] / own["low"] < alone["high"] / alone["low"])
+    assert sum(held) >= 8  # less is as probable as 1 %, at 95 % each
+    assert np.mean(fewer) > 0.5
+
+
+@pytest.mark.slow
+def test_strengths_of_a_mechanism_that_all_have_are_a_population(table: SigmaTable) -> None:
+    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, effects=HEAVY_TIP)] for n in range(3)}
+    fleet = diagnose_fleet(skins, table, "batch")
+    assert [(entry["name"], entry["scope"]) for entry in fleet["mechanisms"]] == [
+        ("contact_resonance", {"skins": list(skins)})
+    ]
+    mass = population(fleet, "contact_resonance.tip_mass")
+    assert (mass["unit"], mass["departures"]) == ("g", [])
+    assert all(entry["low"] < 4.0 < entry["high"] for entry in mass["skins"])

@@ -1,0 +1,188 @@
+"""The report of skins of one make that were diagnosed as a fleet."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
+from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
+from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.several.common_set import CommonSet
+from underskin.diagnosis.several.course import Candidate
+from underskin.diagnosis.several.population import REGULAR, Populations
+from underskin.diagnosis.several.skin import D33, ERRORS, QUANTITIES
+from underskin.diagnosis.several.strengths import DEPARTS, Strength
+from underskin.findings.formatting import in_percent
+
+STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
+_WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
+_UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """What was found: the usable skins, the sets of their mechanisms, their E, thickness and d33, the probabilities
+    that one of the first two is declared wrongly for all skins, and the strengths of mechanisms."""
+
+    candidates: Mapping[str, Candidate]
+    common: CommonSet
+    pooled: Populations
+    declared_wrongly: Mapping[str, float]
+    strengths: Sequence[Strength]
+
+
+def fleet_report(
+    name: str, campaigns: Sequence[str], results: Mapping[str, DiagnosisResult], fleet: Fleet
+) -> dict[str, Any]:
+    """Of a fleet of this name, its campaigns' names, and the result of each skin alone."""
+    usable = {skin: results[skin] for skin in fleet.candidates}
+    lacking = [skin for skin in results if skin not in usable]
+    reports = {skin: report(result) for skin, result in usable.items()}
+    populations = [*_populations(fleet), *(_of_strength(strength) for strength in fleet.strengths)]
+    mechanisms = _mechanisms(fleet)
+    departs = any(entry["departures"] for entry in populations)
+    undescribed = {skin: one.undescribed for skin, one in fleet.candidates.items()}
+    unexplained = [skin for skin, share in undescribed.items() if share > STATED]
+    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
+    wrongly = max(fleet.declared_wrongly.values(), default=0.0)
+    declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
+    probability = 1 - described if unexplained else fleet.common.probability * declared * described
+    d33 = next(entry for entry in populations if entry["parameter"] == D33)
+    return {
+        "schema": SCHEMA,
+        "campaign": name,
+        "campaigns": list(campaigns),
+        "verdict": _verdict(probability, bool(mechanisms) or departs, unexplained),
+        "probability": round(probability, 3),
+        "statement": _statement(probability, mechanisms, unexplained, lacking, populations),
+        "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
+        "mechanisms": mechanisms,
+        "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
+        "unnamed": None,
+        "alternatives": [],
+        "not_identifiable": [],
+        "findings": [
+            {**finding, "statement": f"{skin}: {finding['statement']}"}
+            for skin, own in reports.items()
+            for finding in own["findings"]
+        ],
+        "fit": None,
+        "power": [],
+        "population": populations,
+        "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
+        "next_experiment": None,
+        "provenance": {
+            **next(iter(usable.values())).provenance,
+            "each": [
+                {"skin": skin, "verdict": own["verdict"], "probability": own["probability"]}
+                for skin, own in reports.items()
+            ],
+        },
+    }
+
+
+def _populations(fleet: Fleet) -> list[dict[str, Any]]:
+    """Of d33, E and the thickness."""
+    pooled, skins = fleet.pooled, tuple(fleet.candidates)
+    rows = {quantity: (row, departure) for row, (departure, quantity) in enumerate(QUANTITIES.items())}
+    return [
+        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity])
+        for quantity in (D33, *(quantity for quantity in rows if quantity != D33))
+    ]
+
+
+def _of_strength(strength: Strength) -> dict[str, Any]:
+    return _population(strength.parameter, strength.unit, strength.skins, strength.population, 0, DEPARTS)
+
+
+def _population(
+    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str
+) -> dict[str, Any]:
+    mean = float(np.exp(pooled.mean[row]))
+    value, low, high = np.exp(pooled.of_skins[:, :, row])
+    return {
+        "parameter": parameter,
+        "unit": unit,
+        "mean": rounded(mean),
+        "sd": rounded(mean * float(pooled.spread[row]), 3),
+        "departures": [
+            {"skin": skin, "value": rounded(float(value[number])), "probability": round(share, 3)}
+            for number, (skin, own) in enumerate(zip(skins, pooled.departs, strict=True))
+            if own[REGULAR] < 1 - STATED and (share := own.get(departure, 0.0)) > _WORTH_SAYING
+        ],
+        "skins": [
+            {
+                "skin": skin,
+                "value": rounded(float(value[number])),
+                "low": rounded(float(low[number])),
+                "high": rounded(float(high[number])),
+            }
+            for number, skin in enumerate(skins)
+        ],
+    }
+
+
+def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
+    """With the skins that have each; a declared E or thickness that is wrong for all, or for one that departs in it."""
+    present: dict[str, dict[str, float]] = {
+        error: dict.fromkeys(fleet.candidates, share)
+        for error, share in fleet.declared_wrongly.items()
+        if share > STATED
+    }
+    for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.each, strict=True):
+        for mechanism in names:
+            present.setdefault(mechanism, {})[skin] = share
+    for skin, own in zip(fleet.candidates, fleet.pooled.departs, strict=True):
+        likely = max(own, key=lambda departure: own[departure])
+        if likely in ERRORS and own[likely] > STATED:
+            present.setdefault(likely, {})[skin] = own[likely]
+    return [
+        {
+            "name": mechanism,
+            "probability": round(float(np.mean(list(each.values()))), 3),
+            "parameters": [],
+            "explains_percent": None,
+            "scope": {"skins": list(each)},
+        }
+        for mechanism, each in present.items()
+    ]
+
+
+def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
+    if unexplained:
+        return "unexplained"
+    if probability < EXPLAINED:
+        return "ambiguous"
+    return "explained" if anything else "no_mismatch"
+
+
+def _statement(
+    probability: float,
+    mechanisms: Sequence[Mapping[str, Any]],
+    unexplained: Sequence[str],
+    lacking: Sequence[str],
+    populations: Sequence[Mapping[str, Any]],
+) -> str:
+    each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
+    missing = "; ".join(each) or in_words((NOTHING_MISSING,))
+    parts = [f"By skin: {missing} ({in_percent(probability)} probability)."]
+    if unexplained:
+        parts[0] = (
+            f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}."
+        )
+    departures: dict[str, list[str]] = {}
+    for entry in populations:
+        for one in entry["departures"]:
+            departures.setdefault(one["skin"], []).append(
+                f"in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the others have "
+                f"{entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})"
+            )
+    parts += [f"{skin} departs {', or '.join(ways)}." for skin, ways in departures.items()]
+    if not departures:
+        parts.append("None is seen to depart from the others.")
+    if lacking:
+        parts.append(f"Nothing could be told of {', '.join(lacking)}.")
+    return " ".join(parts)
