@@ -34,7 +34,8 @@ def wrong_modulus(result: Result) -> str:
 (`underskin prove wrong_modulus`, `proof/wrong_modulus.py`, seed {result["seed"]}), half beside a compressed block or
 indentations, a third with a companion; {len(visible)} visible (more than 20 in χ² together). *Named or grouped*:
 `modulus_error` is in the leading set, or in a group that holds 80 %. *Determined*: the standard deviation of ln E is
-below 5 % on the FRFs by the rig's equations, or a block or indentations are there.
+below 5 % on the FRFs by the rig's equations, or a block or indentations are there. These equations take a scatter of
+places to first order: of contacts centred on their sensors they promise more than there is where it is large.
 
 {table(head, [[called, *_row(entries)] for called, entries in parts.items()])}
 {_of_contacts(visible)}

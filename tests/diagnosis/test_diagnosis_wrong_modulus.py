@@ -94,3 +94,22 @@ def test_where_the_modulus_is_right_contacts_beyond_the_tables_are_left_out(tabl
     assert report["verdict"] == "no_mismatch"
     assert codes(report).count("out_of_domain") == 4
     assert "contacts_kept" not in codes(report)
+
+
+@pytest.mark.slow
+def test_a_layered_contact_keeps_what_hertz_puts_beyond_the_tables(table: SigmaTable) -> None:
+    """Hertz' a/h of 4.4 N under 16 mm is 3.2 here; the layer's own contact is narrower."""
+    layered = Made(
+        mechanisms=("layered_contact",),
+        modulus_mpa=1.2,
+        thickness_mm=1.0,
+        sensor_radius_mm=0.7,
+        preloads_n=(0.5, 1.5, 3.0, 4.4),
+        spheres_mm=(8.0, 16.0),
+        offsets_mm=(0.0, 0.6),
+    )
+    report = diagnosis_report(campaign(layered, table), table)
+    assert {entry["name"] for entry in report["mechanisms"]} == {"layered_contact"}
+    (kept,) = (entry["statement"] for entry in report["findings"] if entry["code"] == "contacts_kept")
+    assert "4 of 32 contacts" in kept
+    assert "with the values found for layered contact" in kept

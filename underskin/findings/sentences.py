@@ -273,8 +273,9 @@ def contact_slips(ratio: float, more: int) -> str:
     return f"{text}{more_rows(more, 'contacts')}"
 
 
-def contacts_kept(contacts: int, recordings: int, declared_mpa: float, found_mpa: float, answer: str) -> str:
-    """Contacts that are within the tables by the values found, and not by the declared ones."""
-    found = f"at the {found_mpa:.3g} MPa found" if found_mpa != declared_mpa else f"with the values found for {answer}"
+def contacts_kept(contacts: int, recordings: int, declared_mpa: float, found_mpa: float | None, answer: str) -> str:
+    """Contacts that are within the tables by the values found, and not by the declared ones; `found_mpa` is None where
+    no other modulus is among these."""
+    found = f"with the values found for {answer}" if found_mpa is None else f"at the {found_mpa:.3g} MPa found"
     number = f"{contacts} of {recordings} contacts"
     return f"by the declared {declared_mpa:g} MPa {number} lie beyond the tables, {found} they lie within: kept"

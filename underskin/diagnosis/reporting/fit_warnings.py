@@ -60,12 +60,15 @@ def _kept(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     if not len(kept):
         return []
     assert skin.youngs_modulus_mpa is not None
-    factor = dict(zip([entry.name for entry in explanation.model.parameters], explanation.point.fit, strict=True))
+    fit = dict(zip([entry.name for entry in explanation.model.parameters], explanation.point.fit, strict=True))
+    found_mpa = None
+    if "modulus_factor" in fit:
+        found_mpa = skin.youngs_modulus_mpa * float(np.exp(fit["modulus_factor"] + fit["youngs_modulus"]))
     arguments = {
         "contacts": len(kept),
         "recordings": problem.lines.recordings,
         "declared_mpa": skin.youngs_modulus_mpa,
-        "found_mpa": skin.youngs_modulus_mpa * float(np.exp(factor.get("modulus_factor", 0.0))),
+        "found_mpa": found_mpa,
         "answer": in_words([in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]),
     }
     return [Finding(Reason.CONTACTS_KEPT, "", "skin.youngs_modulus_mpa", arguments)]
