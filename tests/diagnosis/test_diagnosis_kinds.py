@@ -12,7 +12,8 @@ from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.selection.other_kinds import OtherKind
+from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
+from underskin.diagnosis.selection.search import search
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -26,14 +27,14 @@ LINES: dict[str, Any] = {
     "lines": {"low_hz": 1, "high_hz": 130, "count": 20},
     "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
 }
-BLOCK = {
+BLOCK: dict[str, Any] = {
     "heights_mm": [12],
     "diameters_mm": [20],
     "largest_displacement_mm": 1.0,
     "speeds_mm_per_s": [0.1],
     "force_noise_n": 0.05,
 }
-SPHERE = {
+SPHERE: dict[str, Any] = {
     "indenters_mm": [4],
     "largest_displacement_mm": 0.25,
     "speeds_mm_per_s": [0.05],
@@ -82,10 +83,11 @@ def modulus_of(document: Mapping[str, Any], kind: str) -> dict[str, Any]:
     return dict(entry)
 
 
-@pytest.mark.parametrize(("kind", "design"), [("compression", BLOCK), ("indentation", SPHERE)])
+@pytest.mark.parametrize(("kind", "design", "width"), [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
 def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
-    kind: str, design: Mapping[str, Any], table: SigmaTable
+    kind: str, design: Mapping[str, Any], width: float, table: SigmaTable
 ) -> None:
+    """How wide a block has E depends on friction, which one shape does not tell."""
     measured = lines(9.0)
     alone = report(measured, [], table)
     assert alone["verdict"] == "ambiguous"
@@ -96,7 +98,7 @@ def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     assert factor["low"] < 9 / 16 < factor["high"]
     told = modulus_of(together, kind)
     assert told["low"] < 9.0 < told["high"]
-    assert told["high"] / told["low"] < 1.2
+    assert told["high"] / told["low"] < width
     assert "E from the " in together["statement"]
     assert "declared 16" in together["statement"]
     assert together["contradictions"] == []
@@ -123,6 +125,29 @@ def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable
     assert friction["low"] < 0.6 < friction["high"]
     assert document["mechanisms"][0]["explains_percent"] > 50
     assert modulus_of(document, "compression")["value"] == pytest.approx(16.0, rel=0.03)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 0.8])
+def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: float, table: SigmaTable) -> None:
+    blocks = curves("compression", BLOCK, effects={"platen_friction": {"friction": friction}} if friction else {})
+    document = report(lines(), blocks, table)
+    assert (document["verdict"], document["contradictions"]) == ("no_mismatch", [])
+    told = modulus_of(document, "compression")
+    assert told["low"] < 16.0 < told["high"]
+    bonded = 1 + 2 * (BLOCK["diameters_mm"][0] / (4 * BLOCK["heights_mm"][0])) ** 2
+    assert told["low"] > 0.93 * 16.0 * (1 + friction * (bonded - 1)) / bonded
+    assert told["high"] < 1.07 * 16.0 * (1 + friction * (bonded - 1))
+
+
+def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: SigmaTable) -> None:
+    """Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both."""
+    layer: Effects = {"layered_contact": {}}
+    deep = {**SPHERE, "largest_displacement_mm": 0.8}
+    document = report(lines(9.0, layer), curves("indentation", deep, 9.0, layer), table)
+    assert set(named(document)) == {"layered_contact", "modulus_error"}
+    assert document["contradictions"] == []
+    told = modulus_of(document, "indentation")
+    assert told["low"] < 9.0 < told["high"]
 
 
 def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTable) -> None:
@@ -177,7 +202,8 @@ def test_the_likelihood_of_the_curves_has_their_evidence_under_their_prior(table
     document = lines()
     document["recordings"] += curves("compression", BLOCK)
     campaign = parse(document)
-    other = OtherKind(campaign, "compression", table, ())
+    apart = of_curves(campaign, "compression", table, ())
+    other = OtherKind("compression", apart, search(apart).explanations)
     problem = FittingProblem(frf_lines(campaign), table, Beside([other]))
     hypothesis = problem.hypothesis(("modulus_error",), placed=False)
     assert hypothesis.knowledge is not None

@@ -122,12 +122,12 @@ def _of_frf(
 
     alone, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
 
-    def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
+    def fitted(beside: Beside | None, asked_for: Sequence[frozenset[str]]) -> tuple[FittingProblem, Search]:
         """Beside other kinds under the same noise, so that evidences can be compared."""
         if beside is None:
             return alone, search(alone, known)
         problem = FittingProblem(alone.lines, table, beside)
-        return problem, search(problem)
+        return problem, search(problem, asked_for=asked_for)
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search
@@ -148,9 +148,9 @@ def _of_curves(
     mechanisms.bind(campaign, table, kind)
     rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
 
-    def fitted(beside: Beside | None) -> tuple[FittingProblem, Search]:
+    def fitted(beside: Beside | None, asked_for: Sequence[frozenset[str]]) -> tuple[FittingProblem, Search]:
         problem = FittingProblem(rows, table, beside)
-        return problem, search(problem)
+        return problem, search(problem, asked_for=asked_for)
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search

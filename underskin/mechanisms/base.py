@@ -152,6 +152,11 @@ class Mechanism:
         """
         return values
 
+    def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
+        """Logarithms of by how much too large an apparent modulus may be by it, equally probable, where the recordings
+        cannot tell it from the modulus; none where they can."""
+        return ()
+
     def bind(self, conditions: Conditions, table: SigmaTable) -> Mechanism:
         """The mechanism for the recordings of one campaign and their parts; itself where it needs no campaign."""
         return self

@@ -85,6 +85,7 @@ class Request:
     parent: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
     larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
+    kept: bool = False  # fitted to its end however far behind it begins
 
     @property
     def without_scatter(self) -> bool:
@@ -242,7 +243,7 @@ def _fitted(
         points = stacked([starts[number] for number in members])
         gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
         least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
-        kept = [len(requests[number].names) <= least for number in members]
+        kept = [requests[number].kept or len(requests[number].names) <= least for number in members]
         hopeless = np.where(kept, np.inf, _HOPELESS)[points.owner]
 
         def target(at: Evaluated, gains: Floats = gains, hopeless: Floats = hopeless, best: float = best) -> Floats:

@@ -24,7 +24,7 @@ def with_scatter(hypotheses: Sequence[Hypothesis], points: Mapping[int, Points])
 
 
 def hardly_scatters(evidence: Evidence) -> bool:
-    """Whether the positioning scatter that a parent needed is less than is usual here: what was added may explain it."""
+    """Whether positioning scatter, which a parent needed, is less than usual here: what was added may explain it."""
     return float(evidence.point.covariance[POSITION]) < POSITION_PRIOR.middle
 
 

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
@@ -13,7 +11,7 @@ from underskin.diagnosis.inference.over_spread import over_spread
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.inference.unseen import Normals, beside, together
 from underskin.diagnosis.reporting.law_level import law_levels
-from underskin.diagnosis.reporting.numbers import place_of, rounded
+from underskin.diagnosis.reporting.numbers import mixture_quantile, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS
 
@@ -82,17 +80,12 @@ def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
         [_d33_under(search, problem, explanation, probability).times(probability) for probability, explanation in each]
     )
     share = mixture.share / mixture.share.sum()
-
-    def quantile(level: float) -> float:
-        def beyond(at: float) -> float:
-            return float(share @ ndtr((at - mixture.mean) / mixture.deviation) - level)
-
-        far = 8 * mixture.deviation.max()
-        return float(np.exp(brentq(beyond, mixture.mean.min() - far, mixture.mean.max() + far)))
-
+    ends = {
+        key: np.exp(mixture_quantile(level, share, mixture.mean, mixture.deviation))
+        for key, level in (("value", 0.5), ("low", 0.025), ("high", 0.975))
+    }
     entry = each[0][1].model.parameters[place_of(each[0][1], "d33")]
-    ends = {"value": rounded(quantile(0.5)), "low": rounded(quantile(0.025)), "high": rounded(quantile(0.975))}
-    return {"name": "d33", "unit": entry.unit, **ends}
+    return {"name": "d33", "unit": entry.unit, **{key: rounded(float(at)) for key, at in ends.items()}}
 
 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:

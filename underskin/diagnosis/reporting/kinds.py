@@ -7,7 +7,8 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, mixture_quantile, parameter, place_of, rounded
+from underskin.diagnosis.selection.curve_knowledge import OfCurves
 from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
@@ -25,7 +26,7 @@ def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
     for kind in joined.beside.kinds:
         known = joined.beside.told(kind, leading)
         explanation = known.best
-        stated = [_tolerant(parameter(explanation, place_of(explanation, "youngs_modulus")), known.tolerance)]
+        stated = [_of_elastomer(parameter(explanation, place_of(explanation, "youngs_modulus")), known)]
         for own in own_places(explanation.names, explanation.best.hypothesis.lines).values():
             stated += [parameter(explanation, place) for place in range(own.start, own.stop)]
         told += [{"kind": kind.kind, **_entry(entry)} for entry in stated]
@@ -33,14 +34,14 @@ def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
     return told if own_modulus is None else [own_modulus, *told]
 
 
-def _tolerant(modulus: Mapping[str, Any], tolerance: float) -> dict[str, Any]:
-    """With an interval that allows for how the modulus may differ from the skin's."""
-    value = modulus["value"]
-    ways = [np.log(modulus[key] / value) for key in ("low", "high")]
-    low, high = (
-        value * np.exp(sign * np.hypot(way, SDS_OF_95 * tolerance)) for sign, way in zip((-1, 1), ways, strict=True)
-    )
-    return {**modulus, "low": rounded(float(low)), "high": rounded(float(high))}
+def _of_elastomer(modulus: Mapping[str, Any], known: OfCurves) -> dict[str, Any]:
+    """With an interval that allows for what an apparent modulus hides, and for how the skin's may differ."""
+    deviation = np.log(modulus["high"] / modulus["low"]) / (2 * SDS_OF_95)
+    hidden, shares = np.array(known.hidden).T
+    means, deviations = np.log(modulus["value"]) - hidden, np.full(len(hidden), np.hypot(deviation, known.tolerance))
+    levels = {"value": 0.5, "low": 0.025, "high": 0.975}
+    ends = {key: np.exp(mixture_quantile(level, shares, means, deviations)) for key, level in levels.items()}
+    return {**modulus, **{key: rounded(float(at)) for key, at in ends.items()}}
 
 
 def _entry(stated: Mapping[str, Any]) -> dict[str, Any]:

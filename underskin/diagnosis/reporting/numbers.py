@@ -3,13 +3,15 @@
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.laplace import levels_covariance
 from underskin.diagnosis.inference.profile import profile_end
 from underskin.mechanisms.parameter import Parameter
+from underskin.units import Floats
 
 SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
 
@@ -17,6 +19,16 @@ SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard
 def rounded(value: float, digits: int = 4) -> float | None:
     """To significant digits; None for what is not finite."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
+
+
+def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
+    """Of a mixture of normal distributions, whose `shares` sum to 1, (parts,)."""
+
+    def beyond(at: float) -> float:
+        return float(shares @ ndtr((at - means) / deviations) - level)
+
+    far = 8 * deviations.max()
+    return float(brentq(beyond, means.min() - far, means.max() + far))
 
 
 def place_of(explanation: Explanation, name: str) -> int:

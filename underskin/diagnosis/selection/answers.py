@@ -184,10 +184,15 @@ class Search:
         return [Answer(answer.explanation, answer.probability * share, alone) for alone, share in each if share > 1e-6]
 
     @property
+    def weighed(self) -> list[tuple[Explanation, float]]:
+        """The sets that show, and those beneath the processes that show, with the logarithm of prior times evidence."""
+        showing = [(entry, self.log_weight(entry)) for entry in self.explanations if self.shows(entry)]
+        return [*showing, *self.processes_showing]
+
+    @property
     def log_total(self) -> float:
         """The logarithm of the sum over all answers of prior times evidence."""
-        weights = [self.log_weight(entry) for entry in self.explanations if self.shows(entry)]
-        return float(np.logaddexp.reduce([*weights, *(weight for _, weight in self.processes_showing)]))
+        return float(np.logaddexp.reduce([weight for _, weight in self.weighed]))
 
     def _possible_beside(
         self, kept: Sequence[Explanation], weights: Sequence[float]

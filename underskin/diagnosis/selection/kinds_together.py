@@ -1,7 +1,8 @@
 """Several kinds of recordings in one campaign: explained together, unless they contradict each other.
 
 That curves and FRFs are of one material is a hypothesis like any other: its rival, that each kind has a modulus and
-strengths of its own, has the evidence of the kinds apart and a small prior.
+strengths of its own, has the evidence of the kinds apart, with the same priors of what is missing, and a small prior:
+another elastomer beside the skin's is rarer than a modulus that was declared wrong.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -11,15 +12,19 @@ import numpy as np
 
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.other_kinds import Beside, OtherKind
+from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
+from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.priors import least_evidence
+from underskin.diagnosis.selection.search import search
 from underskin.mechanisms.base import Kind
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
-_APART = 0.03  # prior of kinds that are not of one material
+_ALSO = 2  # answers of recordings alone whose sets are tried together with those of the curves
+_APART = 3e-3  # prior of kinds that are not of one material
 
-Fitted = Callable[[Beside | None], tuple[FittingProblem, Search]]
+# Recordings explained beside the curves of other kinds, with sets that are to be among those tried; or alone
+Fitted = Callable[[Beside | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
 
 
 @dataclass(frozen=True)
@@ -56,15 +61,30 @@ class Others:
     def joined(self, fitted: Fitted) -> Joined:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
-            return Joined(*fitted(None))
-        beside = Beside(
-            [OtherKind(campaign, kind, self._table, self._without) for kind, campaign in self._campaigns.items()]
-        )
-        problem, together = fitted(beside)
-        alone, apart = fitted(None)
-        log_apart = apart.log_total + sum(map(beside.log_evidence_apart, beside.kinds)) + np.log(_APART)
+            return Joined(*fitted(None, ()))
+        beside = Beside([self._searched(kind, campaign) for kind, campaign in self._campaigns.items()])
+        alone, apart = fitted(None, ())
+        best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
+        problem, together = fitted(beside, beside.asked_for(alone.lines, best))
+        log_apart = _log_apart(apart, beside) + np.log(_APART)
         log_together = together.log_total + np.log1p(-_APART)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
         if contradictory > 0.5:
             return Joined(alone, apart, beside, apart, contradictory)
         return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
+
+    def _searched(self, kind: Kind, campaign: Campaign) -> OtherKind:
+        problem = of_curves(campaign, kind, self._table, self._without)
+        return OtherKind(kind, problem, search(problem).explanations)
+
+
+def _log_apart(apart: Search, beside: Beside) -> float:
+    """The logarithm of the sum over what recordings alone say, times what curves say with parameters of their own."""
+    return float(
+        np.logaddexp.reduce(
+            [
+                weight + sum(beside.log_evidence_apart(kind, entry.names, apart.supported) for kind in beside.kinds)
+                for entry, weight in apart.weighed
+            ]
+        )
+    )

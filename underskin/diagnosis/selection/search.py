@@ -14,17 +14,23 @@ from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection import curve_sets
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.curve_sets import Explanations
+from underskin.diagnosis.selection.priors import LARGEST
 from underskin.diagnosis.selection.unnamed_rivals import discrepancy
 from underskin.mechanisms.base import Unsupported
 
-_PARENTS = 3
+_PARENTS, _LARGEST = 3, 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
-def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search:
-    """Fit nothing, every single, then what grows from the best; what is `known` of them is taken over."""
+def search(
+    problem: FittingProblem, known: Sequence[Explanation] = (), asked_for: Sequence[frozenset[str]] = ()
+) -> Search:
+    """Fit nothing, every single, sets that other kinds of recordings have `asked_for`, then what grows from the best.
+
+    What is `known` of them is taken over.
+    """
     explanations: Explanations = {frozenset(entry.names): entry for entry in known}
     tried = {frozenset[str]()}
     unsupported: dict[str, str] = {}
@@ -41,8 +47,11 @@ def search(problem: FittingProblem, known: Sequence[Explanation] = ()) -> Search
         _explain(problem, explanations, singles[:1])
         singles = [Request(request.names, begin=explanations[frozenset()].point) for request in singles[1:]]
     _explain(problem, explanations, singles)
+    beside = [Request(tuple(name for name in catalogue if name in one), kept=True) for one in asked_for if len(one) > 1]
+    tried |= {frozenset(request.names) for request in beside}
+    _explain(problem, explanations, beside)
     integrated: Explanations = {}
-    for size in (2, 3):
+    for size in range(2, (LARGEST if asked_for else _LARGEST) + 1):
         integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
         explanations |= integrated
         if problem.lines.curves and size == 2:
@@ -111,7 +120,7 @@ def _parents(result: Search, size: int) -> list[Explanation]:
     """The explanations, one mechanism smaller, from which sets of this size grow."""
     ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
     best = result.log_weight(ranked[0])
-    if size == 3:
-        return ranked[:1] if len(ranked[0].names) == 2 else []
+    if size > 2:
+        return ranked[:1] if len(ranked[0].names) == size - 1 else []
     smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
     return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]

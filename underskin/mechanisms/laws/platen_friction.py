@@ -1,9 +1,16 @@
 """The mechanism `platen_friction`."""
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter, Uniform
+from underskin.recordings.conditions import CompressionConditions, Conditions
 
+_ONE_SHAPE = 1.05  # of S²: samples that differ by less tell friction from the modulus no better than noise
+_FRICTIONS = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)  # even quantiles of its prior
 _REASON = "from well oiled to bonded: nothing is known beforehand"
 
 
@@ -25,6 +32,17 @@ class PlatenFriction(Mechanism):
     parameters_stated = (
         Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=_REASON),
     )
+
+    def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:
+        """Of samples of one shape."""
+        shapes = [
+            (0.25 * entry.sample_diameter_mm / entry.sample_height_mm) ** 2
+            for entry in conditions.recordings
+            if isinstance(entry, CompressionConditions)
+        ]
+        if not shapes or max(shapes) > _ONE_SHAPE * min(shapes):
+            return ()
+        return [float(np.log1p(2 * friction * np.mean(shapes))) for friction in _FRICTIONS]
 
     def on_curve(self, curve: Curve, values: Values) -> None:
         """Let the platens hold."""

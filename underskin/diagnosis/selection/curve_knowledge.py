@@ -1,0 +1,188 @@
+"""What curves of one kind, beside recordings of another, tell of the elastomer that is common to both.
+
+The curves are searched with the modulus free, as if they were alone; each subset of the mechanisms that act on both
+kinds then leaves something to be known. Mechanisms of the curves alone (a stage that gives) are summed over; so are
+those that an apparent modulus may hide whatever the curves look like (friction at the platens).
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.autodiff import Differentiated
+from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.selection.priors import least_evidence, log_prior
+from underskin.mechanisms.base import Kind, Unsupported
+from underskin.mechanisms.parameter import Parameter
+from underskin.mechanisms.registry import Known
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, to_si
+
+_BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
+_EXTRAPOLATED = 0.7  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_HIDES = 0.5  # prior of what does not show: platens are oiled as often as they are not
+MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
+
+Quantity = tuple[str, str]  # a mechanism, or none, and what is known of it
+
+
+@dataclass(frozen=True, eq=False)
+class OfCurves:
+    """What one subset of the mechanisms that act on both kinds leaves to be known.
+
+    `each` set of mechanisms that holds it and none else but the curves' own, with its log prior times evidence, that
+    without these first; `mean` (quantities,) and `covariance` of the `quantities` over all of them; `tolerance` is the
+    standard deviation by which the logarithm of the modulus may differ from the skin's; `hidden` are by how much the
+    logarithm of the apparent modulus may be too large by mechanisms that do not show, with their probabilities.
+    """
+
+    each: tuple[tuple[Explanation, float], ...]
+    quantities: tuple[Quantity, ...]
+    mean: Floats
+    covariance: Floats
+    tolerance: float = _BATCH
+    hidden: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
+
+    @property
+    def best(self) -> Explanation:
+        """The most probable set's fit."""
+        return max(self.each, key=lambda entry: entry[1])[0]
+
+    @property
+    def log_weight(self) -> float:
+        """The logarithm of the sum over the curves' own mechanisms."""
+        return float(np.logaddexp.reduce([weight for _, weight in self.each]))
+
+
+class OtherKind:
+    """The curves of one kind in a campaign that is diagnosed by recordings of another."""
+
+    def __init__(self, kind: Kind, problem: FittingProblem, explanations: Sequence[Explanation]) -> None:
+        """Curves with the modulus free (`of_curves`), and the sets of mechanisms that were found to explain them."""
+        self.kind, self.problem = kind, problem
+        self._explanations = {frozenset(entry.names): entry for entry in explanations}
+        mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
+        self.supported = tuple(name for name in mechanisms.named if self._supports(name))
+        may_hide = {name: mechanisms[name].hidden_in_modulus(conditions) for name in self.supported}
+        self._may_hide = {name: values for name, values in may_hide.items() if values}
+        self.found: dict[frozenset[str], OfCurves] = {}
+
+    def _supports(self, name: str) -> bool:
+        try:
+            self.problem.hypothesis((name,), placed=False)
+        except Unsupported:
+            return False
+        return True
+
+    def told(self, names: Collection[str], of_both: Sequence[str]) -> OfCurves:
+        """Under a set of mechanisms of those that act on both kinds; the curves' own ones may be there beside."""
+        key = frozenset(name for name in names if name in self.supported and name in of_both)
+        if key not in self.found:
+            self.found[key] = self._tolerant(self._fitted(key, of_both), key, of_both)
+        return self.found[key]
+
+    def tell_all(self, of_both: Sequence[str]) -> None:
+        """Under every set that was found, so that `found` holds them."""
+        for names in tuple(self._explanations):
+            self.told(names, of_both)
+
+    def _tolerant(self, told: OfCurves, names: frozenset[str], of_both: Sequence[str]) -> OfCurves:
+        """Where a law extrapolates the modulus to no strain: as unsure as a good part of what it takes off."""
+        plain = [name for name in names if not self.problem.lines.mechanisms[name].extrapolates_modulus]
+        if len(plain) == len(names):
+            return told
+        taken_off = float(told.mean[0] - self.told(plain, of_both).mean[0])  # what hides is in both
+        return replace(told, tolerance=float(np.hypot(_BATCH, _EXTRAPOLATED * taken_off)))
+
+    def _fitted(self, both: frozenset[str], of_both: Sequence[str]) -> OfCurves:
+        alone = {name for name in self.supported if name not in of_both and name not in self._may_hide}
+        without = self._explained(both)
+        shown = without.log_evidence + least_evidence(without)
+        beside = [
+            entry
+            for names, entry in self._explanations.items()
+            if names > both and names - both <= alone and entry.log_evidence > shown
+        ]
+        each = tuple(
+            (entry, entry.log_evidence + log_prior(len(entry.names) - len(both), len(alone)))
+            for entry in (without, *beside)
+        )
+        quantities, mean, covariance = _mixture(each, both)
+        hidden = self._hidden()
+        values, shares = np.array(hidden).T
+        mean[0] -= shares @ values
+        covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
+        return OfCurves(each, quantities, mean, covariance, hidden=hidden)
+
+    def _explained(self, names: frozenset[str]) -> Explanation:
+        if names not in self._explanations:
+            ordered = tuple(name for name in self.supported if name in names)
+            begin = self._explanations[frozenset()].point
+            (explanation,) = self.problem.explain([Request(ordered, begin=begin, kept=True)])
+            assert explanation is not None
+            self._explanations[names] = explanation
+        return self._explanations[names]
+
+    def _hidden(self) -> tuple[tuple[float, float], ...]:
+        """What the apparent modulus may hide, with probabilities."""
+        hidden = [(0.0, 1.0)]
+        for values in self._may_hide.values():
+            each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
+            hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
+        return tuple(hidden)
+
+
+def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
+    """The curves of one kind of a campaign, its modulus free; mechanisms `without` which all is to be explained."""
+    mechanisms = Known({MODULUS_ERROR, *without})
+    free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
+    mechanisms.bind(free, table, kind)
+    return FittingProblem(replace(curve_lines(free, kind), mechanisms=mechanisms), table)
+
+
+def _mixture(
+    each: Sequence[tuple[Explanation, float]], both: frozenset[str]
+) -> tuple[tuple[Quantity, ...], Floats, Floats]:
+    """Mean and covariance of what both kinds know, over sets with their log weights."""
+    weights = np.array([weight for _, weight in each])
+    shares = np.exp(weights - np.logaddexp.reduce(weights))
+    posteriors = [_posterior(entry, both) for entry, _ in each]
+    means = np.array([mean for _, mean, _ in posteriors])
+    mean = shares @ means
+    within = np.tensordot(shares, np.array([covariance for _, _, covariance in posteriors]), 1)
+    return posteriors[0][0], mean, within + (shares[:, None] * (means - mean)).T @ (means - mean)
+
+
+def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
+    """Mean and covariance of what both kinds know: the modulus' logarithm, the parameters of mechanisms."""
+    hypothesis, fit = explanation.best.hypothesis, explanation.point.fit
+    parameters, lines = explanation.model.parameters, hypothesis.lines
+    quantities: list[Quantity] = [MODULUS]
+    values, rows = [], []
+    modulus = [entry.name for entry in parameters].index("youngs_modulus")
+    values.append(fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0)))
+    rows.append(np.eye(len(fit))[modulus])
+    for name, place in own_places(explanation.names, lines).items():
+        if name not in both:
+            continue
+        seeds = {
+            entry.name: Differentiated(np.array([entry.from_fit(fit[index])]), _unit(entry, fit, index, len(fit)))
+            for index, entry in zip(range(place.start, place.stop), parameters[place], strict=True)
+        }
+        for key, quantity in lines.mechanisms[name].common(lines.kind, seeds).items():
+            quantities.append((name, key))
+            values.append(float(quantity.value[0]))
+            rows.append(quantity.slopes[:, 0])
+    by_fit = np.array(rows)[:, hypothesis.mean_places]
+    covariance = by_fit @ explanation.best.covariance @ by_fit.T
+    return tuple(quantities), np.array(values), covariance
+
+
+def _unit(entry: Parameter, fit: Floats, index: int, count: int) -> Floats:
+    slopes = np.zeros((count, 1))
+    slopes[index] = entry.from_fit(fit[index]) if entry.scale == "log" else 1.0
+    return slopes
