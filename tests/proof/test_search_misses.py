@@ -14,6 +14,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import search
 
+STOPPED = DrawnCase(900004, 54, "single", WIDE)  # of a step whose fit without scatter begins worse than others end
 MISLED = DrawnCase(900002, 29, "pair", WIDE)  # of a wrong thickness and gains of sensors, which alone look like scatter
 
 
@@ -23,6 +24,13 @@ def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> Non
     assert entry["found"] == entry["truth"] == ["sensor_spread", "thickness_error"]
     assert not is_miss(entry)
     assert abs(entry["lost_own"]) < 1.0
+
+
+@pytest.mark.slow
+def test_a_fit_that_was_stopped_as_hopeless_is_taken_up_where_scatter_shows_that_it_is_not() -> None:
+    entry = compared(STOPPED)
+    assert entry["found"] == entry["truth"] == ["sensor_relaxation"]
+    assert abs(entry["lost_own"]) < 0.5
 
 
 @pytest.mark.slow

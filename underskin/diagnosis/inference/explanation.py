@@ -168,6 +168,7 @@ class FittingProblem:
                 also_placed[number] = improved
         placed_starts |= with_scatter(placed, also_placed)
         best = min([best, *(evidence.cost for own in fits for _, evidence in own)])
+        shown_plain = {number for number, own in enumerate(fits) if own}
         scattering = _fitted(placed, placed_starts, requests, best)
         _add(fits, scattering, log_priors[1])
         for number, _, evidence in scattering:
@@ -176,7 +177,9 @@ class FittingProblem:
         also_plain = {
             number: without_scatter(improved)
             for number, improved, evidence in scattering
-            if number in scattered and evidence is not None and hardly_scatters(evidence)
+            if evidence is not None
+            and number not in shown_plain
+            and (number not in scattered or hardly_scatters(evidence))
         }
         _add(fits, _fitted(plain, also_plain, requests, best), log_priors[0])
         return [Explanation.of(own) if own else None for own in fits]

@@ -32,7 +32,7 @@ class ModulusError(Mechanism):
             "-",
             1 / LARGEST_FACTOR,
             LARGEST_FACTOR,
-            HeavyTailed(0.0, 0.35),
+            HeavyTailed(0.0, 0.45),
             "log",
             limit=1.0,
             shown=0.7,
