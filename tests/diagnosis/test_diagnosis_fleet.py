@@ -9,6 +9,8 @@ import pytest
 from tests.support.skins import HEAVY_TIP, made
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import report
+from underskin.diagnosis.several.bench import benches
+from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
@@ -122,6 +124,18 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: Sigma
         fewer.append(alone is None or own["high"] / own["low"] < alone["high"] / alone["low"])
     assert sum(held) >= 8  # less is as probable as 1 %, at 95 % each
     assert np.mean(fewer) > 0.5
+
+
+@pytest.mark.slow
+def test_a_skin_of_three_recordings_has_the_scatter_of_its_sisters(table: SigmaTable) -> None:
+    """The rig scatters gains by 2 % and no position."""
+    whole = made("few", seed=61)
+    campaigns = [*(one for (one,) in sisters(3).values()), replace(whole, recordings=whole.recordings[:3])]
+    results = [diagnose(one, table) for one in campaigns]
+    found = benches([Candidate(one.problem, one.search) for one in results if one.problem and one.search])
+    assert len(found) == 4
+    assert found[3].gain.middle == pytest.approx(np.log(0.02), abs=0.3)
+    assert found[3].placed < 0.3
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ import numpy as np
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.selection.priors import log_prior
-from underskin.diagnosis.several.bench_gain import gain_priors
+from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.campaigns import in_order, refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
@@ -89,12 +89,12 @@ class _Attempt:
 def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     """Of the usable skins."""
     each = list(candidates.values())
-    sets, gains = sets_of(each), gain_priors(each)
+    sets, on = sets_of(each), benches(each)
     supported = min(one.search.supported for one in each)
     odds = log_prior(1, supported) - log_prior(0, supported)
 
     def attempt(error: str, centre: tuple[float, float], log_prior_weight: float) -> _Attempt:
-        skins = [FleetSkin(one, with_smaller(sets), gain, centre) for one, gain in zip(each, gains, strict=True)]
+        skins = [FleetSkin(one, with_smaller(sets), bench, centre) for one, bench in zip(each, on, strict=True)]
         common = common_set(skins, sets, supported)
         return _Attempt(error, skins, common, common.log_evidence + log_prior_weight)
 

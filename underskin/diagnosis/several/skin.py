@@ -14,7 +14,7 @@ from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
 from underskin.diagnosis.inference.knowledge import Knowledge
-from underskin.diagnosis.noise.noise_priors import Plateau
+from underskin.diagnosis.several.bench import Bench
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.likelihoods import log_integral, mixed, of_posterior, posterior
 from underskin.diagnosis.several.population import REGULAR, State, log_odds_of_departure
@@ -39,11 +39,11 @@ class FleetSkin:
         self,
         candidate: Candidate,
         sets: Sequence[frozenset[str]],
-        gain: Plateau,
+        bench: Bench,
         centre: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        """Fit all sets; `gain` is the prior of the gain scatter's logarithm, `centre` ln of the make's E and thickness
-        over the declared ones."""
+        """Fit all sets; `bench` says what scatters, `centre` is ln of the make's E and thickness over the declared
+        ones."""
         self.candidate = candidate
         self._centre = centre
         skin = candidate.problem.lines.campaign.skin
@@ -52,7 +52,7 @@ class FleetSkin:
         self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])
         self.errors = tuple(name for name in ERRORS if name not in candidate.search.unsupported)
         self.departures = (*self.errors, D33)
-        self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), gain)
+        self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), bench)
 
     def log_evidence(self, names: frozenset[str], skins: int) -> float:
         """Of a set, whether the skin departs or not, as one of so many."""
@@ -98,7 +98,7 @@ class FleetSkin:
     def _log_integral(self, likelihood: Knowledge, departs: str) -> float:
         return log_integral(likelihood, *self._prior(departs)).item()
 
-    def _fits(self, sets: Sequence[frozenset[str]], gain: Plateau) -> Likelihoods:
+    def _fits(self, sets: Sequence[frozenset[str]], bench: Bench) -> Likelihoods:
         """Of those that can be fitted."""
         found: Likelihoods = {}
         lines, table = self.candidate.problem.lines, self.candidate.problem.table
@@ -108,10 +108,10 @@ class FleetSkin:
             def beside(model: Model, lines: Lines, held: Sequence[str] = held) -> Knowledge:
                 return self._about_make(model, lines, held)
 
-            problem = FittingProblem(lines, table, beside, gain)
+            problem = FittingProblem(lines, table, beside, bench.gain)
             for names, fit in zip(sets, _explained(problem, [{*names, *self.errors} for names in sets]), strict=True):
                 if fit is not None:
-                    each = [(share, self._said(fit, one, held)) for share, one in fit.each]
+                    each = [(_log_share(fit, one, bench), self._said(fit, one, held)) for _, one in fit.each]
                     found[names, departs] = mixed(each, *self._prior(departs))
         for names in sets:
             self._where_far(found, names)
@@ -165,6 +165,13 @@ class FleetSkin:
         by_fit = matrix[:, best.hypothesis.mean_places]
         mean = matrix @ best.point.fit + self.declared
         return of_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
+
+
+def _log_share(fit: Explanation, one: Evidence, bench: Bench) -> float:
+    """ln of the prior of a fit with or without positioning scatter, where there are both."""
+    if len(fit.each) == 1:
+        return 0.0
+    return float(np.log(bench.placed if one.hypothesis.placed else 1 - bench.placed))
 
 
 def _explained(problem: FittingProblem, sets: Sequence[set[str]]) -> list[Explanation | None]:
