@@ -197,7 +197,10 @@ def test_a_dead_sensor_stands_beside_the_verdict(table: SigmaTable) -> None:
 def test_each_dead_sensor_is_named(table: SigmaTable) -> None:
     dead = {"s1", "s2", "s4", "s5"}
     report = diagnosis_report(without_response(campaign(Made(sensors=7, lines=40), table), dead), table)
-    assert all(f"sensor {name!r} shows no response" in report["statement"] for name in dead)
+    told = [entry["statement"] for entry in report["findings"] if entry["code"] == "no_response"]
+    assert {said.split("'")[1] for said in told} == dead
+    assert sum(f"sensor {name!r} shows no response" in report["statement"] for name in dead) == 2
+    assert "further findings: 2 of no response" in report["statement"]
 
 
 @pytest.mark.slow
@@ -224,7 +227,7 @@ def test_what_is_left_out_of_an_explained_campaign_stands_at_the_head_of_its_pag
     silent = replace(first, frf_re_pc_per_n=np.zeros(40), frf_im_pc_per_n=np.zeros(40))
     report = diagnosis_report(replace(made, recordings=(silent, *made.recordings[1:])), table)
     assert report["verdict"] == "explained"
-    assert "Recording 'r0': every line is 0: left out." in report["statement"]
+    assert "Recording 'r0': every line is 0: left out; apart from that, the paper's model lacks" in report["statement"]
     shown = page(report)
     assert shown.index("every line is 0") < shown.index("<h2>")
     assert CATALOGUE["contact_resonance"].plain.split(",")[0] in report["statement"]

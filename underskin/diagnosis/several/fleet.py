@@ -17,10 +17,12 @@ from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_pla
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
+from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
-from underskin.diagnosis.several.campaigns import in_order, refuse_copies
+from underskin.diagnosis.several.campaigns import refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set
 from underskin.diagnosis.several.course import Candidate
+from underskin.diagnosis.several.dates import in_order
 from underskin.diagnosis.several.population import STATED, without_departing
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import in_percent
@@ -28,6 +30,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
+_MOST_TOLD = 3  # departures in the statement
 _MODULUS_ERROR = "modulus_error"
 _INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
 
@@ -272,19 +275,18 @@ def _statement(
     populations: Sequence[Mapping[str, Any]],
 ) -> str:
     each = [f"{in_words([name])} in {', '.join(where)}" for name, where in by_mechanism.items()]
-    missing = "; ".join(each) or in_words((NOTHING_MISSING,))
-    parts = [f"By skin: {missing} ({in_percent(probability)} probability)."]
+    missing = ", ".join(each) or in_words((NOTHING_MISSING,))
+    verdict = f"by skin: {missing} ({in_percent(probability)} probability)"
     if unexplained:
-        parts[0] = (
-            f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}."
-        )
-    parts += [
-        f"{one['skin']} departs in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the "
-        f"others have {entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})."
-        for entry, one in departures
+        verdict = f"something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}"
+    departing = [
+        f"{entry['parameter'].replace('_', ' ')} of {one['skin']} departs: {one['value']:g} {entry['unit']}, where the "
+        f"others have {entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})"
+        for entry, one in departures[:_MOST_TOLD]
     ]
+    if len(departures) > _MOST_TOLD:
+        departing.append(f"{len(departures) - _MOST_TOLD} further departures are listed by quantity")
     if not departures and populations:
-        parts.append("None is seen to depart from the others.")
-    if lacking:
-        parts.append(f"Nothing could be told of {', '.join(lacking)}.")
-    return " ".join(parts)
+        departing = ["none is seen to depart from the others"]
+    untold = f"nothing could be told of {', '.join(lacking)}" if lacking else ""
+    return of_clauses([verdict], departing, [untold])
