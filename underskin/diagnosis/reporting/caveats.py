@@ -9,7 +9,13 @@ from underskin.findings.codes import FindingCode
 _SLIPS = (
     *(FindingCode.NO_RESPONSE, FindingCode.IMPOSSIBLE_GEOMETRY, FindingCode.NO_FINITE_LINE, FindingCode.REFUSED),
     *(FindingCode.IMPOSSIBLE_NUMBER, FindingCode.SERIES_NOT_USABLE, FindingCode.CURVE_NOT_USABLE),
-    *(FindingCode.SENSORS_EXCHANGED, FindingCode.WEAK, FindingCode.CONJUGATED, FindingCode.GAIN_STEPS),
+    *(
+        FindingCode.SENSORS_EXCHANGED,
+        FindingCode.WEAK,
+        FindingCode.STRONG,
+        FindingCode.CONJUGATED,
+        FindingCode.GAIN_STEPS,
+    ),
     FindingCode.WARM_UP,
     *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
     FindingCode.DUPLICATED_RECORDING,
