@@ -1,8 +1,9 @@
 """Slips of a lab in whole campaigns: named, put right or left out, and never seen in what physics does."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -126,13 +127,17 @@ def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
+def _with_gain(gain_of: Mapping[str, float], entry: FrfRecording, _: int) -> FrfRecording:
+    return times(entry, gain_of[entry.sensor])
+
+
 def test_of_sensors_that_all_differ_none_stands_alone(table: SigmaTable) -> None:
     """A spread of 15 %, as poled films have, in twelve skins of six sensors."""
     six = campaign(Made(sensors=6), table)
     for seed in range(12):
         gains = np.exp(0.15 * np.random.default_rng(seed).normal(size=6))
-        spread = changed(six, lambda entry, _, gains=gains: times(entry, float(gains[int(entry.sensor[1:])])))
-        assert named(inspect(spread, table)) == [], seed
+        gain_of = {f"s{number}": float(gain) for number, gain in enumerate(gains)}
+        assert named(inspect(changed(six, partial(_with_gain, gain_of)), table)) == [], seed
 
 
 @pytest.mark.parametrize(

@@ -179,16 +179,6 @@ def modulus_clause(after: Mapping[str, Any]) -> str:
     return f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 
 
-def d33_clause(d33: Mapping[str, Any] | None) -> str:
-    """The d33 to quote, or the range in which it lies while none is to be quoted; empty where there is none."""
-    if d33 is None:
-        return ""
-    value, low, high = (f"{d33[key]:.3g}" for key in ("value", "low", "high"))
-    if d33["quotable"]:
-        return f"d33 to quote: {value} {d33['unit']} (95 %: {low} to {high})"
-    return f"d33 is not to be quoted: it lies from {low} to {high} {d33['unit']} over the answers that remain"
-
-
 def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
     """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
     mechanisms beside it, which `law` holds."""

@@ -21,7 +21,6 @@ from underskin.diagnosis.reporting.answer_statement import (
     Around,
     OfAnswer,
     answer_statement,
-    d33_clause,
     insufficient_statement,
     left_by,
 )
@@ -31,17 +30,16 @@ from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
+from underskin.diagnosis.reporting.stated_d33 import stated_d33
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.diagnosis.validation import cross_validation
+from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
-from underskin.diagnosis.validation.residual_noise import REACHES_NOISE
-from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
-from underskin.prediction import plausibility
 from underskin.recordings.campaign import Campaign
 
 SCHEMA = "report/1"
@@ -65,6 +63,7 @@ class DiagnosisResult:
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
+    shifts: Sequence[HiddenShift] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
@@ -148,16 +147,16 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     consistent = diagnosis.joined is None or not kinds.contradictions(diagnosis.joined)
-    d33, implausible = _d33(search, problem, fit, stands=stands and consistent)
+    d33 = stated_d33(search, problem, fit, diagnosis.shifts, stands=stands and consistent)
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
-    findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
+    findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = averaged.presence(search, averaged.present(search, problem))
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
     around = Around(
         slips=slips(findings),
         contradictions=[entry["statement"] for entry in contradictory],
         reserves=reserves(findings),
-        quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33_clause(d33)],
+        quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33.clause()],
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
@@ -185,23 +184,14 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "presence": present,
         "unnamed": law,
         "alternatives": _alternatives(search),
-        "not_identifiable": [
-            {
-                "mechanism": entry.mechanism,
-                "confounded_with": entry.confounded_with,
-                "reason": statements.CONFOUNDED[entry.why].format(
-                    mechanism=entry.mechanism, other=entry.confounded_with
-                ),
-            }
-            for entry in diagnosis.confounded
-        ],
+        "not_identifiable": d33.not_identifiable(diagnosis.confounded),
         "findings": findings,
         "fit": fit,
         "power": [
             {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
             for entry in diagnosis.power
         ],
-        "d33": d33,
+        "d33": d33.document,
         **({"by_kind": told_by_kind, "contradictions": contradictory} if told_by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
@@ -212,22 +202,6 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
-
-
-def _d33(
-    search: Search, problem: FittingProblem, fit: Mapping[str, Any], *, stands: bool
-) -> tuple[dict[str, Any] | None, list[Finding]]:
-    """The d33 averaged over all answers, and a finding where no PVDF has it; None of curves.
-
-    `quotable`: one answer `stands`, d33 is plausible, and the answer fits the recordings to their noise.
-    """
-    d33 = None if problem.lines.curves else averaged.d33(search)
-    if d33 is None:
-        return None, []
-    implausible = plausibility.implausibility(d33["value"])
-    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
-    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
-    return {**d33, "quotable": stands and reached and implausible is None}, [finding] if implausible else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
