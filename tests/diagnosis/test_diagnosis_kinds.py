@@ -92,6 +92,9 @@ def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     alone = report(measured, [], table)
     assert alone["verdict"] == "ambiguous"
     assert "by_kind" not in alone
+    planned = alone["next_experiment"]["statement"]
+    assert "A compressed block or an indentation of the same elastomer" in planned
+    assert "would tell E, and so whether it is modulus error, with a probability of " in planned
     together = report(measured, curves(kind, design, 9.0), table)
     assert (together["verdict"], named(together)) == ("explained", ["modulus_error"])
     (factor,) = together["mechanisms"][0]["parameters"]
@@ -102,6 +105,7 @@ def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     assert "E from the " in together["statement"]
     assert "declared 16" in together["statement"]
     assert together["contradictions"] == []
+    assert "A compressed block" not in ((together["next_experiment"] or {}).get("statement") or "")
 
 
 def test_curves_that_agree_rule_out_what_frfs_alone_leave_open(table: SigmaTable) -> None:

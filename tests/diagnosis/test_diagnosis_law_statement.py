@@ -23,8 +23,8 @@ def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_an
     (change,) = report["unnamed"]["parameters"]
     assert change["low"] < 0.067 - 1 / 3 < change["high"]
     said = f"the contact radius grows with the preload to the power {1 / 3 + change['value']:.2f} ("
-    assert f"This is Hertz's law with another exponent: {said}" in report["statement"]
-    assert "in place of 1/3." in report["statement"]
+    assert f"this is Hertz's law with another exponent: {said}" in report["statement"]
+    assert "in place of 1/3" in report["statement"]
 
 
 @pytest.mark.slow
@@ -32,6 +32,6 @@ def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_an
 def test_a_delay_that_disperses_is_a_delay_with_another_exponent() -> None:
     file = Path(os.environ["UNDERSKIN_CAMPAIGNS"]) / "unlisted-open" / f"{DELAY}.json"
     report = diagnosis_report(parse(json.loads(file.read_text(encoding="utf-8"))), load_table())
-    assert "This is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
+    assert "this is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
     exponent = next(entry for entry in report["unnamed"]["parameters"] if entry["name"] == "exponent")
     assert exponent["value"] == pytest.approx(2.0, abs=0.05)

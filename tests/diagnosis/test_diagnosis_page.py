@@ -99,7 +99,7 @@ def text(found: DiagnosisResult, document: dict[str, Any]) -> str:
 def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -> None:
     tags = Tags(text)
     assert document["verdict"] == "explained"
-    first = "The paper's model lacks contact resonance (probability 98.5 %)"
+    first = "the paper's model lacks contact resonance (probability 98.5 %)"
     assert tags.text.index(first) < tags.text.index("Where")
     headings = re.findall(r"<h2>(.*?)</h2>", text)
     assert headings == [

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from tests.support.skins import HEAVY_TIP, document, made
 from underskin.cli.app import app
+from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.errors import InvalidInput
@@ -58,6 +59,33 @@ def test_what_acts_in_all_is_known_better_than_from_one(table: SigmaTable) -> No
     ]
     assert np.log(mass["high"] / mass["low"]) < 0.8 * np.log(alone["high"] / alone["low"])
     assert mass["low"] < 4.0 < mass["high"]
+
+
+def test_without_all_dates_no_date_is_given_and_the_order_is_told(table: SigmaTable) -> None:
+    """Of one campaign no time is known, so that nothing can be said to be there since a date."""
+    before = made("may")
+    undated = replace(before, recordings=tuple(replace(entry, recorded_at=None) for entry in before.recordings))
+    report = diagnose_together([undated, made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)], table, "both")
+    assert scopes(report) == {"contact_resonance": {"campaigns": ["september"]}}
+    assert "since" not in report["statement"]
+    assert report["statement"].endswith(
+        "Not every campaign has a date, so they count in the order in which they were given: campaign may (no date), "
+        "campaign september (2017-09-12)."
+    )
+
+
+def test_a_d33_of_all_sensors_that_fell_is_a_change_of_level(table: SigmaTable) -> None:
+    """Ageing would do this, and so would an amplifier: the text of the mechanism is not claimed."""
+    fallen = made("september", SEPTEMBER, seed=8)
+    for sensor in [entry.id for entry in fallen.skin.sensors]:
+        fallen = with_gain(fallen, sensor, 0.75)
+    report = diagnose_together([made("may"), fallen], table, "both")
+    assert scopes(report) == {"ageing": {"campaigns": ["september"], "since": "2017-09-12"}}
+    (entry,) = report["mechanisms"]
+    assert "a change of level that ageing, a gain or the temperature would make" in entry["statement"]
+    shown = page(report)
+    assert "<h3>change of level of d33</h3>" in shown
+    assert "again and again" not in shown  # as the text of ageing has it
 
 
 def test_one_sensor_that_ages_is_no_physics_of_the_skin(table: SigmaTable) -> None:

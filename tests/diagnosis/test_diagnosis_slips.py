@@ -1,7 +1,9 @@
 """Slips of a lab in whole campaigns: named, put right or left out, and never seen in what physics does."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +12,8 @@ from rig.draw import drawn, record
 from rig.recorded import campaign as recorded_campaign
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.inspected import Inspected
-from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.caveats import slips
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
@@ -20,7 +23,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 MADE = Made(sensors=3, repeats=2, lines=20)
 SLIPS = {
     *(FindingCode.CONJUGATED, FindingCode.SENSORS_EXCHANGED, FindingCode.GAIN_STEPS, FindingCode.WARM_UP),
-    *(FindingCode.WEAK, FindingCode.SIGN_FLIPPED),
+    *(FindingCode.WEAK, FindingCode.STRONG, FindingCode.SIGN_FLIPPED),
 }
 Change = Callable[[FrfRecording, int], FrfRecording]
 
@@ -107,6 +110,34 @@ def test_a_sensor_at_a_tenth_is_left_out_and_a_spread_of_sensors_is_not(good: Ca
     assert "'s1' answers with 0.1 " in next(entry for entry in inspected.findings if entry.code == "weak").statement
     spread = {"s0": 0.6, "s1": 1.4, "s2": 1.0}
     assert named(inspect(changed(good, lambda entry, _: times(entry, spread[entry.sensor])), table)) == []
+
+
+@pytest.mark.parametrize(("share", "word"), [(0.75, "weak"), (1.35, "strong")])
+def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float, word: str, table: SigmaTable) -> None:
+    six = campaign(Made(sensors=6), table)
+    wrong = changed(six, lambda entry, _: times(entry, share if entry.sensor == "s3" else 1.0))
+    report = diagnosis_report(wrong, table)
+    (finding,) = [entry for entry in report["findings"] if entry["code"] in ("weak", "strong")]
+    assert finding["code"] == word
+    told = re.match(r"sensor 's3' responds with ([0-9.]+) of the others' charge", finding["statement"])
+    assert told
+    assert float(told[1]) == pytest.approx(share, rel=0.04)
+    assert report["verdict"] == "no_mismatch"
+    assert report["statement"].startswith("Sensor 's3' responds with ")
+    assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
+
+
+def _with_gain(gain_of: Mapping[str, float], entry: FrfRecording, _: int) -> FrfRecording:
+    return times(entry, gain_of[entry.sensor])
+
+
+def test_of_sensors_that_all_differ_none_stands_alone(table: SigmaTable) -> None:
+    """A spread of 15 %, as poled films have, in twelve skins of six sensors."""
+    six = campaign(Made(sensors=6), table)
+    for seed in range(12):
+        gains = np.exp(0.15 * np.random.default_rng(seed).normal(size=6))
+        gain_of = {f"s{number}": float(gain) for number, gain in enumerate(gains)}
+        assert named(inspect(changed(six, partial(_with_gain, gain_of)), table)) == [], seed
 
 
 @pytest.mark.parametrize(
@@ -221,5 +252,6 @@ def test_physics_is_no_slip(hidden: str, table: SigmaTable) -> None:
 def test_slips_lead_the_caveats_and_a_dead_sensor_leads_them_all() -> None:
     weak = Finding(Reason.WEAK_SENSOR, "r8", "frf_re_pc_per_n", {"sensor": "s1", "share": 0.1, "recordings": 8})
     dead = Finding(Reason.SILENT_SENSOR, "r4", "frf_re_pc_per_n", {"sensor": "s0", "recordings": 4})
-    text = caveats([weak.in_report(), dead.in_report()])
-    assert text.index("'s0' shows no response") < text.index("'s1' answers with 0.1")
+    first, second = slips([weak.in_report(), dead.in_report()])
+    assert "'s0' shows no response" in first
+    assert "'s1' answers with 0.1" in second

@@ -13,10 +13,11 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.localisation.effect_size import EffectSize, effect
 from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
 from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.answer_statement import answer_statement
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.report import report
-from underskin.diagnosis.reporting.statements import answer_statement, location_statement, why_not
+from underskin.diagnosis.reporting.statements import location_statement, why_not
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
@@ -127,7 +128,7 @@ def test_agreement_names_what_it_does_not_rule_out(table: SigmaTable) -> None:
     said = answer_statement(torn, "no_mismatch")
     assert said.startswith(
         "Recordings and the paper's model agree within the noise (probability 61 %), but they do not rule out: "
-        "adhesion (32 %). Adhesion: The skin sticks"
+        "adhesion (32 %). Adhesion: the skin sticks"
     )
     assert "nothing needs to be added" in answer_statement([Answer(nothing, 0.97), adhesion], "no_mismatch")
 

@@ -34,6 +34,7 @@ from underskin.diagnosis.selection.search import search
 from underskin.diagnosis.selection.unnamed_search import with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.held_out_laws import held_out, of_nearest_law
+from underskin.diagnosis.validation.hidden_shift import hidden_shifts
 from underskin.diagnosis.validation.identifiability import confounding, left_open
 from underskin.diagnosis.validation.imitation import imitation, unseen
 from underskin.diagnosis.validation.platen_seating import without_seating
@@ -227,9 +228,15 @@ def _work_out(
         groups=groups,
         confounded=left_open(confounded, result.answers),
         power=power(signatures, shown, result.supported),
+        shifts=hidden_shifts(problem, signatures, shown, result.supported, _other_kinds(begun)),
         shape=shape,
         plan=plan(problem, result, limits),
     )
+
+
+def _other_kinds(begun: DiagnosisResult) -> frozenset[Kind]:
+    beside = None if begun.joined is None else begun.joined.beside
+    return frozenset() if beside is None else frozenset(kind.kind for kind in beside.kinds)
 
 
 def _located(

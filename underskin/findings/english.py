@@ -207,6 +207,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
     "cable or its range, beyond any spread; left out ({recordings} recordings)",
+    Reason.SENSOR_WEAKER: sentences.sensor_alone,
+    Reason.SENSOR_STRONGER: sentences.sensor_alone,
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",

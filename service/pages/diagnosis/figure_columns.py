@@ -34,6 +34,21 @@ def _parameters(report: Mapping[str, Any]) -> FigureColumns:
     return _by_name(names, rows)
 
 
+def _sensors(report: Mapping[str, Any]) -> FigureColumns:
+    names = ("campaign", "sensor", "unit", "value", "low", "high")
+    return _by_name(names, [[row[name] for name in names] for row in report["d33"]["per_sensor"]])
+
+
+def _population(report: Mapping[str, Any]) -> FigureColumns:
+    names = ("skin", "value", "low", "high")
+    rows = [
+        (entry["parameter"], entry["unit"], entry["mean"], entry["sd"], *(one[name] for name in names))
+        for entry in report["population"]
+        for one in entry["skins"]
+    ]
+    return _by_name(("parameter", "unit", "mean", "sd", *names), rows)
+
+
 def _where(figure: Mapping[str, Any]) -> FigureColumns:
     (trace,) = figure["data"]
     layout = figure["layout"]
@@ -87,6 +102,8 @@ def _numbers(column: Any) -> list[float]:
 _OF_REPORT: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "explanations": _explanations,
     "parameters": _parameters,
+    "sensors": _sensors,
+    "population": _population,
 }
 _OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "where": _where,

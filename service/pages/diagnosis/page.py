@@ -37,6 +37,8 @@ _ABOUT = {
     "predicted. A double click shows all of the air, another one the contact.",
     "before_after": "Each point a recording, or a part of its lines; the grey band is what noise alone allows.",
     "explanations": "What the recordings say of each explanation, the stated one on top.",
+    "sensors": "Each sensor's d33 in each campaign with its 95 % interval, the mechanisms taken into account.",
+    "population": "Each skin's value with its 95 % interval on the grey band in which 95 % of such skins lie.",
     "parameters": "What is known of each parameter: grey before the recordings, blue after them.",
 }
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import

@@ -11,19 +11,19 @@ posterior updated: the chance that the true explanation then could be stated wit
 
 import itertools
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
-from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.planning.rig_limits import RigLimits, candidates, inferred, wider
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.conditions import Conditions, FrfConditions
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 SEED = 20180206
 _SIMULATIONS = 2000
@@ -32,6 +32,9 @@ _LEAST_GAIN = 0.01  # in the probability of deciding that a further recording mu
 _SURVIVES = 0.02
 _RIVALS = 4
 _PROMISING = 0.3  # chance of deciding below which recordings are not proposed
+WRONG_MODULUS = "modulus_error"
+_MODULUS = ("youngs_modulus", "modulus_factor")  # whose logarithms make that of E
+_OF_BLOCK = 0.03  # relative, of E by a block: 2 % from piece to piece, and its fit
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class NextRecordings:
     minutes: float = 0.0
     beyond: bool = False  # the recordings go beyond what the campaign did
     differ_on: Collection[str] = ()  # axes on which the rivals differ, where there are no recordings
+    block: float | None = None  # chance that E from a block tells whether the modulus is wrong, where that is promising
 
 
 def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextRecordings | None:
@@ -58,8 +62,10 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextReco
         for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
             planned = _planned(problem, surviving, rig, bool(beyond))
             if planned and planned.probability >= _PROMISING:
-                return planned
-    return None if surviving[0].probability >= EXPLAINED else _nothing_to_plan(surviving)
+                return replace(planned, block=_by_block(problem, surviving))
+    if surviving[0].probability >= EXPLAINED:
+        return None
+    return replace(_nothing_to_plan(surviving), block=_by_block(problem, surviving))
 
 
 def _planned(
@@ -83,6 +89,33 @@ def _planned(
         minutes=len(chosen) * limits.minutes_per_recording + len(spheres) * limits.minutes_per_indenter,
         beyond=beyond,
     )
+
+
+def _by_block(problem: FittingProblem, surviving: Sequence[Answer]) -> float | None:
+    """The chance that E, known from a compressed block or an indentation, tells whether the declared modulus is wrong,
+    where some rivals say so and some do not, both held equally probable; None where it is not promising, or curves
+    tell E already."""
+    rivals = [answer for answer in surviving if answer.explanation is not None]
+    wrong = np.array([WRONG_MODULUS in answer.names for answer in rivals])
+    if problem.lines.curves or problem.beside is not None or not wrong.any() or wrong.all():
+        return None
+    moduli = [_log_modulus(answer.explanation) for answer in rivals if answer.explanation is not None]
+    responses = np.array([[mean] for mean, _ in moduli])
+    unknown = [np.array([[deviation]]) for _, deviation in moduli]
+    probability = np.array([answer.probability for answer in rivals])
+    prior = 0.5 * probability / np.where(wrong, probability[wrong].sum(), probability[~wrong].sum())
+    outlook = _Outlook(responses, unknown, np.full_like(responses, _OF_BLOCK**2), prior)
+    chance = outlook.deciding([0], wrong[:, None] == wrong)
+    return chance if chance >= _PROMISING else None
+
+
+def _log_modulus(explanation: Explanation) -> tuple[float, float]:
+    """ln E under an explanation, the declared one times what it makes of it, and its standard deviation."""
+    names = [entry.name for entry in explanation.model.parameters]
+    places = [names.index(name) for name in _MODULUS if name in names]
+    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
+    return float(explanation.point.fit[places].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
 def _nothing_to_plan(surviving: Sequence[Answer]) -> NextRecordings:
@@ -145,8 +178,9 @@ class _Outlook:
     scatter: Floats  # variance of the logarithm of a new recording (rivals, candidates)
     prior: Floats  # (rivals,)
 
-    def deciding(self, chosen: Sequence[int]) -> float:
-        """The simulated chance that the true explanation holds `EXPLAINED` after these recordings."""
+    def deciding(self, chosen: Sequence[int], alike: Mask | None = None) -> float:
+        """The simulated chance that the true explanation holds `EXPLAINED` after these recordings, together with those
+        that are `alike` (rivals, rivals)."""
         random = np.random.default_rng(SEED)
         truth = random.choice(len(self.prior), size=_SIMULATIONS, p=self.prior)
         noise = random.normal(size=(_SIMULATIONS, len(chosen)))
@@ -162,7 +196,8 @@ class _Outlook:
             log_posterior[:, rival] = -0.5 * (white**2).sum(axis=0) - np.log(np.diag(root)).sum()
         log_posterior += np.log(self.prior)
         log_posterior -= np.logaddexp.reduce(log_posterior, axis=1)[:, None]
-        return float((np.exp(log_posterior[np.arange(_SIMULATIONS), truth]) >= EXPLAINED).mean())
+        counted = np.eye(len(self.prior), dtype=bool) if alike is None else alike
+        return float(((np.exp(log_posterior) * counted[truth]).sum(axis=1) >= EXPLAINED).mean())
 
     @property
     def promising(self) -> list[int]:

@@ -41,6 +41,25 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
     ]
 
 
+def present(search: Search, problem: FittingProblem) -> dict[str, float]:
+    """The posterior that each mechanism is there, also beside a law or a process that nobody listed."""
+    found: dict[str, float] = {}
+    for answer in search.answers:
+        if answer.explanation is not None:
+            for name in answer.names:
+                found[name] = found.get(name, 0.0) + answer.probability
+            continue
+        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.shows(entry)]
+        beside = [*laws, *search.processes_showing]
+        total = np.logaddexp.reduce([weight for _, weight in beside]) if beside else 0.0
+        for entry, weight in beside:
+            for name in entry.names:
+                if name in problem.lines.mechanisms.named:
+                    share = answer.probability * float(np.exp(weight - total))
+                    found[name] = found.get(name, 0.0) + share
+    return found
+
+
 def _groups(search: Search) -> list[list[str]]:
     standing = [
         answer.explanation
@@ -147,9 +166,9 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
     return {"probability": round(total, 3), "rivals": rivals, "differ_percent": rounded(furthest, 2)}
 
 
-def alike_statement(found: Mapping[str, Any]) -> str:
-    """That one of several answers may serve as a model, in one sentence."""
+def alike_clause(found: Mapping[str, Any]) -> str:
+    """That one of several answers may serve as a model."""
     return (
-        f"All that hold {100 * found['probability']:.1f} % predict these recordings alike, to "
-        f"{found['differ_percent']:g} %: as a model any of them serves within what was measured."
+        f"all that hold {100 * found['probability']:.1f} % predict these recordings alike, to "
+        f"{found['differ_percent']:g} %: as a model any of them serves within what was measured"
     )

@@ -14,9 +14,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
 from underskin.diagnosis.reporting import wording
-from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.reporting.answer_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.figures import explanations
-from underskin.diagnosis.reporting.statements import first_and_rest, lacking_part
+from underskin.diagnosis.reporting.several_figures import several_figures
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
@@ -34,7 +34,7 @@ plot.before(label);
 _FILTERS = (
     *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
     *(wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
-    *(caveats, first_and_rest, in_percent, lacking_part),
+    *(first_and_rest, in_percent, lacking_part),
 )
 
 Report = Mapping[str, Any]
@@ -74,7 +74,8 @@ def plan_of(planned: Mapping[str, Any]) -> str:
 
 def of_report(report: Report) -> dict[str, go.Figure]:
     """The figures that a report alone can give."""
-    return {} if report["fit"] is None else {"explanations": explanations(report)}
+    own = {} if report["fit"] is None else {"explanations": explanations(report)}
+    return {**own, **several_figures(report)}
 
 
 def _plot(figure: go.Figure, name: str) -> str:

@@ -65,17 +65,17 @@ def _modulus_alone(joined: Joined) -> dict[str, Any] | None:
     return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
 
 
-def statement(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
-    """E by kind, in one sentence; empty where there is one kind."""
+def moduli_clause(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
+    """E by kind; empty where there is one kind."""
     moduli = [entry for entry in told if entry["parameter"] == "youngs_modulus"]
     if not moduli:
         return ""
-    each = "; ".join(
+    each = ", ".join(
         f"E from {_CALLED[entry['kind']]}: {entry['value']:.3g} MPa (95 %: {entry['low']:.3g} to {entry['high']:.3g})"
         for entry in moduli
     )
     declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
-    return f"{each}; declared {declared:g}." if declared is not None else f"{each}."
+    return f"{each}, declared {declared:g}" if declared is not None else each
 
 
 def contradictions(joined: Joined) -> list[dict[str, Any]]:

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from underskin.diagnosis.reporting.answer_statement import Around
 from underskin.diagnosis.reporting.hints import TURNED, hint
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
+from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.mechanisms.unnamed.axes import time_zone
@@ -20,10 +22,20 @@ _DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay 
 
 
 def statement(
-    probability: float, leading: LeadingLaw, document: Mapping[str, Any], floor: float, *, outweighed: bool
+    probability: float,
+    leading: LeadingLaw,
+    document: Mapping[str, Any],
+    floor: float,
+    around: Around,
+    left: str,
+    *,
+    outweighed: bool,
 ) -> str:
-    """What is missing in plain words, with its numbers, what it is worth, and which physics usually does this;
-    `outweighed` by a course of no form."""
+    """Three sentences at most: that no known mechanism describes this, after what decides how far that can be trusted;
+    what is missing, with its numbers and what it is worth; its rivals, what usually does this, and what to quote.
+
+    `left` says how far the base model goes on curves; the law may be `outweighed` by a course of no form.
+    """
     law = leading.law
     acts_on, axis = law.spoken.acts_on, law.spoken.axis
     beside = tuple(name for name in leading.explanation.names if name != law.name)
@@ -31,23 +43,19 @@ def statement(
     held = document["heldout_rmse_percent"]
     worth = _worth(held, floor, _held_out(law))
     altered = [*_altered(law, document), *_order(law, document)]
-    parts = [
-        f"No known mechanism describes this (probability {in_percent(probability)}).",
-        f"What is missing{known} {_does(law)}{_follows(leading)}: {_size(leading)}; {worth}.",
-        *altered,
+    missing = [f"what is missing{known} {_does(law)}{_follows(leading)}: {_size(leading)}", worth, *altered]
+    rivals = [
+        f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
+        f"({in_percent(entry['probability'])} of it)"
+        for entry in document["rivals"][:2]
     ]
-    if document["rivals"]:
-        rivals = "; ".join(
-            f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
-            f"({in_percent(entry['probability'])} of it)"
-            for entry in document["rivals"][:2]
-        )
-        parts.append(f"In these recordings this may also be: {rivals}.")
+    also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
     if outweighed:
-        parts.append("More probable still is a course of no listed form: take this law as the nearest that has one.")
+        also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
     turns = isinstance(law, CurveLaw) and law.shape.variant == TURN
     told = "" if altered or leading.is_constant else hint(acts_on, TURNED if turns else axis)
-    return " ".join([*parts, *([told] if told else [])])
+    verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
+    return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -63,11 +71,11 @@ def _altered(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
         value, low, high = (1 / 3 + stated["change"][name] for name in ("value", "low", "high"))
         power = f"{value:.2f} ({low:.2f} to {high:.2f}) in place of 1/3"
         grows = f"the contact radius grows with {followed(law.axis.name)} to the power {power}"
-        return [f"This is Hertz's law with another exponent: {grows}."]
+        return [f"this is Hertz's law with another exponent: {grows}"]
     exponent = stated.get("exponent")
     if isinstance(law, FrequencyLaw) and law.variant == "phase" and exponent and exponent["value"] > _DELAY:
         power = f"{exponent['value']:.2f} ({exponent['low']:.2f} to {exponent['high']:.2f}) in place of 1"
-        return [f"This is a delay with another exponent: its phase grows with frequency to the power {power}."]
+        return [f"this is a delay with another exponent: its phase grows with frequency to the power {power}"]
     return []
 
 
@@ -79,7 +87,7 @@ def _order(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
     value, low, high = (stated["exponent"][name] for name in ("value", "low", "high"))
     if value < 0:
         return []
-    return [f"This is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}); an amplifier's is of order 1."]
+    return [f"this is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}), where an amplifier's is of order 1"]
 
 
 def _held_out(law: UnnamedLaw) -> str:

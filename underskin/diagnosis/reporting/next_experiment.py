@@ -4,9 +4,11 @@ from typing import Any
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import in_words
-from underskin.diagnosis.planning.optimal_design import NextRecordings
+from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
 from underskin.diagnosis.reporting.statements import listed
 from underskin.findings.formatting import in_percent
+
+_STIFFENING = "strain_stiffening"
 
 
 def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
@@ -41,8 +43,18 @@ def _statement(plan: NextRecordings) -> str:
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
     return (
         f"{count} with the {first.indenter_radius_mm:g} mm sphere at {first.preload_n:g} N, should tell which of "
-        f"{_rivals(plan)} it is, with a probability of {in_percent(plan.probability)}.{beyond}"
+        f"{_rivals(plan)} it is, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
+
+
+def _block(plan: NextRecordings) -> str:
+    """That a compressed block or an indentation would tell, where that is promising."""
+    if plan.block is None:
+        return ""
+    stiffens = any(_STIFFENING in names for names in plan.rivals)
+    also = "; compressed by a fifth of its height, a block shows strain stiffening too" if stiffens else ""
+    told = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
+    return f" A compressed block or an indentation of the same elastomer would tell E, and so {told}."
 
 
 def _why_none(plan: NextRecordings) -> str:
@@ -50,7 +62,7 @@ def _why_none(plan: NextRecordings) -> str:
     if plan.differ_on:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
         statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
-    return statement
+    return statement + _block(plan)
 
 
 def _rivals(plan: NextRecordings) -> str:

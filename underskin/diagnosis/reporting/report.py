@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
@@ -19,23 +17,29 @@ from underskin.diagnosis.localisation.region import reaches_all_along
 from underskin.diagnosis.localisation.residual_shape import Shape
 from underskin.diagnosis.planning.optimal_design import NextRecordings
 from underskin.diagnosis.reporting import averaged, kinds, next_experiment, statements
-from underskin.diagnosis.reporting.caveats import caveats
+from underskin.diagnosis.reporting.answer_statement import (
+    Around,
+    OfAnswer,
+    answer_statement,
+    insufficient_statement,
+    left_by,
+)
+from underskin.diagnosis.reporting.caveats import reserves, slips
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
+from underskin.diagnosis.reporting.stated_d33 import stated_d33
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.diagnosis.validation import cross_validation
+from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
-from underskin.diagnosis.validation.residual_noise import REACHES_NOISE
-from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
-from underskin.prediction import plausibility
 from underskin.recordings.campaign import Campaign
 
 SCHEMA = "report/1"
@@ -60,6 +64,7 @@ class DiagnosisResult:
     groups: Sequence[cross_validation.HeldOut] = ()
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
+    shifts: Sequence[HiddenShift] = ()
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
@@ -111,11 +116,10 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
     if diagnosis.search is None or diagnosis.problem is None:
         findings = [finding.in_report() for finding in diagnosis.findings]
-        said = (statements.insufficient_statement(diagnosis.lacking), caveats(findings))
         return {
             **document,
             "probability": 1.0,
-            "statement": " ".join(part for part in said if part),
+            "statement": insufficient_statement(diagnosis.lacking, slips(findings)),
             "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "Nothing was located."},
             "mechanisms": [],
             "presence": [],
@@ -141,42 +145,36 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         mechanisms += _of_curves_alone(diagnosis, leader)
     told_by_kind = [] if diagnosis.joined is None else kinds.by_kind(diagnosis.joined, shown.names)
     contradictory = [] if diagnosis.joined is None else kinds.contradictions(diagnosis.joined)
-    of_kinds = "" if diagnosis.joined is None else kinds.statement(diagnosis.joined, told_by_kind)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     consistent = diagnosis.joined is None or not kinds.contradictions(diagnosis.joined)
-    d33, implausible = _d33(search, problem, fit, stands=stands and consistent)
+    d33 = stated_d33(search, problem, fit, diagnosis.shifts, stands=stands and consistent)
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
-    findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *implausible)]
-    present = averaged.presence(search, _presence(search, problem))
-    statement = statements.answer_statement(
-        search.answers,
-        stated,
-        diagnosis.shape,
-        problem.kind,
-        fit,
-        caveats=" ".join(filter(None, [*(entry["statement"] for entry in contradictory), caveats(findings)])),
-        power=diagnosis.power,
-        group=present[0] if present else None,
-        idle=_idle(diagnosis, named) if named is not None else (),
-        told=[
-            *(_told(problem, mechanisms) if named is not None else ()),
-            *filter(None, [of_kinds, averaged.alike_statement(alike) if alike is not None else ""]),
-        ],
+    findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
+    present = averaged.presence(search, averaged.present(search, problem))
+    of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
+    around = Around(
+        slips=slips(findings),
+        contradictions=[entry["statement"] for entry in contradictory],
+        reserves=reserves(findings),
+        quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33.clause()],
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
         beside = [entry["name"] for entry in mechanisms]
-        statement = " ".join(
-            part
-            for part in (
-                law_statement(leader.probability, leading, law, floor, outweighed=outweighed(search)),
-                caveats(findings),
-                statements.left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else "",
-                *(entry["statement"] for entry in contradictory),
-                of_kinds,
-            )
-            if part
+        left = left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else ""
+        ahead = outweighed(search)
+        statement = law_statement(leader.probability, leading, law, floor, around, left, outweighed=ahead)
+    else:
+        of_answer = OfAnswer(
+            group=present[0] if present else None,
+            idle=_idle(diagnosis, named) if named is not None else (),
+            mechanisms=mechanisms,
+            told=_told(problem, mechanisms) if named is not None else (),
+        )
+        shape = statements.shape_clause(diagnosis.shape)
+        statement = answer_statement(
+            search.answers, stated, problem.kind, fit, around, of_answer, shape, diagnosis.power
         )
     return {
         **document,
@@ -187,23 +185,14 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         "presence": present,
         "unnamed": law,
         "alternatives": _alternatives(search),
-        "not_identifiable": [
-            {
-                "mechanism": entry.mechanism,
-                "confounded_with": entry.confounded_with,
-                "reason": statements.CONFOUNDED[entry.why].format(
-                    mechanism=entry.mechanism, other=entry.confounded_with
-                ),
-            }
-            for entry in diagnosis.confounded
-        ],
+        "not_identifiable": d33.not_identifiable(diagnosis.confounded),
         "findings": findings,
         "fit": fit,
         "power": [
             {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
             for entry in diagnosis.power
         ],
-        "d33": d33,
+        "d33": d33.document,
         **({"by_kind": told_by_kind, "contradictions": contradictory} if told_by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
@@ -216,26 +205,10 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     }
 
 
-def _d33(
-    search: Search, problem: FittingProblem, fit: Mapping[str, Any], *, stands: bool
-) -> tuple[dict[str, Any] | None, list[Finding]]:
-    """The d33 averaged over all answers, and a finding where no PVDF has it; None of curves.
-
-    `quotable`: one answer `stands`, d33 is plausible, and the answer fits the recordings to their noise.
-    """
-    d33 = None if problem.lines.curves else averaged.d33(search, problem)
-    if d33 is None:
-        return None, []
-    implausible = plausibility.implausibility(d33["value"])
-    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
-    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
-    return {**d33, "quotable": stands and reached and implausible is None}, [finding] if implausible else []
-
-
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
     places = own_places(explanation.names, explanation.best.hypothesis.lines)
     whole = cross_validation.in_sample(problem, explanation)
-    probabilities = _presence(search, problem)
+    probabilities = averaged.present(search, problem)
     return [
         {
             "name": name,
@@ -251,7 +224,7 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
 def _of_curves_alone(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
     if diagnosis.joined is None or leader.explanation is None or diagnosis.search is None or diagnosis.problem is None:
         return []
-    present = _presence(diagnosis.search, diagnosis.problem)
+    present = averaged.present(diagnosis.search, diagnosis.problem)
     own = kinds.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
     return [{**entry, "probability": round(present.get(entry["name"], 0.0), 3)} for entry in own]
 
@@ -260,25 +233,6 @@ def _told(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> l
     """What the parameters of each mean together, where they do not speak for themselves."""
     values = {one["name"]: {entry["name"]: entry["value"] for entry in one["parameters"]} for one in mechanisms}
     return [said for name, own in values.items() if (said := problem.lines.mechanisms[name].told(own))]
-
-
-def _presence(search: Search, problem: FittingProblem) -> dict[str, float]:
-    """The posterior that each mechanism is there, also beside a law or a process that nobody listed."""
-    present: dict[str, float] = {}
-    for answer in search.answers:
-        if answer.explanation is not None:
-            for name in answer.names:
-                present[name] = present.get(name, 0.0) + answer.probability
-            continue
-        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.shows(entry)]
-        beside = [*laws, *search.processes_showing]
-        total = np.logaddexp.reduce([weight for _, weight in beside]) if beside else 0.0
-        for entry, weight in beside:
-            for name in entry.names:
-                if name in problem.lines.mechanisms.named:
-                    share = answer.probability * float(np.exp(weight - total))
-                    present[name] = present.get(name, 0.0) + share
-    return present
 
 
 def _alternatives(search: Search) -> list[dict[str, Any]]:

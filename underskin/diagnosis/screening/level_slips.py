@@ -1,5 +1,5 @@
-"""Slips that show in the levels of recordings only: a weak sensor, amplitudes of another kind, a warm-up,
-cables exchanged.
+"""Slips that show in the levels of recordings only: a weak sensor, one that stands alone, amplitudes of another kind,
+a warm-up, cables exchanged.
 
 The plainest is put right first, since each looks a little like the others.
 """
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
 from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
 from underskin.diagnosis.screening.levels import levels
+from underskin.diagnosis.screening.sensor_alone import Alone, at_the_others, standing_alone
 from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
 from underskin.diagnosis.screening.weak_sensors import weak_sensors
 from underskin.findings.finding import Finding
@@ -46,12 +47,14 @@ def _plainest(
     own = levels(campaign, entries, table)
     if not _LEAST <= len(own.value) <= _MOST:
         return None
-    step, drift, cables = amplitude_step(own), warming(own), exchanged_cables(own)
-    found = [one for one in (step, drift, cables) if one is not None]
+    slips = (amplitude_step(own), warming(own), exchanged_cables(own), standing_alone(own))
+    found = [one for one in slips if one is not None]
     best = max(found, key=lambda one: one.gain, default=None)
     if isinstance(best, Step):
         return without_step(entries, own, best)
     if isinstance(best, WarmUp):
         return without_first(entries, best)
+    if isinstance(best, Alone):
+        return at_the_others(entries, own, best)
     places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     return None if best is None else with_right_sensors(entries, own, best, places)

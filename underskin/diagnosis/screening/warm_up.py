@@ -1,7 +1,7 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
-A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis, or a
-step after the first recordings, explains as well.
+A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis explains
+as well, a first recording that is off alone, or a plain step after the first recordings.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,10 @@ _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
 _LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN, _OVER_AGEING, _OVER_RIVALS = 3.6, 3.0, 1.5  # of ln evidence, over ageing, and over what else may do it
+_GAIN = 3.2  # of ln evidence
+# ln evidence by which it must exceed what else may do it, less where that is rarer: a drift over the whole campaign,
+# and a step after two recordings or more. A first recording that is off alone is common.
+_OVER_AGEING, _OVER_SMOOTH, _OVER_SLOWER, _OVER_FIRST, _OVER_STEP = 4.5, 1.5, -1.0, 0.5, -3.0
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
@@ -50,12 +53,14 @@ def warming(levels: Levels) -> WarmUp | None:
         return None
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
-    rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
+    first, *steps = _steps(levels)
     slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
-    rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence for one in (*_steps(levels), *slower)]
-    if amplitude > 0 and levels.cycles is not None:
-        rivals += [levels.fit(levels.value, _AMPLITUDE * one).evidence + _OVER_AGEING for one in _ageing(levels.cycles)]
-    return WarmUp(times[best], amplitude, gain) if base + gain > max(rivals) + _OVER_RIVALS else None
+    ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
+    columns = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
+    columns += [(one, _OVER_AGEING) for one in ageing]
+    needed = [levels.fit(levels.value, _AMPLITUDE * column).evidence + over for column, over in columns]
+    needed += [levels.fit(levels.value, smooth_along(axis)).evidence + _OVER_SMOOTH for axis in levels.axes]
+    return WarmUp(times[best], amplitude, gain) if base + gain > max(needed) else None
 
 
 def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:

@@ -9,11 +9,10 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
-import numpy as np
-
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.several.dates import Dated, date_of, in_order
 from underskin.diagnosis.several.posteriors import Shared, values
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
 from underskin.diagnosis.several.together_report import together_report
@@ -69,8 +68,8 @@ def diagnose_together(
     if len(usable) < 2:
         lacking = next(entry for number, entry in enumerate(reports) if number not in usable)
         return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
-    dates = {place: date for place, number in enumerate(usable) if (date := date_of(ordered[number])) is not None}
-    return together_report(name, ordered, results, reports, usable, dates, table)
+    dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
+    return together_report(name, ordered, results, reports, usable, dated, table)
 
 
 def _with_changed_sensors(
@@ -95,21 +94,6 @@ def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> Se
 def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
     shared = Shared.of(explanation, [name], skin=False)
     return values(shared.parameters, shared.mean)
-
-
-def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
-    """By the first time of each; as they come where one has none."""
-    dates = [date_of(campaign) for campaign in campaigns]
-    if any(date is None for date in dates):
-        return list(campaigns)
-    return [campaigns[number] for number in np.argsort(np.array(dates), kind="stable")]
-
-
-def date_of(campaign: Campaign) -> str | None:
-    """The date of its first recording; None where none has a time."""
-    times = [str(entry.recorded_at)[:10] for entry in campaign.recordings if isinstance(entry, FrfRecording)]
-    known = [time for time in times if time != "None"]
-    return min(known, default=None)
 
 
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:

@@ -15,9 +15,10 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.diagnosis.several.bench import benches
-from underskin.diagnosis.several.campaigns import in_order, refuse_copies
+from underskin.diagnosis.several.campaigns import refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
+from underskin.diagnosis.several.dates import in_order
 from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
 from underskin.diagnosis.several.population import Make, Spread, populations
 from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin

@@ -9,6 +9,7 @@ import numpy as np
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.reporting.numbers import rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
+from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
@@ -18,6 +19,7 @@ from underskin.diagnosis.several.strengths import DEPARTS, Strength
 from underskin.findings.formatting import in_percent
 
 STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
+_MOST_TOLD = 3  # skins that depart in the statement
 _WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
 _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
 
@@ -168,11 +170,9 @@ def _statement(
 ) -> str:
     each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
-    parts = [f"By skin: {missing} ({in_percent(probability)} probability)."]
+    verdict = f"By skin: {missing} ({in_percent(probability)} probability)"
     if unexplained:
-        parts[0] = (
-            f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}."
-        )
+        verdict = f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}"
     departures: dict[str, list[str]] = {}
     for entry in populations:
         for one in entry["departures"]:
@@ -180,9 +180,7 @@ def _statement(
                 f"in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the others have "
                 f"{entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})"
             )
-    parts += [f"{skin} departs {', or '.join(ways)}." for skin, ways in departures.items()]
-    if not departures:
-        parts.append("None is seen to depart from the others.")
-    if lacking:
-        parts.append(f"Nothing could be told of {', '.join(lacking)}.")
-    return " ".join(parts)
+    told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
+    told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
+    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], unknown)

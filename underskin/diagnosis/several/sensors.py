@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
+from underskin.diagnosis.several.dates import Dated
 from underskin.errors import InvalidInput
 from underskin.inversion.invert import Inversion, invert
 from underskin.prediction.adopted_model import AdoptedModel
@@ -146,13 +147,13 @@ def per_sensor(each: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]
     return [row for one in each if one is not None for row in one.in_report()]
 
 
-def change_in_words(change: Change, names: Sequence[str], dates: Mapping[int, str]) -> str:
-    """d33 of one or of all sensors."""
+def change_in_words(change: Change, dated: Dated) -> str:
+    """A clause on d33 of one or of all sensors; of all, that a change of level tells nothing of its cause."""
     whose = "of all sensors" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     way = "fell" if change.value < 0 else "rose"
-    before, after = (dates.get(number, names[number]) for number in (change.since - 1, change.since))
-    low, high = (abs(100 * (change.value + way * SDS_OF_95 * change.uncertainty)) for way in (-1, 1))
-    low, high = sorted((low, high))
-    return (
-        f"d33 {whose} {way} by {abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g}) between {before} and {after}."
-    )
+    before, after = (dated.called(number) for number in (change.since - 1, change.since))
+    low, high = sorted(abs(100 * (change.value + end * SDS_OF_95 * change.uncertainty)) for end in (-1, 1))
+    size = f"{abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g})"
+    causes = "an amplifier's gain or the temperature" if change.value > 0 else "ageing, a gain or the temperature"
+    level = "" if change.sensor is not None else f", a change of level that {causes} would make"
+    return f"d33 {whose} {way} by {size} between {before} and {after}{level}"

@@ -1,6 +1,6 @@
 """The report of campaigns of one skin that were diagnosed together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,8 +8,10 @@ import numpy as np
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult
+from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
+from underskin.diagnosis.several.dates import Dated
 from underskin.diagnosis.several.posteriors import Shared, combined, values
 from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
 from underskin.findings.formatting import in_percent
@@ -17,6 +19,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 _ALTERNATIVES = 6
+_MOST_TOLD = 3  # changes of d33 in the statement
 _DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
 
 
@@ -26,17 +29,17 @@ def together_report(
     results: Sequence[DiagnosisResult],
     reports: Sequence[dict[str, Any]],
     usable: Sequence[int],
-    dates: Mapping[int, str],
+    dated: Dated,
     table: SigmaTable,
 ) -> dict[str, Any]:
     """Of the campaigns in their order, with the result and the report of each alone; `usable` are the numbers of those
-    that tell anything, and `dates` those of the usable ones, by their place among these."""
+    that tell anything, and `dated` these with their dates."""
     candidates = [
         Candidate(result.problem, result.search)
         for result in (results[number] for number in usable)
         if result.problem is not None and result.search is not None
     ]
-    names = [campaigns[number].name for number in usable]
+    names = dated.names
     found = courses(candidates, min(candidate.search.supported for candidate in candidates))
     undescribed = [candidate.undescribed for candidate in candidates]
     described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed]))
@@ -49,7 +52,7 @@ def together_report(
         for place, number in enumerate(usable)
     ]
     changed = changes(sensors)
-    mechanisms = [*_mechanisms(candidates, found, leader, names, dates), *_aged(changed, names, dates)]
+    mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
     last = reports[usable[-1]]
@@ -64,7 +67,7 @@ def together_report(
         "campaigns": [campaign.name for campaign in campaigns],
         "verdict": verdict,
         "probability": round(probability, 3),
-        "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, names, dates),
+        "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, dated),
         "location": {
             "axes": [],
             "region": {},
@@ -137,9 +140,7 @@ def _verdict(leader: Course, described: float, undescribed: Sequence[float], cha
     return "explained" if any(leader.sets) or changed else "no_mismatch"
 
 
-def _mechanisms(
-    candidates: Sequence[Candidate], found: Courses, leader: Course, names: Sequence[str], dates: Mapping[int, str]
-) -> list[dict[str, Any]]:
+def _mechanisms(candidates: Sequence[Candidate], found: Courses, leader: Course, dated: Dated) -> list[dict[str, Any]]:
     entries = []
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
         for run in _runs(candidates, leader, mechanism):
@@ -159,7 +160,7 @@ def _mechanisms(
                     "probability": round(float(np.min(found.present[mechanism][where])), 3),
                     "parameters": parameters,
                     "explains_percent": None,
-                    "scope": _scope(where, _shown_in(candidates, mechanism), names, dates),
+                    "scope": _scope(where, _shown_in(candidates, mechanism), dated),
                 }
             )
     return entries
@@ -170,27 +171,30 @@ def _shown_in(candidates: Sequence[Candidate], mechanism: str) -> list[int]:
     return [number for number, one in enumerate(candidates) if mechanism not in one.search.unsupported]
 
 
-def _scope(where: Sequence[int], able: Sequence[int], names: Sequence[str], dates: Mapping[int, str]) -> dict[str, Any]:
-    """In which campaigns; `since` where it is there from one on in all that can show it, and not before."""
+def _scope(where: Sequence[int], able: Sequence[int], dated: Dated) -> dict[str, Any]:
+    """In which campaigns; `since` where it is there from one date on in all that can show it, and not before."""
     from_on = list(where) == [number for number in able if number >= where[0]] and where[0] > min(able)
-    since = dates.get(where[0], names[where[0]]) if from_on else None
-    return {"campaigns": [names[number] for number in where], **({"since": since} if since else {})}
+    since = dated.since(where[0]) if from_on else None
+    return {"campaigns": [dated.names[number] for number in where], **({"since": since} if since else {})}
 
 
-def _aged(changed: Sequence[Change], names: Sequence[str], dates: Mapping[int, str]) -> list[dict[str, Any]]:
-    """A d33 that fell from one campaign to the next is ageing, of one sensor or of all."""
+def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
+    """A d33 that fell from one campaign to the next, as by ageing, of one sensor or of all.
+
+    Each has a statement, since a change of level alone does not tell its cause.
+    """
     entries = []
     for change in changed:
         if change.value > 0:
             continue
         half = SDS_OF_95 * change.uncertainty
         ends = {"value": 100 * change.value, "low": 100 * (change.value - half), "high": 100 * (change.value + half)}
+        since = dated.since(change.since)
         scope: dict[str, Any] = {
-            "campaigns": list(names[change.since :]),
-            "since": dates.get(change.since, names[change.since]),
+            "campaigns": list(dated.names[change.since :]),
+            **({"since": since} if since else {}),
+            **({"sensors": [change.sensor]} if change.sensor is not None else {}),
         }
-        if change.sensor is not None:
-            scope["sensors"] = [change.sensor]
         entries.append(
             {
                 "name": "ageing",
@@ -200,6 +204,7 @@ def _aged(changed: Sequence[Change], names: Sequence[str], dates: Mapping[int, s
                 ],
                 "explains_percent": None,
                 "scope": scope,
+                "statement": of_clauses([change_in_words(change, dated)]),
             }
         )
     return entries
@@ -232,24 +237,28 @@ def _statement(
     undescribed: Sequence[float],
     mechanisms: Sequence[dict[str, Any]],
     changed: Sequence[Change],
-    names: Sequence[str],
-    dates: Mapping[int, str],
+    dated: Dated,
 ) -> str:
     percent = in_percent(probability)
-    said = [change_in_words(change, names, dates) for change in changed]
-    if verdict == "unexplained":
-        which = ", ".join(name for name, share in zip(names, undescribed, strict=True) if share > 0.5)
-        return " ".join([f"Something is missing in {which} that no known mechanism describes ({percent}).", *said])
-    if verdict == "no_mismatch":
-        agree = f"All {len(names)} campaigns and the paper's model agree within the noise"
-        return f"{agree}, with one d33 for each sensor ({percent})."
+    names = dated.names
+    said = [change_in_words(change, dated) for change in changed[:_MOST_TOLD]]
+    if len(changed) > _MOST_TOLD:
+        said.append(f"d33 of each sensor has {len(changed) - _MOST_TOLD} further changes")
     parts = [
         _in_words(entry, names) for entry in mechanisms if entry["name"] in {n for own in leader.sets for n in own}
     ]
-    if not any(leader.sets):
-        return " ".join([f"Within each campaign nothing is missing ({percent}).", *said])
-    begin = "Best explained so" if verdict == "ambiguous" else "The paper's model lacks"
-    return " ".join([f"{begin}: {'; '.join(parts)} ({percent}).", *said])
+    if verdict == "unexplained":
+        which = ", ".join(name for name, share in zip(names, undescribed, strict=True) if share > 0.5)
+        stated = f"something is missing in {which} that no known mechanism describes ({percent})"
+    elif verdict == "no_mismatch":
+        agree = f"all {len(names)} campaigns and the paper's model agree within the noise"
+        stated = f"{agree}, with one d33 for each sensor ({percent})"
+    elif not any(leader.sets):
+        stated = f"within each campaign nothing is missing ({percent})"
+    else:
+        begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
+        stated = f"{begin}: {', '.join(parts)} ({percent})"
+    return of_clauses([stated], said, [dated.order_clause()])
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:

@@ -76,15 +76,35 @@ class Signatures:
     def _of_nuisances(self, rows: "_Rows") -> list[Split]:
         return [rows.split(slope, self._fitter.lines) for slope in self._base.slopes]
 
+    @property
+    def nuisances(self) -> list[str]:
+        """The parameters of the base model, by name."""
+        return [entry.name for entry in self._fitter.hypotheses[0].model.parameters]
+
+    @property
+    def typical(self) -> dict[str, int]:
+        """Where each mechanism's typical signature is: its first."""
+        return {name: self.owners.index(name) for name in self.owners}
+
     def left(self, levels: NoiseLevels) -> tuple[Floats, Floats]:
         """The information on the signatures (signatures, signatures) under this noise: what the nuisances leave of it,
         and before they are taken out."""
+        own, shared, beside = self._parts(levels)
+        return own - shared @ np.linalg.solve(beside, shared.T), own
+
+    def taken_up(self, levels: NoiseLevels) -> Floats:
+        """By how much the nuisances move, in fit coordinates, to take up each signature (nuisances, signatures)."""
+        _, shared, beside = self._parts(levels)
+        return np.asarray(np.linalg.solve(beside, shared.T))
+
+    def _parts(self, levels: NoiseLevels) -> tuple[Floats, Floats, Floats]:
+        """The information on the signatures, what they share with the nuisances, and that on the nuisances with their
+        priors."""
         nuisances = self._fitter.hypotheses[0].model.parameters
         information = self._information(levels)
         count = len(nuisances)
         prior = np.diag([entry.prior.sd**-2 if isinstance(entry.prior, Normal) else 0.0 for entry in nuisances])
-        own, shared, beside = information[count:, count:], information[count:, :count], information[:count, :count]
-        return own - shared @ np.linalg.solve(beside + prior, shared.T), own
+        return information[count:, count:], information[count:, :count], information[:count, :count] + prior
 
     def _products(self, smooth: float) -> tuple[Floats, Floats]:
         """Re u*J and Re JᵀJ of the nuisances and the signatures; of curves with a smooth error of that share."""

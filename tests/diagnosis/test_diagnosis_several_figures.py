@@ -1,0 +1,63 @@
+"""Reports of several campaigns draw d33 over campaigns, and skins on the band of their population."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.pages.diagnosis.figure_columns import columns
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.reporting.html_report import of_report, page
+from underskin.diagnosis.several.campaigns import diagnose_together
+from underskin.diagnosis.several.fleet import diagnose_fleet
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import SigmaTable
+
+
+def made(name: str, d33: float, seed: int, table: SigmaTable) -> Campaign:
+    whole = campaign(Made(sensors=3, d33_pc_per_n=d33, seed=seed), table)
+    return Campaign(name, whole.skin, whole.recordings)
+
+
+@pytest.fixture(scope="module")
+def together(table: SigmaTable) -> dict[str, Any]:
+    return diagnose_together([made("<b>may", 15.0, 1, table), made("june", 12.0, 2, table)], table, "both")
+
+
+@pytest.fixture(scope="module")
+def fleet(table: SigmaTable) -> dict[str, Any]:
+    skins = {f"skin-{n}": [made(f"c{n}", 15.0 + 0.2 * n, n, table)] for n in range(5)}
+    return diagnose_fleet({**skins, "<i>weak": [made("c9", 9.0, 9, table)]}, table, "batch")
+
+
+def test_d33_of_each_sensor_is_drawn_over_the_campaigns_with_its_interval(together: dict[str, Any]) -> None:
+    figure = of_report(together)["sensors"]
+    assert [trace.name for trace in figure.data] == ["s0", "s1", "s2"]
+    rows = together["d33"]["per_sensor"]
+    for trace in figure.data:
+        own = [row for row in rows if row["sensor"] == trace.name]
+        assert list(trace.y) == [row["value"] for row in own]
+        assert np.array(trace.y) + trace.error_y.array == pytest.approx([row["high"] for row in own])
+        assert np.array(trace.y) - trace.error_y.arrayminus == pytest.approx([row["low"] for row in own])
+        assert np.array(trace.y) == pytest.approx([15.0, 12.0], rel=0.06)
+    assert list(figure.layout.xaxis.ticktext) == ["&lt;b&gt;may", "june"]
+    assert columns("sensors", together, {})["value"] == [row["value"] for row in rows]
+    assert 'id="figure-sensors"' in page(together)
+
+
+def test_each_skin_stands_on_the_band_of_its_population(fleet: dict[str, Any]) -> None:
+    figure = of_report(fleet)["population"]
+    (d33,) = [entry for entry in fleet["population"] if entry["parameter"] == "d33"]
+    assert [entry["skin"] for entry in d33["departures"]] == ["<i>weak"]
+    band = figure.layout.shapes[0]
+    assert (band.x0 + band.x1) / 2 == pytest.approx(d33["mean"])
+    assert band.x1 - band.x0 == pytest.approx(2 * 1.96 * d33["sd"], rel=1e-3)
+    usual, departing = figure.data[:2]
+    assert list(departing.y) == ["&lt;i&gt;weak"]
+    assert departing.x[0] < band.x0
+    assert len(usual.x) == 5
+    told = columns("population", fleet, {})
+    assert told["skin"][:6] == [entry["skin"] for entry in d33["skins"]]
+    shown = page(fleet)
+    assert 'id="figure-population"' in shown
+    assert "<i>weak" not in shown

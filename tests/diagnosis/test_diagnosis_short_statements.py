@@ -1,0 +1,108 @@
+"""Statements have three sentences at most, whatever there is to say; what they leave out stands elsewhere."""
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proof.slip_kinds import SLIPS, Case
+from rig.draw import drawn, record
+from rig.drawn_campaign import documents_and_truth
+from rig.joint import drawn_joint
+from rig.recorded import campaign as rig_campaign
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.html_report import page
+from underskin.diagnosis.reporting.sentences import clause, of_clauses, small
+from underskin.diagnosis.several.campaigns import diagnose_together
+from underskin.diagnosis.several.fleet import diagnose_fleet
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.campaign import Campaign, from_dict, parse
+from underskin.surrogate.sigma_table import SigmaTable
+
+SEED = 940501
+
+Report = dict[str, Any]
+
+
+def sentences(statement: str) -> list[str]:
+    """Split after a mark that ends a sentence: before a capital, and after any full stop with a space behind it."""
+    return re.split(r"(?<=[.!?]) +(?=[\"'(]?[A-Z])|(?<=\.) +", statement)
+
+
+def of_lines(table: SigmaTable) -> Iterator[Report]:
+    for number in range(4):
+        for hidden in ("none", "single", "pair", "unknown"):
+            yield diagnosis_report(parse(rig_campaign(record(drawn(SEED, number, hidden)))), table)
+
+
+def with_slips(table: SigmaTable) -> Iterator[Report]:
+    recorded = record(drawn(SEED, 1, "single"))
+    made, _ = from_dict(rig_campaign(recorded))
+    case = Case(made, recorded, np.full(len(recorded.exact), 0.02))
+    for slip, (make, _) in SLIPS.items():
+        wrong = make(case, np.random.default_rng(3))
+        if wrong is not None:
+            report = diagnosis_report(wrong.campaign, table)
+            yield {**report, "campaign": slip}
+
+
+def of_curves(table: SigmaTable) -> Iterator[Report]:
+    for kind in ("indentation", "compression"):
+        for number in range(3):
+            ((document,), _) = documents_and_truth(SEED, number, kind, None)
+            yield diagnosis_report(parse(document), table)
+
+
+def of_several(table: SigmaTable) -> Iterator[Report]:
+    for number in range(2):
+        for what in ("compression", "dates", "skins"):
+            campaigns = [parse(document) for document in drawn_joint(SEED, number, what)[0]]
+            if what == "dates":
+                yield diagnose_together(campaigns, table, what)
+            elif what == "skins":
+                yield diagnose_fleet(by_skin(campaigns), table, what)
+            else:
+                yield diagnosis_report(campaigns[0], table)
+
+
+def by_skin(campaigns: list[Campaign]) -> dict[str, list[Campaign]]:
+    return {str(one.skin.id): [other for other in campaigns if other.skin.id == one.skin.id] for one in campaigns}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("reports", [of_lines, with_slips, of_curves, of_several])
+def test_a_statement_has_three_sentences_at_most(reports: Any, table: SigmaTable) -> None:
+    seen = list(reports(table))
+    assert len(seen) >= 6
+    long = [report["statement"] for report in seen if not 1 <= len(sentences(report["statement"])) <= 3]
+    assert long == []
+
+
+@pytest.mark.slow
+def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None:
+    begun = [report for report in with_slips(table) if report["verdict"] != "insufficient_data"]
+    decided = [report for report in begun if "apart from that, " in sentences(report["statement"])[0]]
+    assert len(decided) >= 5
+    for report in decided:
+        before = small(sentences(report["statement"])[0].partition("; apart from that, ")[0])
+        assert any(clause(entry["statement"])[:40] in before for entry in report["findings"]), report["statement"]
+
+
+@pytest.mark.slow
+def test_what_a_statement_does_not_say_stands_on_the_page(table: SigmaTable) -> None:
+    for report in of_lines(table):
+        shown = " ".join(re.sub(r"<[^>]+>", " ", page(report)).replace("&#39;", "'").replace("&#34;", '"').split())
+        assert all(" ".join(CATALOGUE[entry["name"]].plain.split()) in shown for entry in report["mechanisms"])
+        if report["d33"] is not None:
+            assert f"{report['d33']['value']:.4g}" in shown
+
+
+def test_several_sentences_become_one_and_names_stay_as_they_are() -> None:
+    said = clause("The cable is loose. Hertz's law lacks it. Was it in kN? Left out, see Nr. 3.")
+    assert said == "The cable is loose; Hertz's law lacks it; was it in kN? – left out, see Nr.\N{NO-BREAK SPACE}3"
+    assert (
+        of_clauses(["d33 fell", "A cell drifts"], [], [""], ["E from FRFs"]) == "d33 fell; a cell drifts. E from FRFs."
+    )
+    assert len(sentences(of_clauses([said], [said]))) == 2

@@ -1,0 +1,107 @@
+"""Figures of reports on several campaigns: d33 of each sensor from campaign to campaign, and what each skin of a fleet
+has beside the band of the population; from the report alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from underskin.diagnosis.reporting.numbers import SDS_OF_95
+
+_BLUE, _ORANGE = "#0072B2", "#D55E00"
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
+_MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
+_BESIDE = 0.5  # of a campaign's place on the axis, over which its sensors lie side by side
+_ROW, _OF_SKIN = 130, 22  # height of a quantity, and of a skin in it [pixels]
+
+
+def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
+    """By name: sensors, population; those that the report has."""
+    drawn = {}
+    rows = (document["d33"] or {}).get("per_sensor")
+    if rows:
+        drawn["sensors"] = sensors_over_campaigns(rows)
+    if document.get("population"):
+        drawn["population"] = skins_in_populations(document["population"])
+    return drawn
+
+
+def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]]) -> go.Figure:
+    """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; `rows` are those of
+    `d33.per_sensor`."""
+    campaigns = list(dict.fromkeys(row["campaign"] for row in rows))
+    sensors = list(dict.fromkeys(row["sensor"] for row in rows))
+    beside = _BESIDE * (np.arange(len(sensors)) - (len(sensors) - 1) / 2) / len(sensors)
+    figure = go.Figure()
+    for number, sensor in enumerate(sensors):
+        own = [row for row in rows if row["sensor"] == sensor]
+        figure.add_scatter(
+            x=[campaigns.index(row["campaign"]) + beside[number] for row in own],
+            y=[row["value"] for row in own],
+            error_y=_reaching(own),
+            mode="lines+markers",
+            name=escape(sensor),
+            line={"color": _COLOURS[number % len(_COLOURS)], "width": 1},
+            marker={"symbol": _MARKERS[number % len(_MARKERS)], "size": 8},
+            text=[escape(row["campaign"]) for row in own],
+            hovertemplate="%{text}: %{y:.4g} pC/N<extra>%{fullData.name}</extra>",
+        )
+    labels = [escape(name) for name in campaigns]
+    figure.update_xaxes(title="campaign", tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
+    figure.update_yaxes(title=f"d33 [{rows[0]['unit']}], 95 %")
+    figure.update_layout(title="d33 of each sensor over the campaigns", height=470)
+    return _styled(figure)
+
+
+def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
+    """Each quantity of each skin with its 95 % interval on the band of the population (95 %), those that depart in
+    another colour; `populations` is the report's `population`."""
+    titles = [f"{entry['parameter'].replace('_', ' ').replace('.', ': ')} [{entry['unit']}]" for entry in populations]
+    skins = max(len(entry["skins"]) for entry in populations)
+    figure = make_subplots(len(populations), 1, subplot_titles=titles)
+    for place, entry in enumerate(populations, start=1):
+        departing = {one["skin"] for one in entry["departures"]}
+        for departs, colour, name in ((False, _BLUE, "as the others"), (True, _ORANGE, "departs")):
+            own = [one for one in entry["skins"] if (one["skin"] in departing) is departs]
+            figure.add_scatter(
+                x=[one["value"] for one in own],
+                y=[escape(one["skin"]) for one in own],
+                error_x=_reaching(own),
+                mode="markers",
+                marker={"color": colour, "symbol": "square" if departs else "circle", "size": 9},
+                name=name,
+                legendgroup=name,
+                showlegend=place == 1,
+                hovertemplate="%{y}: %{x:.4g}<extra></extra>",
+                row=place,
+                col=1,
+            )
+        half = SDS_OF_95 * entry["sd"]  # plotly draws bands on subplots that have points alone
+        low, high = entry["mean"] - half, entry["mean"] + half
+        figure.add_vrect(x0=low, x1=high, fillcolor="rgba(0,0,0,0.12)", line_width=0, row=place, col=1)
+        figure.add_vline(x=entry["mean"], line={"color": "#000000", "width": 1}, row=place, col=1)
+    figure.update_layout(
+        title="Each skin, and the band in which 95 % of such skins lie",
+        height=150 + len(populations) * (_ROW + _OF_SKIN * skins),
+    )
+    return _styled(figure)
+
+
+def _reaching(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The 95 % intervals of some rows as plotly has them: how far beside the value."""
+    return {
+        "type": "data",
+        "symmetric": False,
+        "array": [row["high"] - row["value"] for row in rows],
+        "arrayminus": [row["value"] - row["low"] for row in rows],
+        "width": 4,
+    }
+
+
+def _styled(figure: go.Figure) -> go.Figure:
+    figure.update_layout(template="plotly_white", font={"size": 14, "color": "#222222"})
+    return figure

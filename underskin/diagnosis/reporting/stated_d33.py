@@ -1,0 +1,99 @@
+"""The d33 of a report: whether it is to be quoted, and what would change it that these recordings do not show."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.reporting import averaged
+from underskin.diagnosis.reporting.statements import CONFOUNDED
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.validation.hidden_shift import HiddenShift
+from underskin.diagnosis.validation.identifiability import Confounding, Likeness
+from underskin.diagnosis.validation.residual_noise import REACHES_NOISE
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_digits
+from underskin.prediction import plausibility
+
+_BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
+
+
+@dataclass(frozen=True)
+class StatedD33:
+    """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
+    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted."""
+
+    document: Mapping[str, Any] | None
+    findings: Sequence[Finding] = ()
+    hidden: Sequence[HiddenShift] = ()
+
+    @property
+    def declared(self) -> list[HiddenShift]:
+        """The hidden ones that are wrong declared numbers, the largest first."""
+        chosen = [entry for entry in self.hidden if entry.declared]
+        return sorted(chosen, key=lambda entry: -abs(entry.log_factor))
+
+    def clause(self) -> str:
+        """The value to quote, or why none is; empty where there is no d33."""
+        if self.document is None:
+            return ""
+        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
+        if self.document["quotable"]:
+            return f"d33 to quote: {value} {self.document['unit']} (95 %: {low} to {high})"
+        ends = f"from {low} to {high} {self.document['unit']}"
+        if not self.declared:
+            return f"d33 is not to be quoted: it lies {ends} over the answers that remain"
+        each = " and ".join(f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.declared)
+        return f"d33 is not to be quoted: it lies {ends}, but what would not show here would change it, {each}"
+
+    def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
+        """The report's entries, with what each would do to d33 beyond its interval."""
+        hidden = {entry.mechanism: entry for entry in self.hidden}
+        known = {entry.mechanism for entry in confounded if entry.confounded_with in _BY_NUISANCES}
+        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.declared]
+        return [
+            {
+                "mechanism": entry.mechanism,
+                "confounded_with": entry.confounded_with,
+                "reason": _reason(entry, hidden.get(entry.mechanism)),
+            }
+            for entry in (*confounded, *(one for one in further if one.mechanism not in known))
+        ]
+
+
+def stated_d33(
+    search: Search, problem: FittingProblem, fit: Mapping[str, Any], shifts: Sequence[HiddenShift], *, stands: bool
+) -> StatedD33:
+    """The d33 averaged over all answers.
+
+    `quotable`: one answer `stands`, d33 is plausible, the answer fits the recordings to their noise, and no wrong
+    declared number that would not show here would move d33 beyond its interval.
+    """
+    d33 = None if problem.lines.curves else averaged.d33(search, problem)
+    if d33 is None:
+        return StatedD33(None)
+    half_width = float(np.log(d33["high"] / d33["low"])) / 2
+    hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
+    implausible = plausibility.implausibility(d33["value"])
+    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
+    quotable = stands and reached and implausible is None
+    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
+    findings = [finding] if implausible else []
+    # Beside other reasons not to quote it, a hidden one would not be what decides.
+    stated = StatedD33({**d33, "quotable": quotable}, findings, hidden if quotable else ())
+    return StatedD33({**d33, "quotable": False}, findings, hidden) if stated.declared else stated
+
+
+def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:
+    reason = CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
+    if hidden is None or entry.confounded_with not in _BY_NUISANCES:
+        return reason
+    return f"{reason}; d33 would then be {_percent(hidden)} too {'large' if hidden.log_factor > 0 else 'small'}"
+
+
+def _percent(hidden: HiddenShift) -> str:
+    return f"{in_digits(abs(hidden.percent), 2)} %"

@@ -1,0 +1,78 @@
+"""One sensor whose level stands beside that of all others, which are alike: its own d33 or its cable, no physics.
+
+With a gain of its own for that sensor the model of levels must explain them far better than with any spread of all
+sensors, and than anything smooth along an axis. Where several sensors differ, that is `sensor_spread`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import exp, log
+
+import numpy as np
+
+from underskin.diagnosis.screening.along_axes import smooth_along
+from underskin.diagnosis.screening.levels import LevelFit, Levels
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import FrfRecording
+
+_LEAST_SENSORS = 4
+_LEAST = 0.14  # of |ln gain|
+_AMPLITUDE = 0.4  # prior standard deviation of ln gain
+_GAIN, _OVER_RIVALS = 1.7, 1.5  # of ln evidence, on its cost, and over what else may do it
+_COST = 2.0  # per ln of how many sensors there are: one that is tried, and one that chance puts apart
+
+
+@dataclass(frozen=True)
+class Alone:
+    """Number of the sensor, the logarithm of its gain over the others', and by how much ln evidence gains on its
+    cost."""
+
+    sensor: int
+    amplitude: float
+    gain: float
+
+
+def standing_alone(levels: Levels) -> Alone | None:
+    """The sensor that stands alone most plainly, None where none is plain."""
+    numbers = np.unique(levels.sensor).tolist()
+    if len(numbers) < _LEAST_SENSORS:
+        return None
+    base = levels.fit(levels.value)
+    own = max(numbers, key=lambda number: _plainness(base, levels, number))
+    column = (levels.sensor == own).astype(float)
+    fit = levels.fit(levels.value, _AMPLITUDE * column[:, None])
+    gain = fit.evidence - base.evidence - _COST * log(len(numbers))
+    if gain < _GAIN:
+        return None
+    amplitude, _ = fit.amplitude(levels.value, column)
+    if abs(amplitude) < _LEAST:
+        return None
+    rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
+    return Alone(own, amplitude, gain) if fit.evidence > max(rivals, default=-np.inf) + _OVER_RIVALS else None
+
+
+def at_the_others(entries: Sequence[FrfRecording], levels: Levels, found: Alone) -> tuple[list[FrfRecording], Finding]:
+    """The recordings with those of the sensor at the others' level, and the finding on it."""
+    first = int(levels.number[levels.sensor == found.sensor][0])
+    name = entries[first].sensor
+    scaled = [_times(entry, exp(-found.amplitude)) if entry.sensor == name else entry for entry in entries]
+    arguments = {
+        "sensor": name,
+        "share": exp(found.amplitude),
+        "recordings": sum(one.sensor == name for one in entries),
+    }
+    reason = Reason.SENSOR_WEAKER if found.amplitude < 0 else Reason.SENSOR_STRONGER
+    return scaled, Finding(reason, "", "frf_re_pc_per_n", arguments)
+
+
+def _plainness(base: LevelFit, levels: Levels, number: int) -> float:
+    amplitude, deviation = base.amplitude(levels.value, (levels.sensor == number).astype(float))
+    return abs(amplitude) / deviation
+
+
+def _times(entry: FrfRecording, factor: float) -> FrfRecording:
+    assert entry.frf_re_pc_per_n is not None
+    assert entry.frf_im_pc_per_n is not None
+    real, imaginary = factor * entry.frf_re_pc_per_n, factor * entry.frf_im_pc_per_n
+    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)

@@ -1,0 +1,55 @@
+"""When campaigns were recorded, and how a report calls them by that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from underskin.recordings.campaign import Campaign, FrfRecording
+
+
+@dataclass(frozen=True)
+class Dated:
+    """Names of campaigns in their order, with the dates of their first recordings, None of those without a time."""
+
+    names: Sequence[str]
+    dates: Sequence[str | None]
+
+    @property
+    def ordered(self) -> bool:
+        """Whether their order is one of time: all have a date."""
+        return None not in self.dates
+
+    def since(self, number: int) -> str | None:
+        """The date from which on something is there that begins with this campaign; None where the order is not one of
+        time."""
+        return self.dates[number] if self.ordered else None
+
+    def called(self, number: int) -> str:
+        """A campaign by its date where that says which it is, else by its name: "campaign B (no date)"."""
+        date = self.dates[number]
+        if date is not None and self.ordered and self.dates.count(date) == 1:
+            return date
+        return f"campaign {self.names[number]} ({date or 'no date'})"
+
+    def order_clause(self) -> str:
+        """That the order is not one of time; empty where it is."""
+        if self.ordered:
+            return ""
+        listed = ", ".join(self.called(number) for number in range(len(self.names)))
+        return f"not every campaign has a date, so they count in the order in which they were given: {listed}"
+
+
+def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
+    """By the first time of each; as they come where one has none."""
+    dates = [date_of(campaign) for campaign in campaigns]
+    if any(date is None for date in dates):
+        return list(campaigns)
+    return [campaigns[number] for number in np.argsort(np.array(dates), kind="stable")]
+
+
+def date_of(campaign: Campaign) -> str | None:
+    """The date of its first recording; None where none has a time."""
+    times = [str(entry.recorded_at)[:10] for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    known = [time for time in times if time != "None"]
+    return min(known, default=None)
