@@ -1,6 +1,7 @@
 """Bodies in columns, as JSON, CSV or NumPy's .npz, and the requests in them."""
 
 import sys
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,7 +12,7 @@ from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, InvalidInput, wrong_type
-from underskin.prediction.columns import CsvError, from_csv
+from underskin.prediction.columns import CsvError, from_csv, without_labels
 
 try:
     import simdjson
@@ -25,21 +26,26 @@ CSV = "text/csv"
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
-def parse(kind: type[_Kind], body: bytes, content_type: str, most_bytes: int) -> _Kind:
-    """The request in `body`; an .npz may have `most_bytes` when it is expanded.
+def parse(
+    kind: type[_Kind], body: bytes, content_type: str, most_bytes: int
+) -> tuple[_Kind, Mapping[str, Sequence[str]]]:
+    """The request in `body`, and the columns of words in a CSV, which only say what a row is; an .npz may have
+    `most_bytes` when it is expanded.
 
     Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
     """
+    labels: Mapping[str, Sequence[str]] = {}
     match media_type_of(content_type):
         case "text/csv":
-            fields: Any = _from_csv(kind, body)
+            fields: Any
+            fields, labels = _from_csv(kind, body)
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
         case "" | "application/json" if len(body) > _LONG and (plain := _plain_json(kind, body)) is not None:
             fields = plain
         case _:
             fields = json_document(body, content_type, f", {CSV} or {NPZ}")
-    return validated(kind, fields)
+    return validated(kind, fields), labels
 
 
 def json_document(body: bytes, content_type: str, also: str = "") -> Any:
@@ -101,14 +107,14 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
     return True
 
 
-def _from_csv(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any]:
+def _from_csv(kind: type[ColumnsRequest], body: bytes) -> tuple[dict[str, Any], dict[str, list[str]]]:
     try:
-        columns = from_csv(body.decode("utf-8-sig"))
+        columns, labels = without_labels(from_csv(body.decode("utf-8-sig")), kind.model_fields)
     except UnicodeDecodeError as error:
         raise Refusal(400, f"The body is not CSV in UTF-8: {error}.") from None
     except CsvError as error:
         raise Refusal(400, f"The CSV of the body {error}.") from None
-    return {name: _cells(kind, name, cells) for name, cells in columns.items()}
+    return {name: _cells(kind, name, cells) for name, cells in columns.items()}, labels
 
 
 def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:

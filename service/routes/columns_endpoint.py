@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
@@ -53,7 +54,11 @@ def add_columns_route(
 
         def work() -> Response:
             with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                return respond(answer(table, store, parse(kind, body, content_type, most_bytes)), accept)
+                asked, labels = parse(kind, body, content_type, most_bytes)
+                found = answer(table, store, asked)
+                if preferred(accept) == CSV:  # the rows go back to where they came from, with what they are called
+                    found = replace(found, names={**labels, **found.names})
+                return respond(found, accept)
 
         if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()

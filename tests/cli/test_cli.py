@@ -80,7 +80,11 @@ def test_table_shows_units_and_what_a_status_means() -> None:
 def test_csv_file_written_by_a_spreadsheet(tmp_path: Path) -> None:
     sheet = tmp_path / "measured.csv"
     sheet.write_bytes("\ufeffpreload_n , frf_pc_per_n\r\n1,7.4\r\n3,11.5\r\n".encode())
-    assert len(columns("d33", *SKIN, "--input", str(sheet))["d33_pc_per_n"]) == 2
+    written = columns("d33", *SKIN, "--input", str(sheet))["d33_pc_per_n"]
+    assert len(written) == 2
+    sheet.write_bytes(b"sep=;\r\nPress;preload_n;frf_pc_per_n\r\nerste;1,0;7,4\r\n# Pause\r\nzweite;3;11,5\r\n")
+    german = columns("d33", *SKIN, "--input", str(sheet))
+    assert (german["Press"], german["d33_pc_per_n"]) == (["erste", "zweite"], written)
 
 
 @pytest.mark.slow
@@ -120,7 +124,8 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
     [
         ("", "must have a header of field names and at least one row"),
         ("preload_n,frf_pc_per_n\n", "at least one row"),
-        ("preload_n;frf_pc_per_n\n1;7\n", "must separate cells by commas"),
+        ("preload_n;frf_pc_per_n\n1;7\n3;1.000,5\n", "frf_pc_per_n[1] = '1.000,5': must be a number"),
+        ("preload_n,frf_pc_per_n,humidity\n1,7,40\n", "has the column 'humidity'; allowed, once each"),
         ("preload_n,preload_n\n1,7\n", "must name each field once; its header has 'preload_n' twice"),
         (
             "preload_n,frf_pc_per_n\n1,7\n1\n",

@@ -184,16 +184,16 @@ def _answer(
     from underskin.prediction.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
-    gathered = columns.gather(options, defaults, input_file)
+    gathered, labels = columns.gather(options, defaults, input_file)
     count = rows(gathered)
     table = load_table()
     answer = compute(table, gathered)
     everything = {**gathered, **answer.columns}
     columns.write_findings(answer.findings)
     if as_csv:
-        columns.write_csv(everything, answer.inside, count)
+        columns.write_csv(everything, answer.inside, count, labels)
     else:
-        columns.write_table(everything, answer.inside, count)
+        columns.write_table(everything, answer.inside, count, labels)
         if not answer.inside.all():
             typer.echo(f"The domain is {answer.domain}.")
 

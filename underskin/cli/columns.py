@@ -12,7 +12,7 @@ from rich.text import Text
 from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv
+from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, without_labels
 from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
@@ -47,14 +47,14 @@ PIPED_WIDTH = 200  # of a table that goes into a file or a pipe
 
 def gather(
     options: Mapping[str, Sequence[str] | None], defaults: Mapping[str, float | None], path: str | None
-) -> dict[str, Floats]:
+) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input) or its default;
-    one whose default is None may be left out.
+    one whose default is None may be left out. Then the file's columns of words.
 
     An option such as ["0.5,1", "2"] is a column of three; a single number has shape () and holds for all rows. Raises
     InvalidInput, or UnderskinError for a field that has no value.
     """
-    in_file = {} if path is None else _from_csv(path, list(options))
+    in_file, labels = ({}, {}) if path is None else _from_csv(path, list(options))
     columns = {}
     for name, values in options.items():
         if values and name in in_file:
@@ -69,7 +69,7 @@ def gather(
         else:
             option = "--" + name.replace("_", "-")
             raise UnderskinError(f"{name} is missing: give {option}, or a column {name} in the CSV file of --input")
-    return columns
+    return columns, labels
 
 
 def _from_option(name: str, values: Sequence[str]) -> Floats:
@@ -77,11 +77,11 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
     return numbers if numbers.size > 1 else numbers.reshape(())
 
 
-def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
+def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
         source = sys.stdin.fileno() if path == STANDARD_INPUT else path
         with open(source, encoding="utf-8-sig", newline="", closefd=path != STANDARD_INPUT) as file:
-            columns = from_csv(file.read())
+            columns, labels = without_labels(from_csv(file.read()), allowed)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise unreadable("input", path, f"must be a readable CSV file ({reason})") from error
@@ -91,7 +91,7 @@ def _from_csv(path: str, allowed: Sequence[str]) -> dict[str, Floats]:
         if name not in allowed:
             words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
             raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
-    return {name: _numbers(name, cells) for name, cells in columns.items()}
+    return {name: _numbers(name, cells) for name, cells in columns.items()}, labels
 
 
 def write_csv(

@@ -2,13 +2,17 @@
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Container, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.units import Floats, Mask
+
+_SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)
+_WITH_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$")
 
 
 class CsvError(ValueError):
@@ -39,18 +43,24 @@ def statuses(inside: Mask, count: int) -> list[str]:
 def from_csv(text: str) -> dict[str, list[str]]:
     """The cells of each column, by the names in the header; lines without a cell are skipped.
 
+    Cells are separated by commas, or by semicolons or tabs where the header is; then numbers may have decimal commas,
+    which become points. A first line `sep=;` and lines that begin with # say nothing.
+
     Raises:
-        CsvError: cells are not separated by commas, a name comes twice, or a row has too many or too few cells.
+        CsvError: the text is no CSV, a name comes twice, or a row has too many or too few cells.
     """
+    rows = text.splitlines(keepends=True)
+    rows = [row for row in rows if row.strip() and not _SAYS_NOTHING.match(row)]
+    separator = next((mark for mark in ";\t" if rows and mark in rows[0]), ",")
     try:
-        lines = [line for line in csv.reader(io.StringIO(text, newline=""), strict=True) if line]
+        lines = [line for line in csv.reader(rows, strict=True, delimiter=separator) if line]
     except csv.Error as error:
         raise CsvError(f"must be readable as CSV ({error})") from error
     if len(lines) < 2:
         raise CsvError("must have a header of field names and at least one row")
+    if separator != ",":
+        lines[1:] = [[cell.replace(",", ".") if _WITH_COMMA.match(cell) else cell for cell in row] for row in lines[1:]]
     header = [name.strip() for name in lines[0]]
-    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-        raise CsvError("must separate cells by commas and write numbers with a point")
     for name in header:
         if header.count(name) > 1:
             raise CsvError(f"must name each field once; its header has {name!r} twice")
@@ -59,6 +69,23 @@ def from_csv(text: str) -> dict[str, list[str]]:
             raise CsvError(f"must have as many cells in each row as in the header: {len(line)} in row {number}, "
                            f"{len(header)} in the header")  # fmt: skip
     return {name: list(cells) for name, cells in zip(header, zip(*lines[1:], strict=True), strict=True)}
+
+
+def without_labels(
+    columns: Mapping[str, Sequence[str]], known: Container[str]
+) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    """The columns that are fields, or hold numbers, and those of words, which only say what a row is."""
+    words = [name for name, cells in columns.items() if name not in known and not any(map(_is_number, cells))]
+    fields = {name: list(cells) for name, cells in columns.items() if name not in words}
+    return fields, {name: list(columns[name]) for name in words}
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def to_csv(columns: Mapping[str, Floats | Sequence[Any]], line_end: str) -> str:

@@ -56,6 +56,14 @@ class Contents:
         return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
 
 
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A file that holds a campaign: the document (`campaign/1`), not yet checked, and what the user should know."""
+
+    campaign: Mapping[str, Any]
+    warnings: tuple[str, ...] = ()
+
+
 def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:
     """The same channels; a name that comes again is numbered, `force (2)`."""
     seen: dict[str, int] = {}

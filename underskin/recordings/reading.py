@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from underskin.errors import FileError
 from underskin.recordings import rig_mapping
 from underskin.recordings.campaign import Campaign, RecordingProblem, from_dict
-from underskin.recordings.channels import Contents
+from underskin.recordings.channels import Contents, Document
 from underskin.recordings.readers import formats
 from underskin.recordings.readers.sandbox import parse_apart
 from underskin.recordings.rig_description import RigDescription
@@ -40,10 +40,10 @@ def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None 
     return understood(read_contents(source, name), name, rig)
 
 
-def understood(contents: Contents | dict[str, Any], name: str, rig: RigDescription | None = None) -> Reading:
+def understood(contents: Contents | Document, name: str, rig: RigDescription | None = None) -> Reading:
     """The campaign in what `read_contents` has read; raises as `read_file`."""
-    if not isinstance(contents, Contents):
-        return Reading(*from_dict(contents), [])
+    if isinstance(contents, Document):
+        return Reading(*from_dict(contents.campaign), list(contents.warnings))
     if rig is None:
         layout = f" ({contents.layout})" if contents.layout else ""
         reason = f"a rig description must say what its channels are; it has {contents.described()}{layout}"
@@ -52,7 +52,7 @@ def understood(contents: Contents | dict[str, Any], name: str, rig: RigDescripti
     return Reading(*from_dict(mapped.document), mapped.warnings, mapped.taken)
 
 
-def read_contents(source: Path | str | bytes, name: str) -> Contents | dict[str, Any]:
+def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
     """A file's channels, or its campaign document, before a rig description is applied; raises FileError."""
     with _opened(source, name) as stream:
         kind = formats.detect(stream, name)

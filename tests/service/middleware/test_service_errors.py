@@ -160,6 +160,18 @@ def test_csv_that_is_not_understood(http: httpx.Client, body: bytes, status: int
     assert says in problem_of(answer, status)["detail"]
 
 
+def test_rows_of_a_spreadsheet_come_back_with_what_they_are_called(http: httpx.Client) -> None:
+    """Semicolons, decimal commas and a column of words, as German spreadsheets have them."""
+    body = b"sep=;\r\nPress;a_over_h;rt_over_h\r\nerste;0,3;0,6\r\nzweite;0,4;0,6\r\n"
+    headers = {"Content-Type": "text/csv", "Accept": "text/csv"}
+    header, *rows = http.post("/v1/sigma", content=body, headers=headers).text.splitlines()
+    assert header.startswith("Press,sigma,")
+    assert [row.split(",")[0] for row in rows] == ["erste", "zweite"]
+    plain = http.post("/v1/sigma", json={"a_over_h": [0.3, 0.4], "rt_over_h": 0.6}).json()
+    sigma = header.split(",").index("sigma")
+    assert [float(row.split(",")[sigma]) for row in rows] == pytest.approx(plain["sigma"], rel=1e-15)
+
+
 def test_what_csv_cannot_tell_is_said(http: httpx.Client) -> None:
     fields = {**FRF, "preload_n": 1.0, "frequency_hz": 10.0}
     body = ",".join(fields) + "\n" + ",".join(map(str, fields.values()))

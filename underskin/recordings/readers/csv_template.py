@@ -9,32 +9,40 @@
     r1,s01,1.0,10,7.1,-0.5
     ,,,20,7.2,-0.6
 
-Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A cell in quotes
-may hold the separator. An empty cell under a quantity that a recording has once repeats the one above; an empty `id`
+Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A first line
+`sep=;` and lines that begin with `#` say nothing; a line of one cell under the table is a note. A cell in quotes may
+hold the separator. An empty cell under a quantity that a recording has once repeats the one above; an empty `id`
 continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds whatever else
 the lab noted, numbers or words. A cell too many, a field that comes again and a
 recording that begins twice are refused.
 """
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
+from difflib import get_close_matches
 from typing import Any, BinaryIO
 
 from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS, KINDS, SCHEMA
+from underskin.recordings.channels import Document
 from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.readers import text
+from underskin.recordings.readers import template_columns, text
+from underskin.recordings.readers.calendar_times import iso_time
+from underskin.recordings.readers.template_columns import FURTHER, Column, NoField
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
 from underskin.units import LAB, LabField
 
-_FIRST_LINE = 200
+_FIRST_LINE = 2000
+_TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
 _SEPARATORS = ("\t", ";", ",")
 _POSITION = ("position_x_mm", "position_y_mm")
 _SENSOR = ("id", "x_mm", "y_mm")
 _TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)) - {"conditions"}
-_FURTHER = "conditions."  # what else the lab noted, a column each
+_ID = "id"
+_NO_ZONE = "times without a zone are in that of UNDERSKIN_TIME_ZONE (UTC where it is not set)"
 _FLAGS = {"true": True, "false": False}
 
 
@@ -43,17 +51,18 @@ def is_template(content: str) -> bool:
     return _separator(content) is not None
 
 
-def read(stream: BinaryIO, file: str) -> dict[str, Any]:
+def read(stream: BinaryIO, file: str) -> Document:
     """The campaign document of a filled-in template; raises FileError that names the line."""
     content = text.content(stream, file)
     separator = _separator(content)
     if separator is None:
         raise FileError(file, "line 1", f"must be schema,{SCHEMA}")
-    return _Template(file, list(_rows(content, separator, file)), separator).document()
+    template = _Template(file, list(_rows(content, separator, file)), separator)
+    return Document(template.document(), tuple(template.warnings))
 
 
 def _separator(content: str) -> str | None:
-    first = text.lines(content[:_FIRST_LINE])[0]
+    first = next((line for line in text.lines(content[:_FIRST_LINE]) if not _says_nothing(line)), "")
     return next((mark for mark in _SEPARATORS if _first_cells(first, mark) == ["schema", SCHEMA]), None)
 
 
@@ -67,9 +76,15 @@ def _first_cells(line: str, separator: str) -> list[str]:
 def _rows(content: str, separator: str, file: str) -> Iterator[list[str]]:
     for number, line in enumerate(text.lines(content), start=1):
         try:
-            yield text.cells(line, separator)
+            yield [""] if _says_nothing(line) else text.cells(line, separator)
         except ValueError as error:
             raise FileError(file, f"line {number}", str(error)) from None
+
+
+def _says_nothing(line: str) -> bool:
+    """Whether a line is blank, a comment, or tells a spreadsheet its separator."""
+    bare = line.strip().strip('"')
+    return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
 
 
 class _Template:
@@ -79,9 +94,10 @@ class _Template:
         self.separator = separator
         self.decimal = text.decimal_mark(rows, separator)
         self.lines: dict[str, int] = {}  # where the fields above the table stand
+        self.warnings: list[str] = []
 
     def document(self) -> dict[str, Any]:
-        table = next((index for index, row in enumerate(self.rows) if row[0].lower() == "id"), None)
+        table = next((index for index, row in enumerate(self.rows) if _ID in map(str.lower, row[:2])), None)
         if table is None:
             raise self._error(len(self.rows) - 1, "the table is missing: no line begins with id")
         above = [self._above(row, index) for index, row in enumerate(self.rows[:table]) if any(row)]
@@ -136,53 +152,74 @@ class _Template:
         raise self._error(index, f"{heading} = {cell}: {said} (if not, units_checked,true)")
 
     def _recordings(self, table: int) -> list[dict[str, Any]]:
-        headings = self._headings(table)
+        end = self._end(table)
+        columns = self._columns(table, end)
+        identity = next(column.place for column in columns if column.field == _ID)
         recordings: list[_Recording] = []
         begun: dict[str, int] = {}
         current, continued = "", False  # the id of the recording, and whether rows without it have followed
-        for index, row in enumerate(self.rows[table + 1 :], start=table + 1):
+        for index, row in enumerate(self.rows[table + 1 : end], start=table + 1):
             if not any(row):
                 continue
-            if row[0] and (row[0] != current or continued):
-                if row[0] in begun:
-                    raise self._error(index, f"recording {row[0]!r} began on line {begun[row[0]] + 1} already", 0)
-                current, begun[row[0]] = row[0], index
+            own = row[identity] if identity < len(row) else ""
+            if own and (own != current or continued):
+                if own in begun:
+                    raise self._error(index, f"recording {own!r} began on line {begun[own] + 1} already", identity)
+                current, begun[own] = own, index
                 recordings.append(_Recording())
-            continued = not row[0]
+            continued = not own
             if not current:
                 raise self._error(index, "the first row of the table needs an id")
-            if len(row) > len(headings):
-                reason = f"has {len(row)} cells under {len(headings)} headings"
-                raise self._error(index, reason, len(headings))
-            if contradiction := recordings[-1].add(self._line(headings, row, index)):
+            if len(row) > len(self.rows[table]):
+                reason = f"has {len(row)} cells under {len(self.rows[table])} headings"
+                raise self._error(index, reason, len(self.rows[table]))
+            if contradiction := recordings[-1].add(self._line(columns, row, index)):
                 raise self._error(index, contradiction)
         return [recording.document() for recording in recordings]
 
-    def _line(self, headings: list[tuple[str, float]], row: list[str], index: int) -> dict[str, Any]:
+    def _end(self, table: int) -> int:
+        """The row behind the last of the table; single cells under it are notes."""
+        last = max(index for index in range(table, len(self.rows)) if sum(map(bool, self.rows[index])) > 1)
+        notes = [(index, row[0]) for index, row in enumerate(self.rows[last + 1 :], start=last + 1) if row[0]]
+        self.warnings += [f"line {index + 1} under the table, {note!r}, is left out" for index, note in notes]
+        return last + 1
+
+    def _line(self, columns: Sequence[Column], row: list[str], index: int) -> dict[str, Any]:
         """The values of a row by field."""
-        cells = [*row, *[""] * (len(headings) - len(row))]
-        return {
-            field: self._value(field, cell, (index, column), factor)
-            for column, ((field, factor), cell) in enumerate(zip(headings, cells, strict=True))
-        }
+        return template_columns.with_parts(
+            {
+                column.field: self._value(
+                    column.field,
+                    row[column.place] if column.place < len(row) else "",
+                    (index, column.place),
+                    column.factor,
+                )
+                for column in columns
+            }
+        )
 
-    def _headings(self, table: int) -> list[tuple[str, float]]:
+    def _columns(self, table: int, end: int) -> list[Column]:
         """The field of each column and the factor to its unit, each field once."""
-        headings: dict[str, float] = {}
-        for cell in self.rows[table]:
-            field, factor = self._field(cell, table)
-            if field in headings:
-                raise self._error(table, f"{cell!r} is a second column of {field}")
-            headings[field] = factor
-        return list(headings.items())
+        try:
+            columns, left_out = template_columns.columns(
+                self.rows[table], self.rows[table + 1 : end], _KNOWN, self.decimal
+            )
+        except NoField as error:
+            raise self._error(table, str(error), error.place) from None
+        self.warnings += left_out
+        halved = [column.heading for column in columns if column.heading.lower().startswith("indenter")]
+        self.warnings += [f"{heading!r} is halved" for heading in halved if "diameter" in heading.lower()]
+        return columns
 
-    def _field(self, heading: str, index: int) -> tuple[str, float]:
-        """The field of a heading and the factor to its unit."""
-        if heading in _KNOWN or f"skin.{heading}" in _SKIN_FIELDS or heading.startswith(_FURTHER):
-            return heading, 1.0
-        known = lab_field(heading)
+    def _field(self, name: str, index: int) -> tuple[str, float]:
+        """The field of the skin that a name above the table means, and the factor to its unit."""
+        if f"skin.{name}" in _SKIN_FIELDS:
+            return name, 1.0
+        known = lab_field(name)
         if known is None:
-            raise self._error(index, f"{heading!r} is no field, or its unit is not of the field")
+            close = get_close_matches(f"skin.{name}", _SKIN_FIELDS, 1)
+            guess = f"; did you mean {close[0]}?" if close else ""
+            raise self._error(index, f"{name!r} is no field, or its unit is not of the field{guess}")
         return known
 
     def _value(self, field: str, cell: str, place: tuple[int, int], factor: float = 1.0) -> Any:
@@ -190,6 +227,8 @@ class _Template:
 
         What is no number stays as it is, for the campaign's checks to refuse.
         """
+        if cell and field == "recorded_at":
+            return self._time(cell, place)
         if not cell or field in _TEXTS:
             return cell or None
         number = text.number(cell, self.decimal)
@@ -198,6 +237,15 @@ class _Template:
         if text.is_grouped(cell):
             raise self._error(place[0], f"{field} = {cell!r} {text.ungrouped(cell)}", place[1])
         return cell
+
+    def _time(self, cell: str, place: tuple[int, int]) -> str:
+        try:
+            time = iso_time(cell)
+        except ValueError as error:
+            raise self._error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
+        if time != cell and _NO_ZONE not in self.warnings:
+            self.warnings.append(_NO_ZONE)
+        return time
 
     def _error(self, index: int, reason: str, column: int | None = None) -> FileError:
         """What is wrong with a row, or with its cell in a column (both from 0)."""
@@ -232,8 +280,8 @@ class _Recording:
         """As in a campaign: one position, and no columns that it leaves empty, which are another kind's."""
         columns = {name: column for name, column in self.columns.items() if any(entry is not None for entry in column)}
         position = [self.once.pop(name, None) for name in _POSITION]
-        noted = {name.removeprefix(_FURTHER): value for name, value in self.once.items() if name.startswith(_FURTHER)}
-        own = {name: value for name, value in self.once.items() if not name.startswith(_FURTHER)}
+        noted = {name.removeprefix(FURTHER): value for name, value in self.once.items() if name.startswith(FURTHER)}
+        own = {name: value for name, value in self.once.items() if not name.startswith(FURTHER)}
         return {
             **({} if position == [None, None] else {"position_mm": position}),
             **own,

@@ -8,11 +8,11 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from underskin import extensions
 from underskin.errors import FileError
-from underskin.recordings.channels import Contents
+from underskin.recordings.channels import Contents, Document
 from underskin.recordings.readers import csv_template, lvm_file, text
 
 MODULES = {
@@ -139,14 +139,15 @@ def _text_format(head: bytes, file: str) -> str:
     return "CSV template" if csv_template.is_template(start) else "CSV"
 
 
-def parse(name: str, stream: BinaryIO, file: str) -> Contents | dict[str, Any]:
+def parse(name: str, stream: BinaryIO, file: str) -> Contents | Document:
     """Read a file of the named format, in this process: its channels, or a campaign document.
 
     Raises FileError that names the place; MemoryError where there is not enough of it.
     """
     if name in MODULES:
         module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
-        return module.read(stream, file)
+        held = module.read(stream, file)
+        return Document(held) if isinstance(held, dict) else held
     stream.seek(0)
     contents = formats_of_other_packages()[name].read(stream, file)
     if not isinstance(contents, Contents):

@@ -19,7 +19,7 @@ import orjson
 
 from underskin.errors import ErrorCode, FileError
 from underskin.parallel import limit_process
-from underskin.recordings.channels import Block, Channel, Contents
+from underskin.recordings.channels import Block, Channel, Contents, Document
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.shown_values import shown
 
@@ -45,11 +45,11 @@ _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
 
 
-def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = _DEFAULT) -> Contents | dict[str, Any]:
+def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = _DEFAULT) -> Contents | Document:
     """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit."""
     contents = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
     if "document" in contents:
-        return dict(contents["document"])
+        return Document(contents["document"], tuple(contents["warnings"]))
     blocks = []
     for block in contents["blocks"]:
         channels = tuple(Channel(**channel) for channel in block["channels"])
@@ -121,7 +121,9 @@ def _with_arrays(contents: Any, mark: str, buffer: memoryview) -> Any:
 
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
     contents = parse(name, stream, "")
-    return asdict(contents) if isinstance(contents, Contents) else {"document": contents}
+    if isinstance(contents, Contents):
+        return asdict(contents)
+    return {"document": contents.campaign, "warnings": contents.warnings}
 
 
 def _main() -> None:

@@ -10,6 +10,8 @@ from underskin.errors import FileError
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _NUMBER = re.compile(r"[+-]?(\d+([.]\d*)?|[.]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+_LOOKED_AT, _MOSTLY = 4096, 0.8  # bytes of a text without a mark, and how many of a half must be zero
+_MINUS = "\N{MINUS SIGN}"
 _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -20,7 +22,8 @@ def content(stream: BinaryIO, file: str) -> str:
 
 
 def decode(data: bytes, file: str) -> str:
-    """The text of a file: UTF-8, UTF-16 where a byte order mark says so, else Latin-1, which older instruments write.
+    """The text of a file: UTF-8, UTF-16 where a byte order mark or every second byte says so, else Latin-1, which older
+    instruments write.
 
     Raises FileError where the bytes are no text.
     """
@@ -28,12 +31,24 @@ def decode(data: bytes, file: str) -> str:
         if data.startswith(mark):
             return _decoded(data[len(mark) :], encoding, file)
     zero = data.find(0)
+    if zero in (0, 1) and (encoding := _unmarked(data)):
+        return _decoded(data, encoding, file)
     if zero >= 0:
         raise FileError(file, f"byte {zero}", "is no text: it holds a zero byte")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def _unmarked(data: bytes) -> str:
+    """The encoding of a text in UTF-16 that has no byte order mark: every second byte is zero in what is mostly ASCII;
+    empty where it is none."""
+    first, second = (data[start:_LOOKED_AT:2].count(0) for start in (0, 1))
+    half = len(data[:_LOOKED_AT]) // 2
+    if max(first, second) < _MOSTLY * half or min(first, second):
+        return ""
+    return "utf-16-be" if first > second else "utf-16-le"
 
 
 def _decoded(data: bytes, encoding: str, file: str) -> str:
@@ -101,7 +116,7 @@ def ungrouped(cell: str) -> str:
 
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, or None where it holds something else."""
-    cell = cell.strip()
+    cell = cell.strip().replace(_MINUS, "-")
     if decimal == ",":
         if "." in cell:
             return None

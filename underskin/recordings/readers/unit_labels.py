@@ -25,9 +25,15 @@ _WHOLE = {
     "m/s2": ("acceleration", 1.0),
     "m/s²": ("acceleration", 1.0),
     "g": ("acceleration", _STANDARD_GRAVITY),
+    "gf": ("force", 1e-3 * _STANDARD_GRAVITY),
+    "kgf": ("force", _STANDARD_GRAVITY),
+    "lbf": ("force", 4.4482216152605),
+    "in": ("length", 25.4e-3),
+    "inch": ("length", 25.4e-3),
     "sec": ("time", 1.0),
     "min": ("time", 60.0),
 }
+_DIAMETER, _RADIUS = "indenter_diameter", "indenter_radius"
 _BEHIND = re.compile(r"(?P<name>.*[^\s,])(\s*/\s*|\s+in\s+|\s*,\s*)(?P<unit>[^\s/,]+(/[^\s/,]+)?)\s*")
 _IN_BRACKETS = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*$")
 
@@ -85,16 +91,26 @@ def labelled_unit(heading: str) -> str:
     return "" if "/" in whole and unit(whole) is not None else behind["unit"]
 
 
+def in_brackets(heading: str) -> tuple[str, str] | None:
+    """The name and the unit in brackets behind it; None where there is none."""
+    bracketed = _IN_BRACKETS.match(heading[-LONGEST_NAME:])
+    return None if bracketed is None else (bracketed["name"].strip(), bracketed["unit"].strip())
+
+
 def lab_field(heading: str) -> tuple[str, float] | None:
-    """The campaign field of a heading and the factor to its unit: `preload [mN]` is `preload_n`, 0.001.
+    """The campaign field of a heading and the factor to its unit: `preload [mN]` is `preload_n`, 0.001, and
+    `indenter_diameter_mm` is `indenter_radius_mm`, 0.5.
 
     None where the heading names no field that has a unit, or a unit of another dimension.
     """
-    bracketed = _IN_BRACKETS.match(heading[-LONGEST_NAME:])
-    if not bracketed:
+    if heading.lower().replace(" ", "_").startswith(_DIAMETER):
+        radius = lab_field(_RADIUS + heading[len(_DIAMETER) :])
+        return None if radius is None else (radius[0], 0.5 * radius[1])
+    bracketed = in_brackets(heading)
+    if bracketed is None:
         return (heading, 1.0) if heading in LAB else None
-    given = unit(bracketed["unit"])
-    stem = bracketed["name"].strip().lower().replace(" ", "_")
+    given = unit(bracketed[1])
+    stem = bracketed[0].lower().replace(" ", "_")
     for name in LAB:
         known = field_unit(name) if name.startswith(f"{stem}_") and given else None
         if known and given and known.dimension == given.dimension and stem == _stem(name):

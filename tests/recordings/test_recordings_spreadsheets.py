@@ -1,0 +1,129 @@
+"""Tables as spreadsheets and their users write them: read as meant, told where something is left out, or refused."""
+
+import cmath
+import math
+
+import pytest
+
+from tests.recordings.test_recordings_cells import ABOVE, HEADINGS, PLAIN, ROWS, changed, read, refusal
+from underskin.recordings import Reading
+from underskin.recordings.campaign import FrfRecording
+
+
+def only(reading: Reading) -> FrfRecording:
+    assert reading.problems == []
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    return recording
+
+
+def same_as_plain(text: str) -> Reading:
+    reading, plain = read(text), only(read(PLAIN))
+    found = only(reading)
+    assert (found.id, found.sensor) == (plain.id, plain.sensor)
+    assert found.indenter_radius_mm == pytest.approx(plain.indenter_radius_mm)
+    assert found.frf_re_pc_per_n == pytest.approx(plain.frf_re_pc_per_n)
+    assert found.frf_im_pc_per_n == pytest.approx(plain.frf_im_pc_per_n)
+    return reading
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sep=,\n" + PLAIN,
+        '"sep=,"\r\n' + PLAIN.replace("\n", "\r\n"),
+        "# exported on Monday\n" + changed("r1,", "# by hand, mb\nr1,"),
+        changed("-0.5", "\N{MINUS SIGN}0.5"),
+        changed("id,sensor", "ID,Sensor"),
+        changed(HEADINGS, HEADINGS.replace("\n", ",\n")),
+        ABOVE + "," + HEADINGS + "0," + ROWS.replace("\n,", "\n1,,"),
+        ABOVE + "Unnamed: 0," + HEADINGS + "1," + ROWS.replace("\n,", "\n2,,"),
+        changed("indenter_radius_mm", "Indenter radius [inch]").replace("r1,s01,4,", f"r1,s01,{4 / 25.4},"),
+    ],
+    ids=["sep", "sep-crlf", "comments", "minus", "capitals", "blank heading", "index", "pandas", "inch"],
+)
+def test_what_spreadsheets_add_changes_nothing(text: str) -> None:
+    assert same_as_plain(text).warnings == []
+
+
+def test_a_text_in_utf_16_without_a_mark_is_read() -> None:
+    for encoding in ("utf-16-le", "utf-16-be"):
+        from underskin.recordings import read_file
+
+        assert only(read_file(PLAIN.encode(encoding), "a.csv")).id == "r1"
+
+
+def test_columns_of_words_are_left_out_and_told() -> None:
+    text = ABOVE + HEADINGS.replace("\n", ",Bemerkung\n") + ROWS.replace("-0.5\n", "-0.5,erste Messung\n")
+    (warning,) = same_as_plain(text).warnings
+    assert "'Bemerkung' holds words and is no field" in warning
+    assert "conditions.NAME" in warning
+
+
+def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed() -> None:
+    unknown = refusal(ABOVE + HEADINGS.replace("\n", ",humidity\n") + ROWS.replace("-0.5\n", "-0.5,40\n"))
+    assert (unknown.place, "conditions.NAME" in unknown.reason) == ("line 9, column 9", True)
+    assert "did you mean preload_n?" in refusal(changed("preload_n", "prelaod_n")).reason
+    assert "did you mean skin.thickness_mm?" in refusal(changed("skin.thickness_mm", "skin.thicknes_mm")).reason
+    unnamed = refusal(ABOVE + HEADINGS.replace("id,", "id,,") + ROWS.replace("r1,", "r1,40,").replace("\n,", "\n,,"))
+    assert unnamed.reason == "has no heading, but cells such as '40'"
+
+
+def test_a_note_under_the_table_is_left_out_and_told() -> None:
+    reading = same_as_plain(PLAIN + "\nmeasured by mb\n")
+    assert reading.warnings == ["line 13 under the table, 'measured by mb', is left out"]
+
+
+def test_a_diameter_is_halved_and_that_is_told() -> None:
+    for heading in ("indenter_diameter_mm", "Indenter diameter [mm]"):
+        reading = same_as_plain(changed("indenter_radius_mm", heading).replace("r1,s01,4,", "r1,s01,8,"))
+        assert reading.warnings == [f"{heading!r} is halved"]
+    both = refusal(
+        changed("indenter_radius_mm", "indenter_radius_mm,indenter_diameter_mm").replace("s01,4,", "s01,4,8,")
+    )
+    assert "second column of indenter_radius_mm" in both.reason
+
+
+@pytest.mark.parametrize(("heading", "turn"), [("frf_phase_deg", 180 / math.pi), ("Frf phase [rad]", 1.0)])
+def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, turn: float) -> None:
+    head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", f"frf_magnitude_pc_per_n,{heading}")
+    polar = [cmath.polar(value) for value in (7.1 - 0.5j, 7.2 - 0.6j)]
+    rows = [f"{magnitude!r},{phase * turn!r}" for magnitude, phase in polar]
+    same_as_plain(ABOVE + head + f"r1,s01,4,1.0,0.09,10,{rows[0]}\n,,,,,20,{rows[1]}\n")
+    alone = refusal(
+        ABOVE + HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,coherence") + ROWS
+    )
+    assert "needs frf_phase_rad beside it" in alone.reason
+    beside = refusal(ABOVE + head.replace("\n", ",frf_re_pc_per_n\n") + f"r1,s01,4,1.0,0.09,10,{rows[0]},7\n")
+    assert "stands beside real and imaginary parts" in beside.reason
+
+
+@pytest.mark.parametrize(
+    ("written", "time"),
+    [
+        ("24.12.2025 09:30", "2025-12-24T09:30:00"),
+        ("3.2.2025 9:05:07", "2025-02-03T09:05:07"),
+        ("24/12/2025 09:30", "2025-12-24T09:30:00"),
+        ("12/24/2025", "2025-12-24T00:00:00"),
+    ],
+)
+def test_local_times_are_read_and_their_zone_told(written: str, time: str) -> None:
+    text = ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n")
+    reading = same_as_plain(text)
+    assert only(reading).recorded_at == time
+    assert reading.warnings == ["times without a zone are in that of UNDERSKIN_TIME_ZONE (UTC where it is not set)"]
+
+
+@pytest.mark.parametrize(
+    ("written", "reason"), [("03/02/2025 09:30", "can be two days"), ("31.2.2025 09:30", "is no date and time")]
+)
+def test_a_time_that_can_be_two_or_none_is_refused(written: str, reason: str) -> None:
+    refused = refusal(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n"))
+    assert refused.place == "line 10, column 9"
+    assert reason in refused.reason
+
+
+def test_forces_in_grams_and_pounds_are_converted() -> None:
+    for unit, newtons in (("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605)):
+        text = changed("preload_n", f"Preload [{unit}]").replace(",1.0,0.09", f",{1.0 / newtons},0.09")
+        assert only(same_as_plain(text)).preload_n == pytest.approx(1.0)

@@ -1,0 +1,32 @@
+"""Dates and times as spreadsheets write them: 24.12.2025 09:30, 24/12/2025 9:30:15."""
+
+import re
+from datetime import datetime
+
+_WRITTEN = re.compile(
+    r"(?P<one>\d{1,2})(?P<mark>[./])(?P<two>\d{1,2})(?P=mark)(?P<year>\d{4})"
+    r"(?:[ ,T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}))?)?"
+)
+_MONTHS = 12
+
+
+def iso_time(cell: str) -> str:
+    """A date and time as ISO 8601 writes it; what is not written as above stays as it is.
+
+    With points the day comes first; with strokes it may be the month. Raises ValueError where that cannot be told, or
+    where there is no such day or time.
+    """
+    found = _WRITTEN.fullmatch(cell.strip())
+    if found is None:
+        return cell
+    day, month = int(found["one"]), int(found["two"])
+    if found["mark"] == "/" and day != month:
+        if max(day, month) <= _MONTHS:
+            raise ValueError("can be two days: write it as 2025-12-24T09:30")
+        day, month = (day, month) if month <= _MONTHS else (month, day)
+    hour, minute, second = (int(found[part] or 0) for part in ("hour", "minute", "second"))
+    try:
+        time = f"{found['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
+        return datetime.fromisoformat(time).isoformat()
+    except ValueError as error:
+        raise ValueError(f"is no date and time: {error}") from None

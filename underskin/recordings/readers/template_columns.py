@@ -1,0 +1,127 @@
+"""The columns of the CSV template: which field each heading means, and what is no field.
+
+Headings are read in capitals or not. `indenter_diameter_mm` is halved, a magnitude with a phase is a complex value. A
+column without a heading that only counts its rows, as spreadsheets write it, or is empty, and a column of words that
+names no field, are left out.
+"""
+
+import cmath
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+from underskin.recordings.readers import text
+from underskin.recordings.readers.unit_labels import in_brackets, lab_field, unit
+
+FURTHER = "conditions."  # what else the lab noted, a column each
+MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
+_PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
+_NO_NAME = ("", "unnamed: 0")  # the second by pandas
+_ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a column is, its field, the factor to the field's unit, and the heading as written."""
+
+    place: int
+    field: str
+    factor: float
+    heading: str
+
+
+class NoField(ValueError):
+    """A heading that cannot be read; the message says why, `place` which one."""
+
+    def __init__(self, place: int, reason: str) -> None:
+        super().__init__(reason)
+        self.place = place
+
+
+def columns(
+    headings: Sequence[str], rows: Sequence[Sequence[str]], known: Collection[str], decimal: str
+) -> tuple[list[Column], list[str]]:
+    """The columns that hold fields, and which are left out, in words; `rows` are the cells under the headings.
+
+    Raises NoField.
+    """
+    found: dict[str, Column] = {}
+    left_out: list[str] = []
+    for place, heading in enumerate(headings):
+        cells = [cell for row in rows for cell in row[place : place + 1] if cell]
+        meant = field_of(heading, known)
+        if meant is None:
+            left_out += _without(place, heading, cells, known, decimal)
+            continue
+        field, factor = meant
+        if field in found:
+            raise NoField(place, f"{heading!r} is a second column of {field}")
+        found[field] = Column(place, field, factor, heading)
+    _require_whole(found)
+    return list(found.values()), left_out
+
+
+def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
+    """The field of a heading and the factor to its unit; None where it names none."""
+    heading = heading.strip()
+    if heading.lower().startswith(FURTHER):
+        return FURTHER + heading[len(FURTHER) :], 1.0
+    lower = heading.lower()
+    if lower in known or lower == MAGNITUDE:
+        return lower, 1.0
+    if lower in ("frf_phase_deg", PHASE):
+        return PHASE, _ANGLES[lower.rpartition("_")[2]]
+    bracketed = in_brackets(heading)
+    if bracketed is not None:
+        name, given = bracketed[0].lower().replace(" ", "_"), unit(bracketed[1])
+        if name == "frf_phase" and bracketed[1] in _ANGLES:
+            return PHASE, _ANGLES[bracketed[1]]
+        if name == "frf_magnitude" and given is not None and given.dimension == "charge/force":
+            return MAGNITUDE, given.to_si / 1e-12
+    return lab_field(heading) or lab_field(lower)
+
+
+def _without(place: int, heading: str, cells: Sequence[str], known: Collection[str], decimal: str) -> list[str]:
+    """That a column which names no field is left out, in words, if it matters; raises NoField where that loses
+    something."""
+    numbers = [text.number(cell, decimal) for cell in cells]
+    if heading.strip().lower() in _NO_NAME:
+        if place == 0 and numbers in (list(range(len(cells))), list(range(1, len(cells) + 1))):
+            return []
+        if cells:
+            raise NoField(place, f"has no heading, but cells such as {cells[0]!r}")
+        return []
+    alike = get_close_matches(heading.strip().lower().replace(" ", "_"), [*known, MAGNITUDE, PHASE], 1, _ALIKE)
+    if alike:
+        raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; did you mean {alike[0]}?")
+    keep = f"{FURTHER}NAME keeps a column of anything else"
+    if any(number is not None for number in numbers):
+        raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; {keep}")
+    return [f"column {heading!r} holds words and is no field: it is left out ({keep})"] if cells else []
+
+
+def _require_whole(found: dict[str, Column]) -> None:
+    """That a magnitude has its phase, and that no parts stand beside them."""
+    given = [found[name] for name in (MAGNITUDE, PHASE) if name in found]
+    if len(given) == 1:
+        other = PHASE if given[0].field == MAGNITUDE else MAGNITUDE
+        raise NoField(given[0].place, f"{given[0].heading!r} needs {other} beside it")
+    if given and any(part in found for part in _PARTS):
+        raise NoField(given[0].place, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
+
+
+def with_parts(line: dict[str, Any]) -> dict[str, Any]:
+    """The values of a row, real and imaginary part in place of magnitude and phase."""
+    if MAGNITUDE not in line:
+        return line
+    others = {field: value for field, value in line.items() if field not in (MAGNITUDE, PHASE)}
+    magnitude, phase = line[MAGNITUDE], line[PHASE]
+    if magnitude is None and phase is None:
+        return {**others, **dict.fromkeys(_PARTS)}
+    if not isinstance(magnitude, float) or not isinstance(phase, float):
+        return {**others, _PARTS[0]: magnitude, _PARTS[1]: phase}  # for the campaign's checks to refuse
+    value = cmath.rect(magnitude, phase)
+    return {**others, _PARTS[0]: value.real, _PARTS[1]: value.imag}
