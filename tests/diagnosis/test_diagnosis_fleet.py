@@ -111,10 +111,10 @@ def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable)
 
 @pytest.mark.slow
 def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
-    """Alone its interval is wider than with them, and over ten draws the pooled one holds the true d33."""
+    """Alone its interval is wider than with them, and over six draws the pooled one holds the true d33."""
     fewer, held = [], []
     three = sisters(3)
-    for seed in range(10):
+    for seed in range(6):
         whole = made("few", seed=60 + seed)
         few = replace(whole, recordings=whole.recordings[:2])
         fleet = diagnose_fleet(three | {"few": [few]}, table, "batch")
@@ -122,7 +122,7 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: Sigma
         held.append(own["low"] < 14.0 < own["high"])
         alone = report(diagnose(few, table))["d33"]
         fewer.append(alone is None or own["high"] / own["low"] < alone["high"] / alone["low"])
-    assert sum(held) >= 8  # less is as probable as 1 %, at 95 % each
+    assert sum(held) >= 5  # less is as probable as 3 %, at 95 % each
     assert np.mean(fewer) > 0.5
 
 
