@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 from tests.diagnosis.series_campaigns import codes, recorded
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.sentences import clause
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.select_lines import choose_lines
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
@@ -45,7 +46,7 @@ def test_mains_are_told_and_their_lines_left_out(drive: dict[str, Any], table: S
     report = diagnosis_report(recorded(effects=pickup, drive=drive), table)
     assert report["verdict"] == "no_mismatch"
     (said,) = [entry for entry in report["findings"] if entry["code"] == "mains_in_charge"]
-    assert said["statement"].rstrip(".")[1:] in report["statement"]
+    assert clause(said["statement"])[1:] in report["statement"]
     assert said["field"] == "charge_pc"
     assert "8 of 8 recordings" in said["statement"]
     assert "50 Hz" in said["statement"]
