@@ -10,6 +10,7 @@ import pytest
 
 from tests.support.installed_package import installed
 from underskin import ExtensionError, FileError
+from underskin.recordings.channels import Contents
 from underskin.recordings.readers import formats
 
 
@@ -58,7 +59,7 @@ def test_a_file_is_read_by_the_format_of_its_suffix(format_of: Any) -> None:
     assert formats.detect(stream, "Monday.LAB") == "lab"
     assert formats.is_parsed_apart("lab")
     answer = formats.parse("lab", stream, "Monday.LAB")
-    assert not isinstance(answer, dict)
+    assert isinstance(answer, Contents)
     assert answer.properties == {"said": "anything"}
 
 

@@ -26,13 +26,13 @@ r2,s01,4,2.0,0.09,,mb,10,7.3,-0.4
 
 
 def document(conditions: Any) -> dict[str, Any]:
-    read = csv_template.read(BytesIO(CSV.encode()), "noted.csv")
+    read = dict(csv_template.read(BytesIO(CSV.encode()), "noted.csv").campaign)
     read["recordings"][0]["conditions"] = conditions
     return read
 
 
 def test_columns_of_the_template_are_conditions() -> None:
-    read = csv_template.read(BytesIO(CSV.encode()), "noted.csv")
+    read = dict(csv_template.read(BytesIO(CSV.encode()), "noted.csv").campaign)
     assert [entry["conditions"] for entry in read["recordings"]] == [
         {"temperature_c": 23.5, "operator": "mb"},
         {"operator": "mb"},

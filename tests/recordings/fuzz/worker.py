@@ -48,8 +48,9 @@ def _read(kind: str, stream: BinaryIO) -> str:
         _detect(stream)
         contents = formats.parse(kind, stream, _FILE)  # as the format that it was before it was damaged
         if isinstance(contents, Contents):
-            contents = rig_mapping.apply(_RIG, contents, _FILE).document
-        from_dict(contents)
+            from_dict(rig_mapping.apply(_RIG, contents, _FILE).document)
+        else:
+            from_dict(contents.campaign)
     except FileError as error:
         return "refused" if error.file == _FILE and error.reason else f"an error that does not say what: {error}"
     except InvalidInput as error:
