@@ -48,7 +48,7 @@ def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_t
     assert likeliest(fleet, "weak") == "d33"
     assert d33["mean"] == pytest.approx(14.0, rel=0.03)
     assert fleet["verdict"] == "explained"
-    assert "one departs, weak, in d33: " in fleet["statement"]
+    assert "One departs, weak, in d33: " in fleet["statement"]
     truth = {"skin-0": 14.0, "skin-1": 14.0, "weak": 9.0}
     assert all(entry["low"] < truth[entry["skin"]] < entry["high"] for entry in d33["skins"])
 

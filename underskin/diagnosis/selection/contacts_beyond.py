@@ -2,8 +2,8 @@
 
 Until E is known, a contact that is computed too wide, or too hard pressed, by a modulus that was declared too small
 counts in every hypothesis, each of which predicts it, the null hypothesis by continuation of the tables. Contacts that
-lie within the tables by answers that stand are kept. The others are left out, and the rest is diagnosed again: no
-answer is found by a continuation alone.
+lie within the tables by answers that stand are kept; something undescribed counts by what is beneath it. The others are
+left out, and the rest is diagnosed again: no answer is found by a continuation alone.
 """
 
 import numpy as np
@@ -19,8 +19,7 @@ def within_as_found(problem: FittingProblem, result: Search) -> frozenset[str]:
     entries = problem.lines.campaign.recordings
     within = np.zeros(len(entries))
     for answer in result.answers:
-        if answer.explanation is not None:
-            best = answer.explanation.best
-            outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
-            within[np.isin(np.arange(len(entries)), outside, invert=True)] += answer.probability
+        best = result.shown_or_nothing(answer).best
+        outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
+        within[np.isin(np.arange(len(entries)), outside, invert=True)] += answer.probability
     return frozenset(entries[number].id for number in np.flatnonzero(within > _STANDS).tolist())
