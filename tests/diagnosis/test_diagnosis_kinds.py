@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from rig.recorded import record_lines
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
 from underskin.diagnosis.selection.search import search
+from underskin.mechanisms.parameter import HeavyTailed
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -221,6 +224,40 @@ def test_the_likelihood_of_the_curves_has_their_evidence_under_their_prior(table
     prior = np.exp(-0.5 * ((log_e - middle) / 1.5) ** 2) / (1.5 * np.sqrt(2 * np.pi))
     integral = np.log(np.trapezoid(np.exp(log_likelihood - log_likelihood.max()) * prior, log_e)) + log_likelihood.max()
     assert integral == pytest.approx(told.log_weight, abs=0.02)
+
+
+@pytest.mark.parametrize("scales", [0.0, 2.0, 3.3])
+def test_the_likelihood_of_the_curves_counts_heavy_tailed_priors_once(scales: float, table: SigmaTable) -> None:
+    """∫∫ L(E, w) p(E) p(w) dE dw is the evidence of the curves, however far w is from what its prior expects."""
+    from underskin.diagnosis.data.dataset import lines as frf_lines
+    from underskin.diagnosis.inference.explanation import FittingProblem
+    from underskin.diagnosis.selection.other_kinds import Beside
+
+    document = lines()
+    document["recordings"] += curves("indentation", SPHERE, effects={"adhesion": {"work_j_per_m2": 1.0}})
+    campaign = parse(document)
+    apart = of_curves(campaign, "indentation", table, ())
+    other = OtherKind("indentation", apart, search(apart).explanations)
+    (prior,) = (entry for entry in CATALOGUE["adhesion"].parameters(campaign) if entry.name == "work_of_adhesion")
+    assert isinstance(prior.prior, HeavyTailed)
+    told = other.told(("adhesion",), other.supported)
+    mean = np.array([told.mean[0], prior.prior.mean + scales * prior.prior.sd, *told.mean[2:]])
+    other.found[frozenset({"adhesion"})] = replace(told, mean=mean)
+    problem = FittingProblem(frf_lines(campaign), table, Beside([other]))
+    hypothesis = problem.hypothesis(("modulus_error", "adhesion"), placed=False)
+    assert hypothesis.knowledge is not None
+    names = [entry.name for entry in hypothesis.model.parameters]
+    deviations = np.sqrt(np.diag(told.covariance)[:2] + np.array([told.tolerance**2, 0.0]))
+    log_e, log_w = (mean[axis] + deviations[axis] * np.linspace(-8, 8, 161) for axis in (0, 1))
+    log_density = np.empty((161, 161))
+    for row, at in enumerate(log_e):
+        for column, work in enumerate(log_w):
+            fit = np.zeros(len(names))
+            fit[[names.index("modulus_factor"), names.index("work_of_adhesion")]] = at - np.log(16e6), work
+            of_modulus = -0.5 * ((at - mean[0]) / 1.5) ** 2 - np.log(1.5 * np.sqrt(2 * np.pi))
+            log_density[row, column] = hypothesis.knowledge.log_density(fit) + of_modulus + prior.log_prior(work)
+    volume = (log_e[1] - log_e[0]) * (log_w[1] - log_w[0])
+    assert np.logaddexp.reduce(log_density, axis=None) + np.log(volume) == pytest.approx(told.log_weight, abs=0.1)
 
 
 def test_the_modulus_that_is_stated_of_a_block_is_the_true_one_not_the_declared_one(table: SigmaTable) -> None:

@@ -51,7 +51,7 @@ def csv(table: str) -> Reading:
 
 @pytest.mark.parametrize("again", ["force_n", "Force [kN]"])
 def test_a_heading_that_comes_twice_is_refused(again: str) -> None:
-    with pytest.raises(FileError, match=r"a\.csv: line 5: .* is a second column of force_n"):
+    with pytest.raises(FileError, match=r"a\.csv: line 5, column 6: .* is a second column of force_n"):
         csv(f"id,kind,indenter_radius_mm,displacement_mm,force_n,{again}\nb,indentation,4,0,0,0\n,,,1,5,1\n")
 
 

@@ -127,3 +127,19 @@ def test_forces_in_grams_and_pounds_are_converted() -> None:
     for unit, newtons in (("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605)):
         text = changed("preload_n", f"Preload [{unit}]").replace(",1.0,0.09", f",{1.0 / newtons},0.09")
         assert only(same_as_plain(text)).preload_n == pytest.approx(1.0)
+
+
+def test_an_id_may_begin_with_the_mark_of_comments() -> None:
+    reading = read(PLAIN + "#2,s01,4,1.0,0.09,10,8.1,-0.5\n,,,,,20,8.2,-0.6\n")
+    assert [entry.id for entry in reading.campaign.recordings] == ["r1", "#2"]
+
+
+def test_what_a_cut_file_ends_with_is_not_taken_for_a_note() -> None:
+    cut = read(PLAIN + ",,,,,30\n")
+    assert [(problem.recording, problem.value) for problem in cut.problems] == [("r1", None)] * 2
+    begun = read(PLAIN + "r2\n")
+    assert {problem.recording for problem in begun.problems} == {"r2"}
+
+
+def test_a_campaign_may_be_called_as_the_first_heading() -> None:
+    assert read(changed("name,palm 3", "name,ID")).campaign.name == "ID"

@@ -27,7 +27,7 @@ from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.contacts_beyond import within_as_found
-from underskin.diagnosis.selection.kinds_together import Joined, Others
+from underskin.diagnosis.selection.kinds_together import Joined, Others, telling_modulus
 from underskin.diagnosis.selection.noise_refinement import frf_problem
 from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.search import search
@@ -228,15 +228,10 @@ def _work_out(
         groups=groups,
         confounded=left_open(confounded, result.answers),
         power=power(signatures, shown, result.supported),
-        shifts=hidden_shifts(problem, signatures, shown, result.supported, _other_kinds(begun)),
+        shifts=hidden_shifts(problem, signatures, shown, result.supported, telling_modulus(begun.joined, shown.names)),
         shape=shape,
         plan=plan(problem, result, limits),
     )
-
-
-def _other_kinds(begun: DiagnosisResult) -> frozenset[Kind]:
-    beside = None if begun.joined is None else begun.joined.beside
-    return frozenset() if beside is None else frozenset(kind.kind for kind in beside.kinds)
 
 
 def _located(

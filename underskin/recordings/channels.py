@@ -58,9 +58,9 @@ class Contents:
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A file that holds a campaign: the document (`campaign/1`), not yet checked, and what the user should know."""
+    """A file that holds a campaign: the document (`campaign/1`, not yet checked), and what the user should know."""
 
-    campaign: Mapping[str, Any]
+    campaign: Any
     warnings: tuple[str, ...] = ()
 
 

@@ -153,6 +153,16 @@ def curvature_of_prior(entry: Parameter) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+def quadratic_of_prior(entry: Parameter, fit: float) -> tuple[float, float]:
+    """Precision and centre of a quadratic that has the gradient of a parameter's prior at a fit coordinate, as the
+    covariance of a fit counts it; 0 where the prior is uniform."""
+    precision, centre = curvature_of_prior(entry)
+    freedom = entry.prior.freedom if isinstance(entry.prior, Normal) else np.inf
+    if np.isfinite(freedom):
+        precision *= (freedom + 1) / (freedom + precision * (fit - centre) ** 2)
+    return precision, centre
+
+
 def own_places(names: Sequence[str], lines: Lines) -> dict[str, slice]:
     """Where in a composed model's parameters each mechanism's are."""
     mechanisms = [mechanism for name, mechanism in lines.mechanisms.items() if name in names]

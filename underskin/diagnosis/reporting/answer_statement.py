@@ -111,6 +111,7 @@ def _answer(
         return first, f"by sets: {_each([leader, *rivals])}"
     but = [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
+    but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
     certain = f"what is certain is that {model} does not describe the recordings" if idle else ""
     return (
         f"best explained by {in_words(leader.names)} ({percent}), but {', and '.join(but)}",

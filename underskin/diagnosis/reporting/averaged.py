@@ -91,7 +91,10 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
 def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
     """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
     may be there besides without showing; None where what no answer explains is more probable than all of them."""
-    each = [pair for answer in search.answers for pair in _stand_on(search, answer) if pair[0] > _COUNTS]
+    by_explanation: dict[int, tuple[float, Explanation]] = {}  # curves' own mechanisms do not change d33
+    for probability, entry in (pair for answer in search.answers for pair in _stand_on(search, answer)):
+        by_explanation[id(entry)] = (probability + by_explanation.get(id(entry), (0.0, entry))[0], entry)
+    each = [pair for pair in by_explanation.values() if pair[0] > _COUNTS]
     total = sum(probability for probability, _ in each)
     if total < 0.5:
         return None
@@ -101,8 +104,8 @@ def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
     shares = mixture.share / mixture.share.sum()
     levels = {"value": 0.5, "low": 0.025, "high": 0.975}
     ends = {key: mixture_quantile(level, shares, mixture.mean, mixture.deviation) for key, level in levels.items()}
-    entry = each[0][1].model.parameters[place_of(each[0][1], "d33")]
-    return {"name": "d33", "unit": entry.unit, **{key: rounded(float(np.exp(at))) for key, at in ends.items()}}
+    unit = each[0][1].model.parameters[place_of(each[0][1], "d33")].unit
+    return {"name": "d33", "unit": unit, **{key: rounded(float(np.exp(at))) for key, at in ends.items()}}
 
 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:
@@ -118,7 +121,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     levels = law_levels(problem, explanation)
     several = [Normals(own.share / len(levels), own.mean + level, own.deviation) for level in levels.tolist()]
     if probability > _WORTH_MORE:
-        known = {frozenset(answer.names) for answer in search.answers}
+        known = {frozenset(one.explanation.names) for one in search.answers if one.explanation is not None}
         others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         more = [beside(problem, explanation, name, "d33") for name in others if name not in explanation.names]

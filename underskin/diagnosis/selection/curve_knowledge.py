@@ -53,6 +53,11 @@ class OfCurves:
         return max(self.each, key=lambda entry: entry[1])[0]
 
     @property
+    def modulus_deviation(self) -> float:
+        """Standard deviation of the logarithm of the skin's modulus."""
+        return float(np.hypot(np.sqrt(self.covariance[0, 0]), self.tolerance))
+
+    @property
     def log_weight(self) -> float:
         """The logarithm of the sum over the curves' own mechanisms."""
         return float(np.logaddexp.reduce([weight for _, weight in self.each]))
@@ -112,7 +117,7 @@ class OtherKind:
             for entry in (without, *beside)
         )
         quantities, mean, covariance = _mixture(each, both)
-        hidden = self._hidden()
+        hidden = self._hidden(both)
         values, shares = np.array(hidden).T
         mean[0] -= shares @ values
         covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
@@ -127,10 +132,10 @@ class OtherKind:
             self._explanations[names] = explanation
         return self._explanations[names]
 
-    def _hidden(self) -> tuple[tuple[float, float], ...]:
-        """What the apparent modulus may hide, with probabilities."""
+    def _hidden(self, both: frozenset[str]) -> tuple[tuple[float, float], ...]:
+        """What the apparent modulus may hide besides this set, with probabilities."""
         hidden = [(0.0, 1.0)]
-        for values in self._may_hide.values():
+        for values in (values for name, values in self._may_hide.items() if name not in both):
             each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
             hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
         return tuple(hidden)

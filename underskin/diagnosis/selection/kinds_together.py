@@ -7,6 +7,7 @@ another elastomer beside the skin's is rarer than a modulus that was declared wr
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 _ALSO = 2  # answers of recordings alone whose sets are tried together with those of the curves
+_TOLD = 0.05  # standard deviation of the logarithm of a modulus that is told
 _APART = 3e-3  # prior of kinds that are not of one material
 
 # Recordings explained beside the curves of other kinds, with sets that are to be among those tried; or alone
@@ -58,11 +60,20 @@ class Others:
         """By kind; mechanisms `without` which all is to be explained."""
         self._campaigns, self._table, self._without = campaigns, table, without
 
+    @cached_property
+    def _kinds(self) -> list[OtherKind]:
+        """Each searched as if it were alone."""
+        found = []
+        for kind, campaign in self._campaigns.items():
+            problem = of_curves(campaign, kind, self._table, self._without)
+            found.append(OtherKind(kind, problem, search(problem).explanations))
+        return found
+
     def joined(self, fitted: Fitted) -> Joined:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
             return Joined(*fitted(None, ()))
-        beside = Beside([self._searched(kind, campaign) for kind, campaign in self._campaigns.items()])
+        beside = Beside(self._kinds)
         alone, apart = fitted(None, ())
         best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
         problem, together = fitted(beside, beside.asked_for(alone.lines, best))
@@ -73,9 +84,13 @@ class Others:
             return Joined(alone, apart, beside, apart, contradictory)
         return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
 
-    def _searched(self, kind: Kind, campaign: Campaign) -> OtherKind:
-        problem = of_curves(campaign, kind, self._table, self._without)
-        return OtherKind(kind, problem, search(problem).explanations)
+
+def telling_modulus(joined: Joined | None, names: Sequence[str]) -> frozenset[Kind]:
+    """The other kinds that tell the modulus, under a set of mechanisms, as well as it must be known for d33."""
+    if joined is None or joined.beside is None:
+        return frozenset()
+    beside = joined.beside
+    return frozenset(kind.kind for kind in beside.kinds if beside.told(kind, names).modulus_deviation < _TOLD)
 
 
 def _log_apart(apart: Search, beside: Beside) -> float:

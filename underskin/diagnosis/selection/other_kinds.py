@@ -10,9 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.inference.knowledge import Knowledge
-from underskin.diagnosis.selection.curve_knowledge import MODULUS, MODULUS_ERROR, OfCurves, OtherKind, Quantity
+from underskin.diagnosis.selection.curve_knowledge import MODULUS, MODULUS_ERROR, OfCurves, OtherKind
 from underskin.diagnosis.selection.priors import LARGEST, log_prior
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composed import Model
@@ -23,8 +23,9 @@ _INFORMED = 0.8  # of a prior's deviation, above which a posterior's says nothin
 _ASKED_FOR, _BEHIND = 3, 12.0  # sets of a kind of curves, and how far behind the best one in nats
 _MODULUS_SD = 1.5  # of the logarithm of a modulus that nobody declared
 
-# Of a prior: mean, variance, and whether it is flat: then the variance is that of a normal one as high
-Moments = tuple[float, float, bool]
+# Of a prior as a normal one: mean, variance, whether it is flat (then the variance is that of one as high), and by how
+# much the logarithm of its density at the curves' mean exceeds that normal one's
+Moments = tuple[float, float, bool, float]
 
 
 class Beside:
@@ -95,7 +96,7 @@ class Beside:
 
     def _of_kind(self, kind: OtherKind, model: Model, lines: Lines) -> Knowledge:
         told = self.told(kind, model.names)
-        matrix, offset, priors = _in_model(told.quantities, model, lines)
+        matrix, offset, priors = _in_model(told, model, lines)
         return _likelihood(told, matrix, offset, priors)
 
 
@@ -105,9 +106,10 @@ def _acts_on(name: str, lines: Lines) -> bool:
     return known and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
 
 
-def _in_model(quantities: Sequence[Quantity], model: Model, lines: Lines) -> tuple[Floats, Floats, list[Moments]]:
-    """The quantities as matrix · x + offset of the model's fit coordinates, and the mean and variance of what is known
-    of each without any recording; a row of zeros where the model has no such quantity."""
+def _in_model(told: OfCurves, model: Model, lines: Lines) -> tuple[Floats, Floats, list[Moments]]:
+    """The quantities as matrix · x + offset of the model's fit coordinates, and what is known of each without any
+    recording; a row of zeros where the model has no such quantity."""
+    quantities = told.quantities
     places = own_places(model.names, lines)
     names = [entry.name for entry in model.parameters]
     matrix, offset = np.zeros((len(quantities), len(names))), np.zeros(len(quantities))
@@ -119,30 +121,31 @@ def _in_model(quantities: Sequence[Quantity], model: Model, lines: Lines) -> tup
             if MODULUS_ERROR in places:
                 matrix[row, places[MODULUS_ERROR].start] = 1.0
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
-            priors.append((np.nan, _MODULUS_SD**2, False))
+            priors.append((float(told.mean[row]), _MODULUS_SD**2, False, 0.0))
             continue
         own = places.get(mechanism, slice(0, 0))
         found = [index for index in range(own.start, own.stop) if names[index] == key]
         if found:
             matrix[row, found[0]] = 1.0
-            priors.append(_moments(model.parameters[found[0]]))
+            priors.append(_moments(model.parameters[found[0]], float(told.mean[row])))
         else:
-            priors.append((0.0, 0.0, False))
+            priors.append((0.0, 0.0, False, 0.0))
     return matrix, offset, priors
 
 
-def _moments(entry: Parameter) -> Moments:
-    precision, centre = curvature_of_prior(entry)
+def _moments(entry: Parameter, mean: float) -> Moments:
     low, high = entry.bounds
-    return (
-        ((low + high) / 2, (high - low) ** 2 / (2 * np.pi), True) if not precision else (centre, 1 / precision, False)
-    )
+    inside = float(np.clip(mean, low, high))
+    precision, centre = quadratic_of_prior(entry, inside)
+    if not precision:
+        return (low + high) / 2, (high - low) ** 2 / (2 * np.pi), True, 0.0
+    normal = 0.5 * float(np.log(precision / (2 * np.pi)) - precision * (inside - centre) ** 2)
+    return centre, 1 / precision, False, entry.log_prior(inside) - normal
 
 
 def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Knowledge:
     """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence; normal."""
-    centre, variance, flat = (np.array(column) for column in zip(*priors, strict=True))
-    centre = np.where(np.isnan(centre), told.mean, centre)
+    centre, variance, flat, higher = (np.array(column) for column in zip(*priors, strict=True))
     flat = flat.astype(bool)
     known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * variance)
     if not known.any():
@@ -156,7 +159,7 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     prior = np.diag(variance)
     away = mean - centre
     volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ prior)[1]
-    height = told.log_weight + 0.5 * volume
+    height = told.log_weight + 0.5 * volume - float(higher[known].sum())
     height += 0.5 * away @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, away))
     matrix, offset = matrix[known], offset[known]
     batch = np.diag([told.tolerance**2 if told.quantities[row] == MODULUS else 0.0 for row in np.flatnonzero(known)])

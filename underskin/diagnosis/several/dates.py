@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 
+from underskin.mechanisms.unnamed.axes import time_zone
 from underskin.recordings.campaign import Campaign, FrfRecording
 
 
@@ -42,10 +44,19 @@ class Dated:
 
 def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
     """By the first time of each; as they come where one has none."""
-    dates = [date_of(campaign) for campaign in campaigns]
-    if any(date is None for date in dates):
+    times = [_first_time(campaign) for campaign in campaigns]
+    known = [time for time in times if time is not None]
+    if len(known) < len(times):
         return list(campaigns)
-    return [campaigns[number] for number in np.argsort(np.array(dates), kind="stable")]
+    return [campaigns[number] for number in np.argsort(known, kind="stable")]
+
+
+def _first_time(campaign: Campaign) -> float | None:
+    """In seconds; None where none of its recordings has a time."""
+    written = [entry.recorded_at for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    times = [datetime.fromisoformat(time) for time in written if time is not None]
+    zone = time_zone()
+    return min((time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in times) if times else None
 
 
 def date_of(campaign: Campaign) -> str | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats
 
@@ -36,7 +36,9 @@ class Shared:
             places += [names.index(name) for name in _SKINS_OWN if name in names]
         places = [place for place in places if place in hypothesis.mean_places]
         rows = [hypothesis.mean_places.index(place) for place in places]
-        moments = np.array([_prior(model[place]) for place in places]).reshape(-1, 2)
+        moments = np.array([_prior(model[place], float(explanation.point.fit[place])) for place in places]).reshape(
+            -1, 2
+        )
         return cls(
             tuple(model[place] for place in places),
             explanation.point.fit[places],
@@ -53,8 +55,8 @@ class Shared:
         return np.asarray(prior + (vectors * np.maximum(values, 0.0)) @ vectors.T)
 
 
-def _prior(entry: Parameter) -> tuple[float, float]:
-    precision, centre = curvature_of_prior(entry)
+def _prior(entry: Parameter, fit: float) -> tuple[float, float]:
+    precision, centre = quadratic_of_prior(entry, fit)
     low, high = entry.bounds
     return (centre, precision) if precision else ((low + high) / 2, _UNIFORM_VARIANCE / (high - low) ** 2)
 
@@ -63,7 +65,8 @@ def log_agreement(one: Shared, two: Shared) -> float:
     """ln ∫ p₁(x) p₂(x)/p(x) dx: how much more probable two campaigns are if parameters are the same in both."""
     if not len(one.mean):
         return 0.0
-    first, second, prior = one.precision, two.precision, np.diag(one.prior_precision)
+    prior = _least_prior([one, two])
+    first, second = one.precision, two.precision
     both = first + second - prior
     towards = first @ one.mean + second @ two.mean - prior @ one.prior_mean
     squares = one.mean @ first @ one.mean + two.mean @ second @ two.mean - one.prior_mean @ prior @ one.prior_mean
@@ -73,9 +76,14 @@ def log_agreement(one: Shared, two: Shared) -> float:
     return float(0.5 * volumes - 0.5 * (squares - towards @ np.linalg.solve(both, towards)))
 
 
+def _least_prior(each: Sequence[Shared]) -> Floats:
+    """The precision of the prior that is in all: in heavy tails the quadratics of one prior differ."""
+    return np.diag(np.min([one.prior_precision for one in each], axis=0))
+
+
 def combined(each: Sequence[Shared]) -> tuple[Floats, Floats]:
     """Mean and standard deviations of parameters that several fits share: their precisions add, the prior's once."""
-    prior = np.diag(each[0].prior_precision)
+    prior = _least_prior(each)
     precisions = [one.precision for one in each]
     covariance = np.linalg.inv(sum(precisions[1:], precisions[0]) - (len(each) - 1) * prior)
     towards = sum((precision @ one.mean for precision, one in zip(precisions, each, strict=True)), np.zeros(len(prior)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
@@ -60,7 +60,7 @@ def _likelihood(fit: Explanation, place: int) -> Knowledge | None:
         return None
     row = hypothesis.mean_places.index(place)
     after = 1 / float(fit.best.covariance[row, row])
-    prior, centre = curvature_of_prior(fit.model.parameters[place])
+    prior, centre = quadratic_of_prior(fit.model.parameters[place], float(fit.point.fit[place]))
     precision = after - prior
     if precision < _INFORMS * prior:
         return None

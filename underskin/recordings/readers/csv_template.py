@@ -10,11 +10,10 @@
     ,,,20,7.2,-0.6
 
 Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A first line
-`sep=;` and lines that begin with `#` say nothing; a line of one cell under the table is a note. A cell in quotes may
-hold the separator. An empty cell under a quantity that a recording has once repeats the one above; an empty `id`
-continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds whatever else
-the lab noted, numbers or words. A cell too many, a field that comes again and a
-recording that begins twice are refused.
+`sep=;` and lines that begin with `#` say nothing; a line of one cell, below a blank one under the table, is a note. A
+cell in quotes may hold the separator. An empty cell under a quantity that a recording has once repeats the one above;
+an empty `id` continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds
+whatever else the lab noted. A cell too many, a field that comes again and a recording that begins twice are refused.
 """
 
 import re
@@ -29,7 +28,7 @@ from underskin.recordings.channels import Document
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import template_columns, text
 from underskin.recordings.readers.calendar_times import iso_time
-from underskin.recordings.readers.template_columns import FURTHER, Column, NoField
+from underskin.recordings.readers.template_columns import FURTHER, NO_NAME, Column, NoField
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
 from underskin.units import LAB, LabField
 
@@ -76,15 +75,26 @@ def _first_cells(line: str, separator: str) -> list[str]:
 def _rows(content: str, separator: str, file: str) -> Iterator[list[str]]:
     for number, line in enumerate(text.lines(content), start=1):
         try:
-            yield [""] if _says_nothing(line) else text.cells(line, separator)
+            cells = text.cells(line, separator)
         except ValueError as error:
-            raise FileError(file, f"line {number}", str(error)) from None
+            if not _says_nothing(line):
+                raise FileError(file, f"line {number}", str(error)) from None
+            cells = [""]
+        # An id may begin with #, as numbers of presses do: then numbers follow it.
+        counts = any(text.number(cell, mark) is not None for cell in cells[1:] for mark in ".,")
+        yield cells if counts or not _says_nothing(line) else [""]
 
 
 def _says_nothing(line: str) -> bool:
     """Whether a line is blank, a comment, or tells a spreadsheet its separator."""
     bare = line.strip().strip('"')
     return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
+
+
+def _begins_table(row: Sequence[str]) -> bool:
+    """Whether a row is the headings: they begin with id, behind an index without a heading too."""
+    first, second = [cell.lower() for cell in [*row, ""][:2]]
+    return first == _ID or (first in NO_NAME and second == _ID)
 
 
 class _Template:
@@ -97,7 +107,7 @@ class _Template:
         self.warnings: list[str] = []
 
     def document(self) -> dict[str, Any]:
-        table = next((index for index, row in enumerate(self.rows) if _ID in map(str.lower, row[:2])), None)
+        table = next((index for index, row in enumerate(self.rows) if _begins_table(row)), None)
         if table is None:
             raise self._error(len(self.rows) - 1, "the table is missing: no line begins with id")
         above = [self._above(row, index) for index, row in enumerate(self.rows[:table]) if any(row)]
@@ -178,11 +188,13 @@ class _Template:
         return [recording.document() for recording in recordings]
 
     def _end(self, table: int) -> int:
-        """The row behind the last of the table; single cells under it are notes."""
-        last = max(index for index in range(table, len(self.rows)) if sum(map(bool, self.rows[index])) > 1)
-        notes = [(index, row[0]) for index, row in enumerate(self.rows[last + 1 :], start=last + 1) if row[0]]
+        """The row behind the last of the table; single cells below a blank line under it are notes."""
+        blank = next((index for index in range(len(self.rows) - 1, table, -1) if any(self.rows[index][1:])), table) + 1
+        while blank < len(self.rows) and any(self.rows[blank]):
+            blank += 1
+        notes = [(index, row[0]) for index, row in enumerate(self.rows[blank:], start=blank) if row[0]]
         self.warnings += [f"line {index + 1} under the table, {note!r}, is left out" for index, note in notes]
-        return last + 1
+        return blank
 
     def _line(self, columns: Sequence[Column], row: list[str], index: int) -> dict[str, Any]:
         """The values of a row by field."""

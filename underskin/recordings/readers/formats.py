@@ -147,7 +147,7 @@ def parse(name: str, stream: BinaryIO, file: str) -> Contents | Document:
     if name in MODULES:
         module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
         held = module.read(stream, file)
-        return Document(held) if isinstance(held, dict) else held
+        return held if isinstance(held, Contents | Document) else Document(held)
     stream.seek(0)
     contents = formats_of_other_packages()[name].read(stream, file)
     if not isinstance(contents, Contents):

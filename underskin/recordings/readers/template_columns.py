@@ -19,7 +19,7 @@ FURTHER = "conditions."  # what else the lab noted, a column each
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
 _PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
-_NO_NAME = ("", "unnamed: 0")  # the second by pandas
+NO_NAME = ("", "unnamed: 0")  # the second by pandas
 _ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
 
 
@@ -88,7 +88,7 @@ def _without(place: int, heading: str, cells: Sequence[str], known: Collection[s
     """That a column which names no field is left out, in words, if it matters; raises NoField where that loses
     something."""
     numbers = [text.number(cell, decimal) for cell in cells]
-    if heading.strip().lower() in _NO_NAME:
+    if heading.strip().lower() in NO_NAME:
         if place == 0 and numbers in (list(range(len(cells))), list(range(1, len(cells) + 1))):
             return []
         if cells:
