@@ -81,7 +81,8 @@ def sensitivity(result: Result) -> str:
 ## Other priors
 
 {result["count"]} campaigns with wide tails (`proof/sensitivity.py`, seed {result["seed"]}), two in five of which hide
-nothing, diagnosed under priors that are not those of the diagnosis. *Right* is of the visible, a *false alarm* a
+nothing, diagnosed under priors that are not those of the diagnosis: of scatter, of the strengths that have heavy-tailed
+ones (bounds and the others stay), and of nothing missing. *Right* is of the visible, a *false alarm* a
 verdict other than `no_mismatch` or `insufficient_data` where nothing is hidden.
 
 {by_priors(result["judged"])}"""

@@ -21,7 +21,7 @@ _ERROR = "modulus_error"
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _DETERMINED = 0.05  # standard deviation of ln E
-_LEFT_OUT = "out_of_domain"
+_LEFT_OUT, _KEPT = "out_of_domain", "contacts_kept"
 
 Report = Mapping[str, Any]
 
@@ -49,7 +49,7 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
     (gain,) = (entry["chi2_gain_joint"] for entry in truth["hidden"] if entry["effect"] == _ERROR)
     sd = truth["documents"][0]["sd_ln_modulus_frf"]
     found = _found(report)
-    d33 = report["d33"]
+    d33, beyond = report["d33"], _beyond(truth["as_declared"])
     return {
         "what": truth["what"],
         "factor": truth["factor"],
@@ -63,14 +63,20 @@ def compared(report: Report, truth: Report) -> dict[str, Any]:
         "found": found,
         "held": found is not None and found["low"] <= truth["factor"] <= found["high"],
         "off": None if found is None else abs(math.log(found["value"] / truth["factor"])),
-        "beyond": _beyond(truth["as_declared"]),
-        "left_out": sum(
-            entry["code"] == _LEFT_OUT and "left out" in entry["statement"] for entry in report["findings"]
-        ),
+        "beyond": beyond,
+        "left_out": _left_out(report, beyond),
         "recordings": len(truth["as_declared"]["a_over_h"]),
         "d33_off": None if d33 is None else abs(math.log(d33["value"] / _d33(truth))),
         "d33_quotable": d33 is not None and d33["quotable"],
     }
+
+
+def _left_out(report: Report, beyond: int) -> int:
+    """How many of the contacts `beyond` the tables as declared were left out: all, where the report tells of none kept;
+    else those that it names."""
+    findings = report["findings"]
+    named = sum(entry["code"] == _LEFT_OUT and "left out" in entry["statement"] for entry in findings)
+    return min(beyond, named) if any(entry["code"] == _KEPT for entry in findings) else beyond
 
 
 def _found(report: Report) -> dict[str, Any] | None:

@@ -1,7 +1,7 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
 A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis explains
-as well, a first recording that is off alone, or a plain step after the first recordings.
+as well, a first recording that is off alone, or a step after the first recordings that explains far more.
 """
 
 from collections.abc import Sequence
