@@ -13,7 +13,7 @@ from proof.judge import answer
 from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, sources, stored
 from rig.joint import WHAT, drawn_joint, joint_campaigns
 
-SEED, COUNT = 36518, 150
+SEED, COUNT = 47076, 150
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _STATED = 0.5  # probability of a departure that is stated
@@ -25,7 +25,7 @@ Report = Mapping[str, Any]
 def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Of each joint campaign what was hidden, and what is told together and apart."""
     cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
-    version = f"{diagnosing()} {sources('rig')}"
+    version = f"{diagnosing()} {sources('rig', 'underskin/diagnosis/several/*.py')}"
     return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
 
 

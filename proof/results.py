@@ -21,7 +21,7 @@ from proof import (
     wrong_modulus,
 )
 from proof.cases import DrawnCase, MadeCase
-from proof.stored import Work, of_each, reports, sources, stored
+from proof.stored import Work, of_diagnosis, of_each, reports, sources, stored
 from underskin.errors import InvalidInput
 
 Tell = Callable[[int, int], None]
@@ -110,7 +110,7 @@ PARTS: dict[str, Part] = {
 
 def work_out(name: str, work: Work, progress: Tell) -> None:
     """Make one part and store it."""
-    result = {"sources": sources("underskin"), "judged_by": sources(_JUDGE), **PARTS[name](work, progress)}
+    result = {"sources": of_diagnosis(), "judged_by": sources(_JUDGE), **PARTS[name](work, progress)}
     work.folder.mkdir(parents=True, exist_ok=True)
     unfinished = work.folder / f".{name}.json.part"
     unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")

@@ -22,6 +22,7 @@ from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
 FAILED = "failed"
+_NOT_OF_ONE_CAMPAIGN = ("underskin.cli.", "underskin.client.", "underskin.diagnosis.several.")
 
 
 @dataclass(frozen=True)
@@ -33,15 +34,16 @@ class Work:
     count: int | None = None
 
 
-def sources(*packages: str) -> str:
-    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`)."""
+def sources(*packages: str, without: tuple[str, ...] = ()) -> str:
+    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`), but for
+    what is in the packages `without`."""
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
     texts = {
         ".".join([name, *path.relative_to(roots[name]).with_suffix("").parts]): path.read_text(encoding="utf-8")
         for name, _, file in (package.partition("/") for package in packages)
         for path in roots[name].rglob(file or "*.py")
     }
-    return source_digest(texts)[:16]
+    return source_digest({name: text for name, text in texts.items() if not name.startswith(without)})[:16]
 
 
 def digest_of(document: Any) -> str:
@@ -85,11 +87,16 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
     return of_each(work, cases, partial(_report, work.folder / "reports", diagnosing()), progress)
 
 
+def of_diagnosis() -> str:
+    """Digest of the library's sources on which a report of one campaign can depend."""
+    return sources("underskin", without=_NOT_OF_ONE_CAMPAIGN)
+
+
 def diagnosing() -> str:
     """Digests of all that a report depends on but its campaign: the library's sources and its table."""
     from underskin.surrogate.sigma_table import load_table
 
-    return f"{sources('underskin')} {load_table().sha256}"
+    return f"{of_diagnosis()} {load_table().sha256}"
 
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
