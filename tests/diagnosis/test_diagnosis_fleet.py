@@ -1,5 +1,6 @@
 """Skins of one make as a fleet: which departs, and in what; what a skin of few recordings gains by its sisters."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -85,6 +86,24 @@ def test_a_skin_of_another_thickness_departs_in_that(table: SigmaTable) -> None:
     assert (entry["name"], entry["scope"]) == ("thickness_error", {"skins": ["thin"]})
     own = next(one for one in population(fleet, "thickness")["skins"] if one["skin"] == "thin")
     assert own["low"] < 0.8 * 2.5 < own["high"]
+
+
+@pytest.mark.slow
+def test_a_skin_that_is_rightly_declared_to_be_thinner_does_not_depart(table: SigmaTable) -> None:
+    fleet = diagnose_fleet(sisters(3) | {"thin": [made("thin", seed=40, thickness=2.0)]}, table, "batch")
+    assert departures(fleet) == set()
+    assert (fleet["verdict"], fleet["mechanisms"]) == ("no_mismatch", [])
+    thickness = {one["skin"]: one["value"] for one in population(fleet, "thickness")["skins"]}
+    assert thickness["thin"] == pytest.approx(2.0, rel=0.04)
+    assert thickness["skin-0"] == pytest.approx(2.5, rel=0.04)
+
+
+@pytest.mark.slow
+def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike(table: SigmaTable) -> None:
+    thin = made("thin", seed=40, thickness=2.0, effects={"thickness_error": {"factor": 0.8}})
+    fleet = diagnose_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
+    assert (departures(fleet), likeliest(fleet, "thin")) == ({"thin"}, "thickness")
+    assert re.search(r"where the others have (1\.9\d*|2(\.0\d*)?) for the same declared", fleet["statement"])
 
 
 @pytest.mark.slow

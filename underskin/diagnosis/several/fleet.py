@@ -117,7 +117,8 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     declared_wrongly = {
         error: float(share * shares.max()) for error, share in zip(errors, pooled.makes, strict=True) if error
     }
-    return Fleet(candidates, best.common, pooled, declared_wrongly, of_strengths(candidates, best.common))
+    declared = np.array([skin.declared for skin in best.skins])
+    return Fleet(candidates, best.common, pooled, declared, declared_wrongly, of_strengths(candidates, best.common))
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
@@ -132,9 +133,7 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
 
 def _makes(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Make], list[str]]:
     """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
-    declared = np.array([skin.declared for skin in skins])
-    usual = np.hypot([*_DECLARED, D33_PRIOR[1]], declared.std(axis=0) / len(skins) ** 0.5)
-    centre = declared.mean(axis=0) + np.array([0.0, 0.0, D33_PRIOR[0]])
+    usual, centre = np.array([*_DECLARED, D33_PRIOR[1]]), np.array([0.0, 0.0, D33_PRIOR[0]])
     makes, errors = [Make(0.0, centre, usual**-2)], [""]
     for row, error in enumerate(ERRORS):
         if all(error in skin.errors for skin in skins):

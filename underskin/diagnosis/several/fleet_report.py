@@ -17,6 +17,7 @@ from underskin.diagnosis.several.population import REGULAR, Populations
 from underskin.diagnosis.several.skin import D33, ERRORS, QUANTITIES
 from underskin.diagnosis.several.strengths import DEPARTS, Strength
 from underskin.findings.formatting import in_percent
+from underskin.units import Floats
 
 STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
 _MOST_TOLD = 3  # skins that depart in the statement
@@ -26,12 +27,14 @@ _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
 
 @dataclass(frozen=True)
 class Fleet:
-    """What was found: the usable skins, the sets of their mechanisms, their E, thickness and d33, the probabilities
-    that one of the first two is declared wrongly for all skins, and the strengths of mechanisms."""
+    """What was found: the usable skins, the sets of their mechanisms, their E and thickness over the declared ones and
+    d33, the logarithms of the declared ones (skins, quantities), the probabilities that one of these is declared
+    wrongly for all skins, and the strengths of mechanisms."""
 
     candidates: Mapping[str, Candidate]
     common: CommonSet
     pooled: Populations
+    declared: Floats
     declared_wrongly: Mapping[str, float]
     strengths: Sequence[Strength]
 
@@ -59,7 +62,7 @@ def fleet_report(
         "campaigns": list(campaigns),
         "verdict": _verdict(probability, bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
-        "statement": _statement(probability, mechanisms, unexplained, lacking, populations),
+        "statement": _statement(probability, mechanisms, unexplained, lacking, populations, _expected(fleet)),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
         "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
@@ -91,25 +94,45 @@ def _populations(fleet: Fleet) -> list[dict[str, Any]]:
     pooled, skins = fleet.pooled, tuple(fleet.candidates)
     rows = {quantity: (row, departure) for row, (departure, quantity) in enumerate(QUANTITIES.items())}
     return [
-        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity])
+        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity], fleet.declared[:, rows[quantity][0]])
         for quantity in (D33, *(quantity for quantity in rows if quantity != D33))
     ]
 
 
+def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
+    """What the others would have if they were declared as one skin is, by parameter and skin, where they differ."""
+    each = np.exp(fleet.pooled.mean + fleet.declared)
+    return {
+        (quantity, skin): float(each[number, row])
+        for row, quantity in enumerate(QUANTITIES.values())
+        for number, skin in enumerate(fleet.candidates)
+        if np.ptp(fleet.declared[:, row]) > 0
+    }
+
+
 def _of_strength(strength: Strength) -> dict[str, Any]:
-    return _population(strength.parameter, strength.unit, strength.skins, strength.population, 0, DEPARTS)
+    return _population(
+        strength.parameter,
+        strength.unit,
+        strength.skins,
+        strength.population,
+        0,
+        DEPARTS,
+        np.zeros(len(strength.skins)),
+    )
 
 
 def _population(
-    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str
+    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str, declared: Floats
 ) -> dict[str, Any]:
-    mean = float(np.exp(pooled.mean[row]))
-    value, low, high = np.exp(pooled.of_skins[:, :, row])
+    """Of one quantity, pooled over one that is declared, of which these are the logarithms (skins,)."""
+    mean, spread = float(np.exp(pooled.mean[row] + declared.mean())), float(pooled.spread[row])
+    value, low, high = np.exp(pooled.of_skins[:, :, row] + declared)
     return {
         "parameter": parameter,
         "unit": unit,
         "mean": rounded(mean),
-        "sd": rounded(mean * float(pooled.spread[row]), 3),
+        "sd": rounded(mean * float(np.hypot(spread, declared.std())), 3),
         "departures": [
             {"skin": skin, "value": rounded(float(value[number])), "probability": round(share, 3)}
             for number, (skin, own) in enumerate(zip(skins, pooled.departs, strict=True))
@@ -167,6 +190,7 @@ def _statement(
     unexplained: Sequence[str],
     lacking: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
+    expected: Mapping[tuple[str, str], float],
 ) -> str:
     each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
@@ -176,9 +200,11 @@ def _statement(
     departures: dict[str, list[str]] = {}
     for entry in populations:
         for one in entry["departures"]:
+            middle = expected.get((entry["parameter"], one["skin"]))
+            others = f"{entry['mean']:g} ± {entry['sd']:g}" if middle is None else f"{middle:.4g} for the same declared"
             departures.setdefault(one["skin"], []).append(
                 f"in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the others have "
-                f"{entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})"
+                f"{others} ({in_percent(one['probability'])})"
             )
     told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
     told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
