@@ -107,6 +107,18 @@ def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike
 
 
 @pytest.mark.slow
+def test_where_it_is_open_in_what_a_skin_departs_the_verdict_is_ambiguous(table: SigmaTable) -> None:
+    """Its headline is no surer than the departure that it states."""
+    fleet = diagnose_fleet(sisters(3) | {"weak": [made("weak", seed=41, d33=12.5)]}, table, "batch")
+    assert departures(fleet) == {"weak"}
+    likely = likeliest(fleet, "weak")
+    share = next(one["probability"] for one in population(fleet, likely)["departures"] if one["skin"] == "weak")
+    assert share < 0.8
+    assert fleet["probability"] <= share
+    assert fleet["verdict"] == "ambiguous"
+
+
+@pytest.mark.slow
 def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: SigmaTable) -> None:
     skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, modulus=32.0)] for n in range(3)}
     fleet = diagnose_fleet(skins, table, "batch")

@@ -13,13 +13,12 @@ from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.population import REGULAR, Populations
+from underskin.diagnosis.several.population import REGULAR, STATED, Populations
 from underskin.diagnosis.several.skin import D33, ERRORS, QUANTITIES
 from underskin.diagnosis.several.strengths import DEPARTS, Strength
 from underskin.findings.formatting import in_percent
 from underskin.units import Floats
 
-STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
 _MOST_TOLD = 3  # skins that depart in the statement
 _WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
 _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
@@ -54,13 +53,15 @@ def fleet_report(
     described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
     wrongly = max(fleet.declared_wrongly.values(), default=0.0)
     declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
-    probability = 1 - described if unexplained else fleet.common.probability * declared * described
+    of_sets = fleet.common.probability * declared * described
+    agreed, settled = _departures_stated(fleet)
+    probability = 1 - described if unexplained else of_sets * agreed
     d33 = next(entry for entry in populations if entry["parameter"] == D33)
     return {
         "schema": SCHEMA,
         "campaign": name,
         "campaigns": list(campaigns),
-        "verdict": _verdict(probability, bool(mechanisms) or departs, unexplained),
+        "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
         "statement": _statement(probability, mechanisms, unexplained, lacking, populations, _expected(fleet)),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
@@ -108,6 +109,18 @@ def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
         for number, skin in enumerate(fleet.candidates)
         if np.ptp(fleet.declared[:, row]) > 0
     }
+
+
+def _departures_stated(fleet: Fleet) -> tuple[float, float]:
+    """The probability of what is stated of all skins' departures, and the least of that of one skin: were the first to
+    decide the verdict, fleets of many skins would all be ambiguous."""
+    departing = [one.population for one in fleet.strengths if any(one.population.stated)]
+    agreed, settled = 1.0, 1.0
+    for pooled in (fleet.pooled, *departing):
+        agreed *= pooled.together.get(pooled.stated, 0.0)
+        each = [own[departs] for own, departs in zip(pooled.departs, pooled.stated, strict=True)]
+        settled = min(settled, *each)
+    return agreed, settled
 
 
 def _of_strength(strength: Strength) -> dict[str, Any]:
@@ -160,10 +173,9 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
     for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.each, strict=True):
         for mechanism in names:
             present.setdefault(mechanism, {})[skin] = share
-    for skin, own in zip(fleet.candidates, fleet.pooled.departs, strict=True):
-        likely = max(own, key=lambda departure: own[departure])
-        if likely in ERRORS and own[likely] > STATED:
-            present.setdefault(likely, {})[skin] = own[likely]
+    for skin, own, departs in zip(fleet.candidates, fleet.pooled.departs, fleet.pooled.stated, strict=True):
+        if departs in ERRORS:
+            present.setdefault(departs, {})[skin] = own[departs]
     return [
         {
             "name": mechanism,
@@ -177,6 +189,7 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
+    """By the probability of what is stated of the least certain skin."""
     if unexplained:
         return "unexplained"
     if probability < EXPLAINED:

@@ -6,7 +6,7 @@ likelihood. Given the states and τ all is normal; sums run over a grid of τ an
 matter, grown by one skin at a time. Fewer than half of the skins depart: the make is what most are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -26,6 +26,7 @@ _MOST_SETS = 200  # with equally many departing skins
 _COUNTS = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
 _LEVELS = (0.5, 0.025, 0.975)
 
+STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
 REGULAR = ""  # the departure of a skin that does not depart
 
 
@@ -68,13 +69,23 @@ class Spread:
 @dataclass(frozen=True, eq=False)
 class Populations:
     """`mean` and `spread` τ of the make (quantities,), of each skin median and ends of the 95 % interval
-    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ."""
+    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ. `together`:
+    that of the departures of all skins at once, by their names."""
 
     mean: Floats
     spread: Floats
     of_skins: Floats
     departs: tuple[dict[str, float], ...]
     makes: Floats
+    together: Mapping[tuple[str, ...], float]
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """The departure of each skin: the likeliest of those that more probably departs than not."""
+        return tuple(
+            REGULAR if own[REGULAR] >= 1 - STATED else max((one for one in own if one != REGULAR), key=own.__getitem__)
+            for own in self.departs
+        )
 
 
 def log_odds_of_departure(skins: int) -> float:
@@ -172,6 +183,10 @@ class _Fleet:
             of_skins.transpose(1, 0, 2),
             departs,
             share.sum(axis=(0, 2)),
+            {
+                tuple(own[state].departs for own, state in zip(self.skins, states, strict=True)): float(one)
+                for states, one in zip(self.found, of_sets, strict=True)
+            },
         )
 
     def _mean(self, part: _Part) -> Floats:
