@@ -12,7 +12,7 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.fleet import diagnose_fleet
+from underskin.diagnosis.several.fleet import declared_wrongly, diagnose_fleet
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -126,6 +126,13 @@ def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: Sigma
     (entry,) = fleet["mechanisms"]
     assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
     assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(32.0, rel=0.1)
+
+
+def test_an_error_of_what_is_declared_of_all_counts_wherever_it_was_looked_at() -> None:
+    attempts = {"": 0.55, "modulus_error": 0.45}
+    makes = {"": 0.88, "modulus_error": 0.1, "thickness_error": 0.02}
+    found = declared_wrongly(attempts, makes)
+    assert found == pytest.approx({"modulus_error": 0.55 * 0.1 + 0.45, "thickness_error": 0.55 * 0.02})
 
 
 @pytest.mark.slow

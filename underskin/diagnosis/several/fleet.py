@@ -20,7 +20,7 @@ from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_o
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.dates import in_order
 from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
-from underskin.diagnosis.several.population import Make, Spread, populations
+from underskin.diagnosis.several.population import Make, Populations, Spread, populations
 from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
 from underskin.diagnosis.several.strengths import of_strengths
 from underskin.errors import InvalidInput
@@ -109,16 +109,30 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     weights = np.array([one.log_weight for one in attempts])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     best = attempts[int(np.argmax(shares))]
-    states = [skin.states(own) for skin, own in zip(best.skins, best.common.from_sisters, strict=True)]
-    makes, errors = _makes(best.skins, odds)
+    pooled, makes = _pooled(best, odds)
     if best.error:
-        makes, errors = [makes[errors.index(best.error)]], [best.error]
-    pooled = populations(states, makes, SPREADS)
-    declared_wrongly = {
-        error: float(share * shares.max()) for error, share in zip(errors, pooled.makes, strict=True) if error
-    }
+        _, makes = _pooled(attempts[0], odds)
+    wrongly = declared_wrongly(dict(zip((one.error for one in attempts), shares.tolist(), strict=True)), makes)
     declared = np.array([skin.declared for skin in best.skins])
-    return Fleet(candidates, best.common, pooled, declared, declared_wrongly, of_strengths(candidates, best.common))
+    return Fleet(candidates, best.common, pooled, declared, wrongly, of_strengths(candidates, best.common))
+
+
+def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, float]]:
+    """The populations by one attempt, and by its skins the probability that what is declared of all is right or has an
+    error."""
+    states = [skin.states(own) for skin, own in zip(attempt.skins, attempt.common.from_sisters, strict=True)]
+    makes, errors = _makes(attempt.skins, odds)
+    if attempt.error:
+        makes, errors = [makes[errors.index(attempt.error)]], [attempt.error]
+    pooled = populations(states, makes, SPREADS)
+    return pooled, dict(zip(errors, pooled.makes.tolist(), strict=True))
+
+
+def declared_wrongly(attempts: Mapping[str, float], makes: Mapping[str, float]) -> dict[str, float]:
+    """The probability of each error of what is declared of all skins: `attempts` those of each attempt, by error, and
+    `makes` those of each error by the attempt that has none."""
+    errors = [error for error in dict.fromkeys((*makes, *attempts)) if error]
+    return {error: attempts[""] * makes.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
