@@ -13,6 +13,9 @@ from underskin.diagnosis.reporting.report import report
 from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.fleet import declared_wrongly, diagnose_fleet
+from underskin.diagnosis.several.skin import ERRORS, FAR
+from underskin.mechanisms.parameter import Normal
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -126,6 +129,13 @@ def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: Sigma
     (entry,) = fleet["mechanisms"]
     assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
     assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(32.0, rel=0.1)
+
+
+def test_skins_depart_as_far_as_the_mechanisms_have_errors() -> None:
+    for far, error in zip(FAR, ERRORS, strict=False):
+        (factor,) = CATALOGUE[error].parameters_stated
+        assert isinstance(factor.prior, Normal)
+        assert far == pytest.approx(factor.prior.sd)
 
 
 def test_an_error_of_what_is_declared_of_all_counts_wherever_it_was_looked_at() -> None:

@@ -20,13 +20,16 @@ from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.likelihoods import log_integral, mixed, of_posterior, posterior
 from underskin.diagnosis.several.population import REGULAR, State, log_odds_of_departure
 from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 MODULUS, THICKNESS, D33 = "modulus_error", "thickness_error", "d33"
 ERRORS = (MODULUS, THICKNESS)
 QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by what a skin departs in
 _ABOUT_MAKE = (0.1, 0.01)  # deviations of ln E and ln h about the make's within which a regular skin is fitted
-FAR = (0.35, 0.12, 0.4)  # the same of one that departs: as the mechanisms have it; of d33 an amplifier's other range
+_FAR_IN_D33 = 0.4  # an amplifier's other range
+FAR = (*(curvature_of_prior(CATALOGUE[name].parameters_stated[0])[0] ** -0.5 for name in ERRORS), _FAR_IN_D33)
+# Deviations of ln E, ln h and ln d33 of one that departs, those of errors as the mechanisms have their scales
 D33_PRIOR = (float(np.log(15.0)), 1.5)
 _BEYOND = 2.0  # deviations about the make, beyond which a fit says no more than that the skin departs
 
