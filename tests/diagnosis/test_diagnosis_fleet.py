@@ -16,7 +16,7 @@ from underskin.diagnosis.several.fleet import declared_wrongly, diagnose_fleet
 from underskin.diagnosis.several.skin import ERRORS, FAR
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -129,6 +129,27 @@ def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: Sigma
     (entry,) = fleet["mechanisms"]
     assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
     assert population(fleet, "youngs_modulus")["mean"] == pytest.approx(32.0, rel=0.1)
+
+
+@pytest.mark.slow
+def test_which_campaign_counts_as_the_latest_is_told_where_one_has_no_date(table: SigmaTable) -> None:
+    skins = sisters(3)
+    undated = made("undated", seed=30)
+    undated = replace(
+        undated,
+        recordings=tuple(
+            replace(one, recorded_at=None) if isinstance(one, FrfRecording) else one for one in undated.recordings
+        ),
+    )
+    told = "not every campaign has a date, so they count in the order in which they were given"
+    later = made("later", "2018-05-03T09:00:00Z", seed=31)
+    dated = diagnose_fleet(skins | {"skin-1": [*skins["skin-1"], later], "skin-2": [undated]}, table, "batch")
+    assert told not in dated["statement"]
+    open_order = diagnose_fleet(skins | {"skin-1": [*skins["skin-1"], undated]}, table, "batch")
+    assert (
+        f"skin-1, the last that can be used speaks: {told}: campaign c1 (2017-05-03), campaign undated (no date)"
+        in (open_order["statement"])
+    )
 
 
 def test_skins_depart_as_far_as_the_mechanisms_have_errors() -> None:

@@ -18,7 +18,7 @@ from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.campaigns import refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.dates import in_order
+from underskin.diagnosis.several.dates import Dated, date_of, in_order
 from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
 from underskin.diagnosis.several.population import Make, Populations, Spread, populations
 from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
@@ -49,11 +49,14 @@ def diagnose_fleet(
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
     refuse_copies([campaign for own in skins.values() for campaign in own])
     results: dict[str, DiagnosisResult] = {}
+    orders: dict[str, str] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
         with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
         results[skin] = _latest(with_frf, table, without)
+        if len(with_frf) > 1:
+            orders[skin] = Dated([one.name for one in with_frf], [date_of(one) for one in with_frf]).order_clause()
         progress((number + 1) / (len(skins) + 1))
     campaigns_named = [campaign.name for own in skins.values() for campaign in own]
     candidates = {
@@ -64,7 +67,7 @@ def diagnose_fleet(
     if len(candidates) < _LEAST_SKINS:
         lacking = next(skin for skin in skins if skin not in candidates)
         return {**report(results[lacking]), "campaign": name, "campaigns": campaigns_named}
-    return fleet_report(name, campaigns_named, results, _found(candidates))
+    return fleet_report(name, campaigns_named, results, _found(candidates), orders)
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:

@@ -39,9 +39,14 @@ class Fleet:
 
 
 def fleet_report(
-    name: str, campaigns: Sequence[str], results: Mapping[str, DiagnosisResult], fleet: Fleet
+    name: str,
+    campaigns: Sequence[str],
+    results: Mapping[str, DiagnosisResult],
+    fleet: Fleet,
+    orders: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Of a fleet of this name, its campaigns' names, and the result of each skin alone."""
+    """Of a fleet of this name, its campaigns' names, the result of each skin alone, and of skins with several campaigns
+    what is said where their order is not one of time."""
     usable = {skin: results[skin] for skin in fleet.candidates}
     lacking = [skin for skin in results if skin not in usable]
     reports = {skin: report(result) for skin, result in usable.items()}
@@ -63,7 +68,9 @@ def fleet_report(
         "campaigns": list(campaigns),
         "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
-        "statement": _statement(probability, mechanisms, unexplained, lacking, populations, _expected(fleet)),
+        "statement": _statement(
+            probability, mechanisms, unexplained, _asides(lacking, orders), populations, _expected(fleet)
+        ),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
         "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
@@ -197,11 +204,18 @@ def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> 
     return "explained" if anything else "no_mismatch"
 
 
+def _asides(lacking: Sequence[str], orders: Mapping[str, str]) -> list[str]:
+    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
+    return unknown + [
+        f"of {skin}, the last that can be used speaks: {clause}" for skin, clause in orders.items() if clause
+    ]
+
+
 def _statement(
     probability: float,
     mechanisms: Sequence[Mapping[str, Any]],
     unexplained: Sequence[str],
-    lacking: Sequence[str],
+    asides: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
     expected: Mapping[tuple[str, str], float],
 ) -> str:
@@ -221,5 +235,4 @@ def _statement(
             )
     told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
     told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
-    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
-    return of_clauses([verdict], told or ["none is seen to depart from the others"], unknown)
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides)
