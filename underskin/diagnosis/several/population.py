@@ -12,10 +12,9 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 from underskin.diagnosis.inference.knowledge import Knowledge
+from underskin.diagnosis.reporting.numbers import mixture_quantile
 from underskin.diagnosis.several.likelihoods import log_integral, of_mean, posterior
 from underskin.units import Floats, Indices
 
@@ -95,6 +94,7 @@ def log_odds_of_departure(skins: int) -> float:
 
 def populations(skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> Populations:
     """Of the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
+    assert all(own and own[0].departs == REGULAR for own in skins)
     return _Fleet(skins, makes, spreads).populations
 
 
@@ -207,14 +207,4 @@ class _Fleet:
             deviations.append(np.sqrt(np.diagonal(after, axis1=1, axis2=2)))
         middle, deviation = np.concatenate(middles), np.concatenate(deviations)
         columns = list(zip(middle.T, deviation.T, strict=True))
-        return np.array([[_quantile(level, weights, *column) for column in columns] for level in _LEVELS])
-
-
-def _quantile(level: float, weights: Floats, middle: Floats, deviation: Floats) -> float:
-    """Of a mixture of normal distributions."""
-    far = 8 * float(deviation.max())
-
-    def beyond(at: float) -> float:
-        return float(weights @ ndtr((at - middle) / deviation) - level)
-
-    return float(brentq(beyond, float(middle.min()) - far, float(middle.max()) + far))
+        return np.array([[mixture_quantile(level, weights, *column) for column in columns] for level in _LEVELS])
