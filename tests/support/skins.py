@@ -35,11 +35,13 @@ def document(
     seed: int = 5,
     modulus: float = 16.0,
     d33: float = 14.0,
+    thickness: float = 2.5,
     skin: str | None = None,
 ) -> dict[str, Any]:
-    """A campaign/1 of a skin that is declared to have 16 MPa."""
+    """A campaign/1 of a skin that is declared to have 16 MPa, and the thickness that it has."""
     described = deepcopy(LINES) | {"name": name, "seed": seed, "effects": effects or {}}
-    described["skin"] |= {"youngs_modulus_mpa": modulus, "d33_pc_per_n": d33} | ({} if skin is None else {"id": skin})
+    described["skin"] |= {"youngs_modulus_mpa": modulus, "d33_pc_per_n": d33, "thickness_mm": thickness}
+    described["skin"] |= {} if skin is None else {"id": skin}
     described["design"] |= {"start": start}
     made = campaign_of_lines(record_lines(experiment(described)))
     made["skin"]["youngs_modulus_mpa"] = 16.0

@@ -18,9 +18,9 @@ from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.campaigns import refuse_copies
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.dates import in_order
+from underskin.diagnosis.several.dates import Dated, date_of, in_order
 from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
-from underskin.diagnosis.several.population import Make, Spread, populations
+from underskin.diagnosis.several.population import Make, Populations, Spread, populations
 from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
 from underskin.diagnosis.several.strengths import of_strengths
 from underskin.errors import InvalidInput
@@ -49,11 +49,14 @@ def diagnose_fleet(
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
     refuse_copies([campaign for own in skins.values() for campaign in own])
     results: dict[str, DiagnosisResult] = {}
+    orders: dict[str, str] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
         with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
         results[skin] = _latest(with_frf, table, without)
+        if len(with_frf) > 1:
+            orders[skin] = Dated([one.name for one in with_frf], [date_of(one) for one in with_frf]).order_clause()
         progress((number + 1) / (len(skins) + 1))
     campaigns_named = [campaign.name for own in skins.values() for campaign in own]
     candidates = {
@@ -64,7 +67,7 @@ def diagnose_fleet(
     if len(candidates) < _LEAST_SKINS:
         lacking = next(skin for skin in skins if skin not in candidates)
         return {**report(results[lacking]), "campaign": name, "campaigns": campaigns_named}
-    return fleet_report(name, campaigns_named, results, _found(candidates))
+    return fleet_report(name, campaigns_named, results, _found(candidates), orders)
 
 
 def _latest(campaigns: Sequence[Campaign], table: SigmaTable, without: Collection[str]) -> DiagnosisResult:
@@ -109,15 +112,30 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     weights = np.array([one.log_weight for one in attempts])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     best = attempts[int(np.argmax(shares))]
-    states = [skin.states(own) for skin, own in zip(best.skins, best.common.from_sisters, strict=True)]
-    makes, errors = _makes(best.skins, odds)
+    pooled, makes = _pooled(best, odds)
     if best.error:
-        makes, errors = [makes[errors.index(best.error)]], [best.error]
+        _, makes = _pooled(attempts[0], odds)
+    wrongly = declared_wrongly(dict(zip((one.error for one in attempts), shares.tolist(), strict=True)), makes)
+    declared = np.array([skin.declared for skin in best.skins])
+    return Fleet(candidates, best.common, pooled, declared, wrongly, of_strengths(candidates, best.common))
+
+
+def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, float]]:
+    """The populations by one attempt, and by its skins the probability that what is declared of all is right or has an
+    error."""
+    states = [skin.states(own) for skin, own in zip(attempt.skins, attempt.common.from_sisters, strict=True)]
+    makes, errors = _makes(attempt.skins, odds)
+    if attempt.error:
+        makes, errors = [makes[errors.index(attempt.error)]], [attempt.error]
     pooled = populations(states, makes, SPREADS)
-    declared_wrongly = {
-        error: float(share * shares.max()) for error, share in zip(errors, pooled.makes, strict=True) if error
-    }
-    return Fleet(candidates, best.common, pooled, declared_wrongly, of_strengths(candidates, best.common))
+    return pooled, dict(zip(errors, pooled.makes.tolist(), strict=True))
+
+
+def declared_wrongly(attempts: Mapping[str, float], makes: Mapping[str, float]) -> dict[str, float]:
+    """The probability of each error of what is declared of all skins: `attempts` those of each attempt, by error, and
+    `makes` those of each error by the attempt that has none."""
+    errors = [error for error in dict.fromkeys((*makes, *attempts)) if error]
+    return {error: attempts[""] * makes.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
@@ -132,9 +150,7 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
 
 def _makes(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Make], list[str]]:
     """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
-    declared = np.array([skin.declared for skin in skins])
-    usual = np.hypot([*_DECLARED, D33_PRIOR[1]], declared.std(axis=0) / len(skins) ** 0.5)
-    centre = declared.mean(axis=0) + np.array([0.0, 0.0, D33_PRIOR[0]])
+    usual, centre = np.array([*_DECLARED, D33_PRIOR[1]]), np.array([0.0, 0.0, D33_PRIOR[0]])
     makes, errors = [Make(0.0, centre, usual**-2)], [""]
     for row, error in enumerate(ERRORS):
         if all(error in skin.errors for skin in skins):

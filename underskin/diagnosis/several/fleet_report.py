@@ -13,12 +13,12 @@ from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.population import REGULAR, Populations
+from underskin.diagnosis.several.population import REGULAR, STATED, Populations
 from underskin.diagnosis.several.skin import D33, ERRORS, QUANTITIES
 from underskin.diagnosis.several.strengths import DEPARTS, Strength
 from underskin.findings.formatting import in_percent
+from underskin.units import Floats
 
-STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
 _MOST_TOLD = 3  # skins that depart in the statement
 _WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
 _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
@@ -26,20 +26,27 @@ _UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
 
 @dataclass(frozen=True)
 class Fleet:
-    """What was found: the usable skins, the sets of their mechanisms, their E, thickness and d33, the probabilities
-    that one of the first two is declared wrongly for all skins, and the strengths of mechanisms."""
+    """What was found: the usable skins, the sets of their mechanisms, their E and thickness over the declared ones and
+    d33, the logarithms of the declared ones (skins, quantities), the probabilities that one of these is declared
+    wrongly for all skins, and the strengths of mechanisms."""
 
     candidates: Mapping[str, Candidate]
     common: CommonSet
     pooled: Populations
+    declared: Floats
     declared_wrongly: Mapping[str, float]
     strengths: Sequence[Strength]
 
 
 def fleet_report(
-    name: str, campaigns: Sequence[str], results: Mapping[str, DiagnosisResult], fleet: Fleet
+    name: str,
+    campaigns: Sequence[str],
+    results: Mapping[str, DiagnosisResult],
+    fleet: Fleet,
+    orders: Mapping[str, str],
 ) -> dict[str, Any]:
-    """Of a fleet of this name, its campaigns' names, and the result of each skin alone."""
+    """Of a fleet of this name, its campaigns' names, the result of each skin alone, and of skins with several campaigns
+    what is said where their order is not one of time."""
     usable = {skin: results[skin] for skin in fleet.candidates}
     lacking = [skin for skin in results if skin not in usable]
     reports = {skin: report(result) for skin, result in usable.items()}
@@ -51,15 +58,19 @@ def fleet_report(
     described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
     wrongly = max(fleet.declared_wrongly.values(), default=0.0)
     declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
-    probability = 1 - described if unexplained else fleet.common.probability * declared * described
+    of_sets = fleet.common.probability * declared * described
+    agreed, settled = _departures_stated(fleet)
+    probability = 1 - described if unexplained else of_sets * agreed
     d33 = next(entry for entry in populations if entry["parameter"] == D33)
     return {
         "schema": SCHEMA,
         "campaign": name,
         "campaigns": list(campaigns),
-        "verdict": _verdict(probability, bool(mechanisms) or departs, unexplained),
+        "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
-        "statement": _statement(probability, mechanisms, unexplained, lacking, populations),
+        "statement": _statement(
+            probability, mechanisms, unexplained, _asides(lacking, orders), populations, _expected(fleet)
+        ),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
         "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
@@ -91,25 +102,57 @@ def _populations(fleet: Fleet) -> list[dict[str, Any]]:
     pooled, skins = fleet.pooled, tuple(fleet.candidates)
     rows = {quantity: (row, departure) for row, (departure, quantity) in enumerate(QUANTITIES.items())}
     return [
-        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity])
+        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity], fleet.declared[:, rows[quantity][0]])
         for quantity in (D33, *(quantity for quantity in rows if quantity != D33))
     ]
 
 
+def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
+    """What the others would have if they were declared as one skin is, by parameter and skin, where they differ."""
+    each = np.exp(fleet.pooled.mean + fleet.declared)
+    return {
+        (quantity, skin): float(each[number, row])
+        for row, quantity in enumerate(QUANTITIES.values())
+        for number, skin in enumerate(fleet.candidates)
+        if np.ptp(fleet.declared[:, row]) > 0
+    }
+
+
+def _departures_stated(fleet: Fleet) -> tuple[float, float]:
+    """The probability of what is stated of all skins' departures, and the least of that of one skin: were the first to
+    decide the verdict, fleets of many skins would all be ambiguous."""
+    departing = [one.population for one in fleet.strengths if any(one.population.stated)]
+    agreed, settled = 1.0, 1.0
+    for pooled in (fleet.pooled, *departing):
+        agreed *= pooled.together.get(pooled.stated, 0.0)
+        each = [own[departs] for own, departs in zip(pooled.departs, pooled.stated, strict=True)]
+        settled = min(settled, *each)
+    return agreed, settled
+
+
 def _of_strength(strength: Strength) -> dict[str, Any]:
-    return _population(strength.parameter, strength.unit, strength.skins, strength.population, 0, DEPARTS)
+    return _population(
+        strength.parameter,
+        strength.unit,
+        strength.skins,
+        strength.population,
+        0,
+        DEPARTS,
+        np.zeros(len(strength.skins)),
+    )
 
 
 def _population(
-    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str
+    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str, declared: Floats
 ) -> dict[str, Any]:
-    mean = float(np.exp(pooled.mean[row]))
-    value, low, high = np.exp(pooled.of_skins[:, :, row])
+    """Of one quantity, pooled over one that is declared, of which these are the logarithms (skins,)."""
+    mean, spread = float(np.exp(pooled.mean[row] + declared.mean())), float(pooled.spread[row])
+    value, low, high = np.exp(pooled.of_skins[:, :, row] + declared)
     return {
         "parameter": parameter,
         "unit": unit,
         "mean": rounded(mean),
-        "sd": rounded(mean * float(pooled.spread[row]), 3),
+        "sd": rounded(mean * float(np.hypot(spread, declared.std())), 3),
         "departures": [
             {"skin": skin, "value": rounded(float(value[number])), "probability": round(share, 3)}
             for number, (skin, own) in enumerate(zip(skins, pooled.departs, strict=True))
@@ -137,10 +180,9 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
     for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.each, strict=True):
         for mechanism in names:
             present.setdefault(mechanism, {})[skin] = share
-    for skin, own in zip(fleet.candidates, fleet.pooled.departs, strict=True):
-        likely = max(own, key=lambda departure: own[departure])
-        if likely in ERRORS and own[likely] > STATED:
-            present.setdefault(likely, {})[skin] = own[likely]
+    for skin, own, departs in zip(fleet.candidates, fleet.pooled.departs, fleet.pooled.stated, strict=True):
+        if departs in ERRORS:
+            present.setdefault(departs, {})[skin] = own[departs]
     return [
         {
             "name": mechanism,
@@ -154,6 +196,7 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
+    """By the probability of what is stated of the least certain skin."""
     if unexplained:
         return "unexplained"
     if probability < EXPLAINED:
@@ -161,12 +204,20 @@ def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> 
     return "explained" if anything else "no_mismatch"
 
 
+def _asides(lacking: Sequence[str], orders: Mapping[str, str]) -> list[str]:
+    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
+    return unknown + [
+        f"of {skin}, the last that can be used speaks: {clause}" for skin, clause in orders.items() if clause
+    ]
+
+
 def _statement(
     probability: float,
     mechanisms: Sequence[Mapping[str, Any]],
     unexplained: Sequence[str],
-    lacking: Sequence[str],
+    asides: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
+    expected: Mapping[tuple[str, str], float],
 ) -> str:
     each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
@@ -176,11 +227,12 @@ def _statement(
     departures: dict[str, list[str]] = {}
     for entry in populations:
         for one in entry["departures"]:
+            middle = expected.get((entry["parameter"], one["skin"]))
+            others = f"{entry['mean']:g} ± {entry['sd']:g}" if middle is None else f"{middle:.4g} for the same declared"
             departures.setdefault(one["skin"], []).append(
                 f"in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the others have "
-                f"{entry['mean']:g} ± {entry['sd']:g} ({in_percent(one['probability'])})"
+                f"{others} ({in_percent(one['probability'])})"
             )
     told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
     told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
-    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
-    return of_clauses([verdict], told or ["none is seen to depart from the others"], unknown)
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides)

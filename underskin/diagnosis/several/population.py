@@ -6,16 +6,15 @@ likelihood. Given the states and τ all is normal; sums run over a grid of τ an
 matter, grown by one skin at a time. Fewer than half of the skins depart: the make is what most are.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ndtr
 
 from underskin.diagnosis.inference.knowledge import Knowledge
+from underskin.diagnosis.reporting.numbers import mixture_quantile
 from underskin.diagnosis.several.likelihoods import log_integral, of_mean, posterior
 from underskin.units import Floats, Indices
 
@@ -26,6 +25,7 @@ _MOST_SETS = 200  # with equally many departing skins
 _COUNTS = 1e-5  # of the probability, below which a set with a spread is left out of means and intervals
 _LEVELS = (0.5, 0.025, 0.975)
 
+STATED = 0.5  # probability from which on it is stated that a skin departs, and that what is declared of all is wrong
 REGULAR = ""  # the departure of a skin that does not depart
 
 
@@ -68,13 +68,23 @@ class Spread:
 @dataclass(frozen=True, eq=False)
 class Populations:
     """`mean` and `spread` τ of the make (quantities,), of each skin median and ends of the 95 % interval
-    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ."""
+    (3, skins, quantities), its departures' probabilities by name, and the probability of each prior of μ. `together`:
+    that of the departures of all skins at once, by their names."""
 
     mean: Floats
     spread: Floats
     of_skins: Floats
     departs: tuple[dict[str, float], ...]
     makes: Floats
+    together: Mapping[tuple[str, ...], float]
+
+    @property
+    def stated(self) -> tuple[str, ...]:
+        """The departure of each skin: the likeliest of those that more probably departs than not."""
+        return tuple(
+            REGULAR if own[REGULAR] >= 1 - STATED else max((one for one in own if one != REGULAR), key=own.__getitem__)
+            for own in self.departs
+        )
 
 
 def log_odds_of_departure(skins: int) -> float:
@@ -84,6 +94,7 @@ def log_odds_of_departure(skins: int) -> float:
 
 def populations(skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> Populations:
     """Of the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
+    assert all(own and own[0].departs == REGULAR for own in skins)
     return _Fleet(skins, makes, spreads).populations
 
 
@@ -172,6 +183,10 @@ class _Fleet:
             of_skins.transpose(1, 0, 2),
             departs,
             share.sum(axis=(0, 2)),
+            {
+                tuple(own[state].departs for own, state in zip(self.skins, states, strict=True)): float(one)
+                for states, one in zip(self.found, of_sets, strict=True)
+            },
         )
 
     def _mean(self, part: _Part) -> Floats:
@@ -192,14 +207,4 @@ class _Fleet:
             deviations.append(np.sqrt(np.diagonal(after, axis1=1, axis2=2)))
         middle, deviation = np.concatenate(middles), np.concatenate(deviations)
         columns = list(zip(middle.T, deviation.T, strict=True))
-        return np.array([[_quantile(level, weights, *column) for column in columns] for level in _LEVELS])
-
-
-def _quantile(level: float, weights: Floats, middle: Floats, deviation: Floats) -> float:
-    """Of a mixture of normal distributions."""
-    far = 8 * float(deviation.max())
-
-    def beyond(at: float) -> float:
-        return float(weights @ ndtr((at - middle) / deviation) - level)
-
-    return float(brentq(beyond, float(middle.min()) - far, float(middle.max()) + far))
+        return np.array([[mixture_quantile(level, weights, *column) for column in columns] for level in _LEVELS])

@@ -2,7 +2,8 @@
 
 Fits under each set of mechanisms with all three free: E and thickness about the make's, as skins of one make differ;
 and either of them anywhere, since what is declared is wrong for this skin. Laplace's approximation of each, with the
-priors taken out, is a normal likelihood of the logarithms.
+priors taken out, is a normal likelihood of the logarithms; those of E and thickness are over the declared ones, so that
+skins that are declared to differ are still of one make.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,13 +20,16 @@ from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.likelihoods import log_integral, mixed, of_posterior, posterior
 from underskin.diagnosis.several.population import REGULAR, State, log_odds_of_departure
 from underskin.mechanisms.models.composed import Model
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats
 
 MODULUS, THICKNESS, D33 = "modulus_error", "thickness_error", "d33"
 ERRORS = (MODULUS, THICKNESS)
 QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by what a skin departs in
 _ABOUT_MAKE = (0.1, 0.01)  # deviations of ln E and ln h about the make's within which a regular skin is fitted
-FAR = (0.35, 0.12, 0.4)  # the same of one that departs: as the mechanisms have it; of d33 an amplifier's other range
+_FAR_IN_D33 = 0.4  # an amplifier's other range
+FAR = (*(curvature_of_prior(CATALOGUE[name].parameters_stated[0])[0] ** -0.5 for name in ERRORS), _FAR_IN_D33)
+# Deviations of ln E, ln h and ln d33 of one that departs, those of errors as the mechanisms have their scales
 D33_PRIOR = (float(np.log(15.0)), 1.5)
 _BEYOND = 2.0  # deviations about the make, beyond which a fit says no more than that the skin departs
 
@@ -49,7 +53,7 @@ class FleetSkin:
         skin = candidate.problem.lines.campaign.skin
         assert skin.youngs_modulus_mpa is not None  # FRFs have no model without them
         assert skin.thickness_mm is not None
-        self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])
+        self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])  # (quantities,)
         self.errors = tuple(name for name in ERRORS if name not in candidate.search.unsupported)
         self.departures = (*self.errors, D33)
         self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), bench)
@@ -72,7 +76,7 @@ class FleetSkin:
             return None
         row = ERRORS.index(error)
         mean, covariance = posterior(likelihood, *self._prior(error))
-        return float((mean - self.declared)[row]), float(covariance[row, row])
+        return float(mean[row]), float(covariance[row, row])
 
     def states(self, log_shares: Mapping[frozenset[str], float]) -> list[State]:
         """What it says under sets of mechanisms of these prior probabilities, the regular state first."""
@@ -92,7 +96,7 @@ class FleetSkin:
 
     def _prior(self, departs: str) -> tuple[Floats, Floats]:
         """Centre and precision of the quantities before any recording."""
-        centre = self.declared + np.array([*self._centre, D33_PRIOR[0]])
+        centre = np.array([*self._centre, D33_PRIOR[0]])
         return centre, 1 / (np.array([*_ABOUT_MAKE, D33_PRIOR[1]]) ** 2 + self._further(departs))
 
     def _log_integral(self, likelihood: Knowledge, departs: str) -> float:
@@ -149,7 +153,7 @@ class FleetSkin:
         places = own_places(fit.names, best.hypothesis.lines)
         entries = [entry.name for entry in fit.model.parameters]
         matrix = np.zeros((len(QUANTITIES), len(entries)))
-        centre, variance, log_evidence = self.declared.copy(), np.zeros(len(QUANTITIES)), best.log_evidence
+        centre, variance, log_evidence = np.zeros(len(QUANTITIES)), np.zeros(len(QUANTITIES)), best.log_evidence
         for row, (error, quantity) in enumerate(QUANTITIES.items()):
             of_error = [places[error].start] if error in self.errors else []
             for place in (entries.index(quantity), *of_error):
@@ -163,7 +167,7 @@ class FleetSkin:
                 centre[row] += middle
                 variance[row] += 1 / precision
         by_fit = matrix[:, best.hypothesis.mean_places]
-        mean = matrix @ best.point.fit + self.declared
+        mean = matrix @ best.point.fit
         return of_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
 
 
