@@ -82,7 +82,10 @@ def test_a_d33_of_all_sensors_that_fell_is_a_change_of_level(table: SigmaTable) 
     report = diagnose_together([made("may"), fallen], table, "both")
     assert scopes(report) == {"ageing": {"campaigns": ["september"], "since": "2017-09-12"}}
     (entry,) = report["mechanisms"]
-    assert "a change of level that ageing, a gain or the temperature would make" in entry["statement"]
+    assert (
+        "a change of level that ageing, a gain, the temperature, or a glue line or a thickness that changed"
+        in entry["statement"]
+    )
     shown = page(report)
     assert "<h3>change of level of d33</h3>" in shown
     assert "again and again" not in shown  # as the text of ageing has it

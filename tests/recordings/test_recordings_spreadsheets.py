@@ -6,6 +6,7 @@ import math
 import pytest
 
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS, PLAIN, ROWS, changed, read, refusal
+from underskin.errors import FileError
 from underskin.recordings import Reading
 from underskin.recordings.campaign import FrfRecording
 
@@ -107,11 +108,17 @@ def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, tur
         ("12/24/2025", "2025-12-24T00:00:00"),
     ],
 )
-def test_local_times_are_read_and_their_zone_told(written: str, time: str) -> None:
+def test_local_times_are_read_and_their_zone_told(written: str, time: str, monkeypatch: pytest.MonkeyPatch) -> None:
     text = ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n")
-    reading = same_as_plain(text)
-    assert only(reading).recorded_at == time
-    assert reading.warnings == ["times without a zone are in that of UNDERSKIN_TIME_ZONE (UTC where it is not set)"]
+    for zone, offset in (("UTC", "+00:00"), ("Europe/Berlin", "+01:00")):
+        monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
+        reading = same_as_plain(text)
+        assert only(reading).recorded_at == time + offset
+        (warning,) = reading.warnings
+        assert f"in the zone {zone} (UNDERSKIN_TIME_ZONE)" in warning
+    monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Berlln")
+    with pytest.raises(FileError, match="must be a time zone such as Europe/Rome"):
+        read(text)
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,7 @@ class FileSummary:
     campaigns: Sequence[str]  # their names
     skin: str | None
     known: Sequence[str] = ()  # what to know before it is kept
+    day: str | None = None  # of the first recording that has a time
     parts: int = 0
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSummary] = ()
@@ -84,6 +85,7 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
+        day=min((str(one.recorded_at)[:10] for one in recordings if one.recorded_at is not None), default=None),
         **about,
     )
 

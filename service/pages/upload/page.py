@@ -129,6 +129,7 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not _unsaid(pending, one)),
         unsaid=_unsaid(pending, pending.seen[file]),
         most_listed=MOST_LISTED,
+        apart=len({one.day for one in pending.seen if one.day is not None}) > 1,
         known=known,
         skin=pending.skin or pending.seen[file].skin or "",
         channels=channels,

@@ -11,11 +11,11 @@ from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.findings.formatting import in_digits, in_percent
-from underskin.mechanisms.unnamed.axes import time_zone
 from underskin.mechanisms.unnamed.curve_laws import TURN, CurveLaw
 from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
+from underskin.recordings.time_zone import time_zone
 
 _HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
 _DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle

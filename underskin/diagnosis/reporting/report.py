@@ -30,7 +30,7 @@ from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
-from underskin.diagnosis.reporting.stated_d33 import stated_d33
+from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, stated_d33
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
@@ -152,6 +152,9 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = averaged.presence(search, averaged.present(search, problem))
+    # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
+    unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
+    plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
     around = Around(
         slips=slips(findings),
@@ -173,9 +176,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             told=_told(problem, mechanisms) if named is not None else (),
         )
         shape = statements.shape_clause(diagnosis.shape)
-        statement = answer_statement(
-            search.answers, stated, problem.kind, fit, around, of_answer, shape, diagnosis.power
-        )
+        statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
     return {
         **document,
         "probability": round(leader.probability, 3),

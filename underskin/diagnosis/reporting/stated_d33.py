@@ -19,7 +19,8 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.prediction import plausibility
 
-_BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
+_LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
+BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class StatedD33:
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
         """The report's entries, with what each would do to d33 beyond its interval."""
         hidden = {entry.mechanism: entry for entry in self.hidden}
-        known = {entry.mechanism for entry in confounded if entry.confounded_with in _BY_NUISANCES}
+        known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
         further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.declared]
         return [
             {
@@ -70,8 +71,8 @@ def stated_d33(
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
-    `quotable`: one answer `stands`, d33 is plausible, the answer fits the recordings to their noise, and no wrong
-    declared number that would not show here would move d33 beyond its interval.
+    `quotable`: one answer `stands`, d33 is plausible, the answer fits the recordings to their noise, which is a fifth
+    of the response at most, and no wrong declared number that would not show here would move d33 beyond its interval.
     """
     d33 = None if problem.lines.curves else averaged.d33(search, problem)
     if d33 is None:
@@ -79,7 +80,8 @@ def stated_d33(
     half_width = float(np.log(d33["high"] / d33["low"])) / 2
     hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
     implausible = plausibility.implausibility(d33["value"])
-    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * fit["noise_floor_percent"]
+    floor = fit["noise_floor_percent"]
+    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * floor and floor <= _LARGEST_FLOOR
     quotable = stands and reached and implausible is None
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
     findings = [finding] if implausible else []
@@ -90,7 +92,7 @@ def stated_d33(
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:
     reason = CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
-    if hidden is None or entry.confounded_with not in _BY_NUISANCES:
+    if hidden is None or entry.confounded_with not in BY_NUISANCES:
         return reason
     return f"{reason}; d33 would then be {_percent(hidden)} too {'large' if hidden.log_factor > 0 else 'small'}"
 

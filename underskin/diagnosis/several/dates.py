@@ -6,8 +6,8 @@ from datetime import datetime
 
 import numpy as np
 
-from underskin.mechanisms.unnamed.axes import time_zone
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.time_zone import time_zone
 
 
 @dataclass(frozen=True)

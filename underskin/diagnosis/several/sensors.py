@@ -18,6 +18,7 @@ from underskin.units import Floats, to_lab
 
 _STATED = 0.98  # probability of a change that is stated
 _PRIOR, _USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
+_WORTH, _MEDIAN_SQUARE = 4.0, 0.455  # sensors that the stated uncertainties are worth; of a χ² of one degree of freedom
 _FEWEST_COMMON = 3  # sensors, so that one can be told from the others
 _LEAST, _LEAST_OF_ALL = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
 
@@ -121,7 +122,7 @@ def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequen
     middle = float(np.median(change))
     around = change - middle
     of_middle = float(1.25 * np.sqrt(np.mean(deviation**2) / len(change)))
-    own = np.hypot(deviation, of_middle)
+    own = np.hypot(deviation, of_middle) * _as_others_scatter(around / np.hypot(deviation, of_middle))
     beyond = np.array([_probability(x, sd, len(common)) for x, sd in zip(around, own, strict=True)])
     found = [
         Change(sensor, number, float(np.expm1(around[place])), float(own[place]), float(beyond[place]))
@@ -133,6 +134,17 @@ def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequen
     if together > _STATED and abs(middle) > _LEAST_OF_ALL:
         found.insert(0, Change(None, number, float(np.expm1(middle)), of_all, together))
     return found
+
+
+def _as_others_scatter(scores: Floats) -> Floats:
+    """By how much the changes of the other sensors scatter, over what their uncertainties say (sensors,): these allow
+    for a gain that scatters as rigs' may, and sensors tell how much it does here."""
+    squares, others = scores**2, len(scores) - 1
+    if not others:
+        return np.ones(1)
+    # The median of the others' squares, so that a second sensor that changed tells nothing of the scatter
+    typical = np.array([np.median(np.delete(squares, place)) / _MEDIAN_SQUARE for place in range(len(scores))])
+    return np.sqrt((_WORTH + others * typical) / (_WORTH + others))
 
 
 def _probability(change: float, deviation: float, among: int) -> float:
@@ -154,6 +166,7 @@ def change_in_words(change: Change, dated: Dated) -> str:
     before, after = (dated.called(number) for number in (change.since - 1, change.since))
     low, high = sorted(abs(100 * (change.value + end * SDS_OF_95 * change.uncertainty)) for end in (-1, 1))
     size = f"{abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g})"
-    causes = "an amplifier's gain or the temperature" if change.value > 0 else "ageing, a gain or the temperature"
+    causes = "an amplifier's gain, the temperature" if change.value > 0 else "ageing, a gain, the temperature"
+    causes += ", or a glue line or a thickness that changed everywhere alike,"
     level = "" if change.sensor is not None else f", a change of level that {causes} would make"
     return f"d33 {whose} {way} by {size} between {before} and {after}{level}"

@@ -4,19 +4,17 @@ An axis holds one number a recording, by the recording's id: laws are bound to i
 recordings are left out has the same order, the same preload before, and the same range.
 """
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, tzinfo
+from datetime import datetime
 from functools import cached_property
-from zoneinfo import ZoneInfo
 
 import numpy as np
 
 from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
+from underskin.recordings.time_zone import time_zone
 from underskin.units import Floats
 
-TIME_ZONE = "UNDERSKIN_TIME_ZONE"  # the setting; UTC where it is not set
 _SAME = 1e-9  # of the range, within which values are one level
 UNITS: Mapping[str, str] = {
     "preload_n": "N",
@@ -138,12 +136,6 @@ def recording_order(entries: Sequence[FrfConditions]) -> Floats:
         if column is not None and len(set(column)) == len(entries):
             return np.argsort(np.argsort(np.array(column))).astype(float)
     return np.arange(len(entries), dtype=float)
-
-
-def time_zone() -> tzinfo:
-    """That of times without one, and of the time of day."""
-    name = os.environ.get(TIME_ZONE, "UTC")
-    return UTC if name == "UTC" else ZoneInfo(name)
 
 
 def _times(entries: Sequence[FrfConditions]) -> list[datetime] | None:

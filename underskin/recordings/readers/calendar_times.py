@@ -3,6 +3,8 @@
 import re
 from datetime import datetime
 
+from underskin.recordings.time_zone import time_zone
+
 _WRITTEN = re.compile(
     r"(?P<one>\d{1,2})(?P<mark>[./])(?P<two>\d{1,2})(?P=mark)(?P<year>\d{4})"
     r"(?:[ ,T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}))?)?"
@@ -11,7 +13,7 @@ _MONTHS = 12
 
 
 def iso_time(cell: str) -> str:
-    """A date and time as ISO 8601 writes it; what is not written as above stays as it is.
+    """A date and time as ISO 8601 writes it, in the lab's zone; what is not written as above stays as it is.
 
     With points the day comes first; with strokes it may be the month. Raises ValueError where that cannot be told, or
     where there is no such day or time.
@@ -27,6 +29,6 @@ def iso_time(cell: str) -> str:
     hour, minute, second = (int(found[part] or 0) for part in ("hour", "minute", "second"))
     try:
         time = f"{found['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
-        return datetime.fromisoformat(time).isoformat()
+        return datetime.fromisoformat(time).replace(tzinfo=time_zone()).isoformat()
     except ValueError as error:
         raise ValueError(f"is no date and time: {error}") from None

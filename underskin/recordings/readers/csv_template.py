@@ -30,6 +30,7 @@ from underskin.recordings.readers import template_columns, text
 from underskin.recordings.readers.calendar_times import iso_time
 from underskin.recordings.readers.template_columns import FURTHER, NO_NAME, Column, NoField
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
+from underskin.recordings.time_zone import time_zone
 from underskin.units import LAB, LabField
 
 _FIRST_LINE = 2000
@@ -41,7 +42,7 @@ _TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)) - {"conditions"}
 _ID = "id"
-_NO_ZONE = "times without a zone are in that of UNDERSKIN_TIME_ZONE (UTC where it is not set)"
+_NO_ZONE = "times such as 24.12.2025 09:30 are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"
 _FLAGS = {"true": True, "false": False}
 
 
@@ -255,8 +256,8 @@ class _Template:
             time = iso_time(cell)
         except ValueError as error:
             raise self._error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
-        if time != cell and _NO_ZONE not in self.warnings:
-            self.warnings.append(_NO_ZONE)
+        if time != cell and (said := _NO_ZONE.format(zone=time_zone())) not in self.warnings:
+            self.warnings.append(said)
         return time
 
     def _error(self, index: int, reason: str, column: int | None = None) -> FileError:

@@ -22,6 +22,7 @@ from underskin.parallel import limit_process
 from underskin.recordings.channels import Block, Channel, Contents, Document
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.shown_values import shown
+from underskin.recordings.time_zone import TIME_ZONE
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class ParsingLimits:
 
 _DEFAULT = ParsingLimits()
 _SHORT_ANSWER = 16 << 20
-_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR")
+_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE)
 _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
 

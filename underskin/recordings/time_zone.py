@@ -1,0 +1,20 @@
+"""The lab's time zone: that of the time of day, and of times that are written without one."""
+
+import os
+from datetime import UTC, tzinfo
+from zoneinfo import ZoneInfo
+
+from underskin.errors import InvalidInput
+
+TIME_ZONE = "UNDERSKIN_TIME_ZONE"  # the setting; UTC where it is not set
+
+
+def time_zone() -> tzinfo:
+    """The zone that the setting names; raises InvalidInput where there is none of that name."""
+    name = os.environ.get(TIME_ZONE, "UTC")
+    if name == "UTC":
+        return UTC
+    try:
+        return ZoneInfo(name)
+    except (KeyError, ValueError, OSError):
+        raise InvalidInput(TIME_ZONE, name, "must be a time zone such as Europe/Rome") from None
