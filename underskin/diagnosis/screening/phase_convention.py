@@ -19,6 +19,7 @@ from underskin.units import Complexes, Floats
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
+_LEAST_PHASE = 5e-3  # rad, root mean square: a channel's own phase may be as large, and no convention shows
 _GAIN, _COST = 20.0, 5.5  # of T, and per ln of the number of choices
 _PLAIN, _BETTER = 25.0, 0.5  # χ² by which the conjugated course is nearer to a causal one, and its share of the other
 
@@ -61,6 +62,8 @@ def _aligned(courses: PhaseCourses) -> Floats:
     fewer = int(min((signs < 0).sum(), (signs > 0).sum()))
     gain = _explained(phase, weight, signs) - _explained(phase, weight, same)
     if fewer == 0 or gain < _GAIN + _COST * log(comb(int(telling.sum()), fewer)):
+        return same
+    if _explained(phase, weight, signs) < _LEAST_PHASE**2 * (weight * np.abs(signs)[:, None]).sum():
         return same
     return signs
 
