@@ -14,9 +14,11 @@ from underskin.cli.app import app
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
+from underskin.diagnosis.several.sensors import SensorsOfCampaign, changes
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
 
 SEPTEMBER, OCTOBER = "2017-09-12T09:00:00Z", "2017-10-20T09:00:00Z"
 
@@ -143,3 +145,35 @@ def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:
     assert "agree within the noise" in (out / "both.html").read_text()
     refused = CliRunner().invoke(app, ["diagnose", *files, "--fleet", "f", "--output-dir", str(out)])
     assert refused.exit_code != 0
+
+
+def sensors(name: str, d33: Floats, relative: float) -> SensorsOfCampaign:
+    uncertainty = relative * d33
+    ids = tuple(f"s{number}" for number in range(len(d33)))
+    return SensorsOfCampaign(name, ids, d33, uncertainty, d33 - uncertainty, d33 + uncertainty, 0.0)
+
+
+def test_a_sensor_that_changed_is_seen_over_how_the_others_scatter() -> None:
+    """Uncertainties that allow for more scatter than there is hide no change of a sixth, and none is seen by chance."""
+    random = np.random.default_rng(11)
+    none = [frozenset[str]()] * 2
+    before, after = (14.0 * np.exp(0.01 * random.normal(size=8)) for _ in range(2))
+    after[3] *= 0.84
+    (change,) = changes([sensors("may", before, 0.03), sensors("june", after, 0.03)], none)
+    assert (change.sensor, change.since) == ("s3", 1)
+    assert change.value == pytest.approx(-0.16, abs=0.03)
+    seen = 0
+    for _ in range(300):
+        pair = [sensors(name, 14.0 * np.exp(0.04 * random.normal(size=8)), 0.04) for name in ("may", "june")]
+        seen += bool(changes(pair, none))
+    assert seen <= 6
+
+
+def test_a_sensor_that_one_campaign_alone_says_stands_apart_needs_less_to_have_changed() -> None:
+    random = np.random.default_rng(12)
+    before, after = (14.0 * np.exp(0.03 * random.normal(size=20)) for _ in range(2))
+    after[3] = 0.84 * before[3]
+    pair = [sensors("may", before, 0.03), sensors("june", after, 0.03)]
+    assert changes(pair, [frozenset(), frozenset()]) == []
+    (change,) = changes(pair, [frozenset(), frozenset({"s3"})])
+    assert change.sensor == "s3"

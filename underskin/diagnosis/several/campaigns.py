@@ -17,6 +17,7 @@ from underskin.diagnosis.several.posteriors import Shared, values
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
 from underskin.diagnosis.several.together_report import together_report
 from underskin.errors import InvalidInput
+from underskin.findings.codes import Reason
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -62,26 +63,37 @@ def diagnose_together(
     for number, campaign in enumerate(ordered):
         results.append(diagnose(campaign, table, without=without))
         progress((number + 1) / (len(ordered) + 1))
-    results = _with_changed_sensors(ordered, results, table, without)
+    alone = [_standing_alone(result) for result in results]
+    results = _with_changed_sensors(ordered, results, alone, table, without)
     reports = [report(result) for result in results]
     usable = [number for number, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
         lacking = next(entry for number, entry in enumerate(reports) if number not in usable)
         return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
     dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
-    return together_report(name, ordered, results, reports, usable, dated, table)
+    return together_report(name, ordered, results, reports, usable, dated, alone, table)
 
 
 def _with_changed_sensors(
-    campaigns: Sequence[Campaign], results: Sequence[DiagnosisResult], table: SigmaTable, without: Collection[str]
+    campaigns: Sequence[Campaign],
+    results: Sequence[DiagnosisResult],
+    alone: Sequence[frozenset[str]],
+    table: SigmaTable,
+    without: Collection[str],
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
-    single = changes([_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)])
+    apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
+    single = changes(apart, alone)
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)
         again.append(result if as_before is campaign else diagnose(as_before, table, without=without))
     return again
+
+
+def _standing_alone(result: DiagnosisResult) -> frozenset[str]:
+    reasons = (Reason.SENSOR_WEAKER, Reason.SENSOR_STRONGER)
+    return frozenset(str(finding.arguments["sensor"]) for finding in result.findings if finding.reason in reasons)
 
 
 def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:

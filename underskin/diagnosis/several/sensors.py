@@ -18,6 +18,7 @@ from underskin.units import Floats, to_lab
 
 _STATED = 0.98  # probability of a change that is stated
 _PRIOR, _USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
+_SUSPECTED = 0.5  # the same prior of a sensor that one of two campaigns says stands alone
 _WORTH, _MEDIAN_SQUARE = 4.0, 0.455  # sensors that the stated uncertainties are worth; of a χ² of one degree of freedom
 _FEWEST_COMMON = 3  # sensors, so that one can be told from the others
 _LEAST, _LEAST_OF_ALL = 0.03, 0.05  # relative changes that are stated: amplifiers are calibrated to some percent
@@ -99,8 +100,9 @@ def _times(entry: FrfRecording, factor: float) -> FrfRecording:
     return FrfRecording.of_lines(entry, measured.frequency, factor * measured.values, measured.coherence)
 
 
-def changes(each: Sequence[SensorsOfCampaign | None]) -> list[Change]:
-    """What changed from one campaign to the next: all sensors together, and single ones beyond that."""
+def changes(each: Sequence[SensorsOfCampaign | None], alone: Sequence[frozenset[str]]) -> list[Change]:
+    """What changed from one campaign to the next: all sensors together, and single ones beyond that; `alone` are those
+    of which each campaign by itself finds that their level stands beside that of the others."""
     found: list[Change] = []
     for number in range(1, len(each)):
         before, after = each[number - 1], each[number]
@@ -108,11 +110,17 @@ def changes(each: Sequence[SensorsOfCampaign | None]) -> list[Change]:
             continue
         common = [sensor for sensor in before.ids if sensor in after.ids]
         if common:
-            found += _between(before, after, common, number)
+            found += _between(before, after, common, number, alone[number - 1] ^ alone[number])
     return found
 
 
-def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequence[str], number: int) -> list[Change]:
+def _between(
+    before: SensorsOfCampaign,
+    after: SensorsOfCampaign,
+    common: Sequence[str],
+    number: int,
+    suspected: frozenset[str],
+) -> list[Change]:
     rows = np.array([(before.ids.index(sensor), after.ids.index(sensor)) for sensor in common])
     change = np.log(np.abs(after.d33[rows[:, 1]] / before.d33[rows[:, 0]]))
     deviation = np.hypot(
@@ -123,14 +131,15 @@ def _between(before: SensorsOfCampaign, after: SensorsOfCampaign, common: Sequen
     around = change - middle
     of_middle = float(1.25 * np.sqrt(np.mean(deviation**2) / len(change)))
     own = np.hypot(deviation, of_middle) * _as_others_scatter(around / np.hypot(deviation, of_middle))
-    beyond = np.array([_probability(x, sd, len(common)) for x, sd in zip(around, own, strict=True)])
+    priors = [_SUSPECTED if sensor in suspected else _PRIOR / len(common) for sensor in common]
+    beyond = np.array([_probability(x, sd, prior) for x, sd, prior in zip(around, own, priors, strict=True)])
     found = [
         Change(sensor, number, float(np.expm1(around[place])), float(own[place]), float(beyond[place]))
         for place, sensor in enumerate(common)
         if len(common) >= _FEWEST_COMMON and beyond[place] > _STATED and abs(around[place]) > _LEAST
     ]
     of_all = float(np.hypot(of_middle, np.hypot(before.unsure, after.unsure)))
-    together = _probability(middle, of_all, 1)
+    together = _probability(middle, of_all, _PRIOR)
     if together > _STATED and abs(middle) > _LEAST_OF_ALL:
         found.insert(0, Change(None, number, float(np.expm1(middle)), of_all, together))
     return found
@@ -147,11 +156,11 @@ def _as_others_scatter(scores: Floats) -> Floats:
     return np.sqrt((_WORTH + others * typical) / (_WORTH + others))
 
 
-def _probability(change: float, deviation: float, among: int) -> float:
-    """That one of so many changed at all: usual changes are of some 20 %, and one in twenty has any."""
+def _probability(change: float, deviation: float, prior: float) -> float:
+    """That it changed at all: usual changes are of some 20 %."""
     both = (deviation**2 + _USUAL**2, deviation**2)
     changed, same = (-0.5 * (change**2 / variance + np.log(variance)) for variance in both)
-    return float(1 / (1 + (1 - _PRIOR / among) / (_PRIOR / among) * np.exp(np.clip(same - changed, -700, 700))))
+    return float(1 / (1 + (1 - prior) / prior * np.exp(np.clip(same - changed, -700, 700))))
 
 
 def per_sensor(each: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]:

@@ -30,10 +30,11 @@ def together_report(
     reports: Sequence[dict[str, Any]],
     usable: Sequence[int],
     dated: Dated,
+    alone: Sequence[frozenset[str]],
     table: SigmaTable,
 ) -> dict[str, Any]:
     """Of the campaigns in their order, with the result and the report of each alone; `usable` are the numbers of those
-    that tell anything, and `dated` these with their dates."""
+    that tell anything, `dated` these with their dates; `alone` the sensors that each says stand alone."""
     candidates = [
         Candidate(result.problem, result.search)
         for result in (results[number] for number in usable)
@@ -51,7 +52,7 @@ def together_report(
         else None  # whose levels no mechanism here explains
         for place, number in enumerate(usable)
     ]
-    changed = changes(sensors)
+    changed = changes(sensors, [alone[number] for number in usable])
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
