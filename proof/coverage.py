@@ -4,13 +4,13 @@ Campaigns of the virtual rig with wide tails (`rig/wide_tails.py`) and the rig's
 `python -m proof.coverage --seed N --count K` prints the table for another seed.
 """
 
-import argparse
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from proof import seeds
 from proof.cases import DrawnCase
 from proof.stored import Work, reports
 from proof.text_wide import by_subset
@@ -55,10 +55,7 @@ def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="proof.coverage", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
-    given = parser.parse_args(arguments)
+    given = seeds.parser("coverage", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         result = _judge(Work(Path(folder)), given.seed, given.count, lambda *_: None)
     print(by_subset(result["judged"]))

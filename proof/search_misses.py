@@ -7,11 +7,11 @@ more than a factor e above that of the best set that the search found.
 `python -m proof.search_misses --seed N --count K` prints each miss, and the share, for another seed.
 """
 
-import argparse
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from proof import seeds
 from proof.cases import DrawnCase
 from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
 from proof.text_wide import is_miss
@@ -104,9 +104,7 @@ def refitted(problem: FittingProblem, names: Sequence[str], effects: dict[str, A
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="proof.search_misses", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
+    parser = seeds.parser("search_misses", __doc__)
     parser.add_argument("--first", type=int, default=0, help="number of the first campaign")
     given = parser.parse_args(arguments)
     judged = []

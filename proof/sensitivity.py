@@ -4,13 +4,13 @@ Campaigns of the virtual rig with wide tails; two in five hide nothing.
 `python -m proof.sensitivity --seed N --count K` prints the table for another seed.
 """
 
-import argparse
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from proof import seeds
 from proof.cases import DrawnCase
 from proof.coverage import held
 from proof.judge import QUIET, judge
@@ -70,10 +70,7 @@ def _report(name: str, case: DrawnCase) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="proof.sensitivity", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
-    given = parser.parse_args(arguments)
+    given = seeds.parser("sensitivity", __doc__).parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         print(by_priors(_judge(Work(Path(folder)), given.seed, given.count, lambda *_: None)["judged"]))
 

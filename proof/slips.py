@@ -4,13 +4,13 @@
 slip in each of them, and prints a table of those where it is visible (χ² beyond 20).
 """
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from proof import seeds
 from proof.markdown import table
 from proof.slip_kinds import SLIPS, Case
 from rig.draw import drawn, record
@@ -94,9 +94,7 @@ def shown(tally: Tally) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="proof.slips", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
+    parser = seeds.parser("slips", __doc__)
     parser.add_argument("--missed", action="store_true", help="list the visible slips that are not named")
     given = parser.parse_args(arguments)
     tally = judged(given.seed, given.count)

@@ -6,13 +6,13 @@ noise. `python -m proof.unlisted --seed N --count K` prints this for another see
 what is stated is a false alarm.
 """
 
-import argparse
 import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from proof import seeds
 from proof.cases import FileCase
 from proof.judge import unnamed_over_noise
 from proof.stored import FAILED, Work, reports, sources
@@ -75,9 +75,7 @@ def judged(name: str, truth: Mapping[str, Any], report: Mapping[str, Any]) -> di
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
-    parser = argparse.ArgumentParser(prog="proof.unlisted", description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--count", type=int, required=True)
+    parser = seeds.parser("unlisted", __doc__)
     parser.add_argument("--quiet", action="store_true", help="hide nothing")
     given = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:

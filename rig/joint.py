@@ -13,8 +13,7 @@ from rig import checks
 from rig.draw_joint import beside_a_block, beside_indentations
 from rig.draw_joint_dates import two_dates
 from rig.draw_joint_skins import skins_of_one_make
-from rig.errors import RigError
-from rig.joint_campaign import Joint
+from rig.joint_campaign import Joint, first_feasible
 from rig.joint_truth import joint_truth
 
 _DRAWN = {
@@ -24,19 +23,13 @@ _DRAWN = {
     "skins": skins_of_one_make,
 }  # fmt: skip
 WHAT = tuple(_DRAWN)
-_TRIES = 200
 
 
 def joint_campaigns(seed: int, number: int, what: str | None = None) -> Joint:
     """Draw and record random joint campaigns `number` of a seed; what they join is drawn too if not given."""
     random = np.random.default_rng([seed, number, 29])
     drawn = _DRAWN[str(random.choice(WHAT)) if what is None else checks.one_of("what", what, WHAT)]
-    for _ in range(_TRIES):
-        try:
-            return drawn(random, f"drawn joint {seed}/{number}", f"skin-{seed}-{number}")
-        except RigError:
-            continue
-    raise RuntimeError(f"no feasible joint campaigns {seed}/{number}")
+    return first_feasible(drawn, random, f"drawn joint {seed}/{number}", f"skin-{seed}-{number}")
 
 
 def drawn_joint(seed: int, number: int, what: str | None = None) -> tuple[list[dict[str, Any]], dict[str, Any]]:

@@ -1,14 +1,20 @@
 """Several campaigns of one truth: FRF lines and curves of one elastomer, dates of one skin, skins of one make."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from rig.effects import Values
 from rig.elastomer import RecordedCurve
+from rig.errors import RigError
 from rig.experiment import Experiment
 from rig.recorded import RecordedLines, campaign
 
 D33_DEPARTURE = "d33_departure"  # a skin's d33 is not of the population's; E and h depart by the effects of their names
+
+_TRIES = 200
 
 
 @dataclass(frozen=True)
@@ -111,3 +117,15 @@ class Joint:
     documents: tuple[JointDocument, ...]
     hidden: tuple[Hidden, ...]
     population: Population | None = None
+
+
+def first_feasible(
+    draw: Callable[[np.random.Generator, str, str], Joint], random: np.random.Generator, name: str, skin: str
+) -> Joint:
+    """The first of what is drawn that the rig can do; raises RuntimeError where many draws in a row are not."""
+    for _ in range(_TRIES):
+        try:
+            return draw(random, name, skin)
+        except RigError:
+            continue
+    raise RuntimeError(f"no feasible campaigns {name}")

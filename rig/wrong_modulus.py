@@ -18,8 +18,7 @@ from rig.draw_elastomer import block_description, indentation_description
 from rig.draw_joint import COMPANIONS, frf_description
 from rig.effects import COMPRESSION, FRF, INDENTATION
 from rig.elastomer import record_curves
-from rig.errors import RigError
-from rig.joint_campaign import CurveSet, Hidden, Joint, JointDocument
+from rig.joint_campaign import CurveSet, Hidden, Joint, JointDocument, first_feasible
 from rig.joint_truth import joint_truth
 from rig.layer import Floats
 from rig.recorded import record_lines
@@ -32,18 +31,12 @@ _BESIDE = (*COMPANIONS, "adhesion", "contact_creep")
 _COMPANY = 0.35
 _HARD = 0.5  # share of the draws with loads up to what the skin bears
 _WIDEST, _HARDEST = 2.9, 0.09  # a/h and L that it bears
-_TRIES = 200
 
 
 def wrong_modulus(seed: int, number: int) -> Joint:
     """Draw and record campaign `number` of a seed."""
     random = np.random.default_rng([seed, number, 43])
-    for _ in range(_TRIES):
-        try:
-            return _drawn(random, f"wrong modulus {seed}/{number}", f"skin-{seed}-{number}")
-        except RigError:
-            continue
-    raise RuntimeError(f"no feasible campaign {seed}/{number}")
+    return first_feasible(_drawn, random, f"wrong modulus {seed}/{number}", f"skin-{seed}-{number}")
 
 
 def drawn_wrong_modulus(seed: int, number: int) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -6,7 +6,7 @@ import math
 import pytest
 
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS, PLAIN, ROWS, changed, read, refusal
-from underskin.errors import FileError
+from underskin.errors import InvalidInput
 from underskin.recordings import Reading
 from underskin.recordings.campaign import FrfRecording
 
@@ -117,7 +117,7 @@ def test_local_times_are_read_and_their_zone_told(written: str, time: str, monke
         (warning,) = reading.warnings
         assert f"in the zone {zone} (UNDERSKIN_TIME_ZONE)" in warning
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Berlln")
-    with pytest.raises(FileError, match="must be a time zone such as Europe/Rome"):
+    with pytest.raises(InvalidInput, match="must be a time zone such as Europe/Rome"):
         read(text)
 
 

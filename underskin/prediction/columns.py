@@ -49,8 +49,7 @@ def from_csv(text: str) -> dict[str, list[str]]:
     Raises:
         CsvError: the text is no CSV, a name comes twice, or a row has too many or too few cells.
     """
-    rows = text.splitlines(keepends=True)
-    rows = [row for row in rows if row.strip() and not _SAYS_NOTHING.match(row)]
+    rows = [row for row in io.StringIO(text, newline="") if row.strip() and not _SAYS_NOTHING.match(row)]
     separator = next((mark for mark in ";\t" if rows and mark in rows[0]), ",")
     try:
         lines = [line for line in csv.reader(rows, strict=True, delimiter=separator) if line]

@@ -1,9 +1,7 @@
 """Dates and times as spreadsheets write them: 24.12.2025 09:30, 24/12/2025 9:30:15."""
 
 import re
-from datetime import datetime
-
-from underskin.recordings.time_zone import time_zone
+from datetime import datetime, tzinfo
 
 _WRITTEN = re.compile(
     r"(?P<one>\d{1,2})(?P<mark>[./])(?P<two>\d{1,2})(?P=mark)(?P<year>\d{4})"
@@ -12,8 +10,8 @@ _WRITTEN = re.compile(
 _MONTHS = 12
 
 
-def iso_time(cell: str) -> str:
-    """A date and time as ISO 8601 writes it, in the lab's zone; what is not written as above stays as it is.
+def iso_time(cell: str, zone: tzinfo) -> str:
+    """A date and time in a zone as ISO 8601 writes it; what is not written as above stays as it is.
 
     With points the day comes first; with strokes it may be the month. Raises ValueError where that cannot be told, or
     where there is no such day or time.
@@ -29,6 +27,6 @@ def iso_time(cell: str) -> str:
     hour, minute, second = (int(found[part] or 0) for part in ("hour", "minute", "second"))
     try:
         time = f"{found['year']}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}"
-        return datetime.fromisoformat(time).replace(tzinfo=time_zone()).isoformat()
+        return datetime.fromisoformat(time).replace(tzinfo=zone).isoformat()
     except ValueError as error:
         raise ValueError(f"is no date and time: {error}") from None

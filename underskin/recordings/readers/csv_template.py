@@ -190,26 +190,21 @@ class _Template:
 
     def _end(self, table: int) -> int:
         """The row behind the last of the table; single cells below a blank line under it are notes."""
-        blank = next((index for index in range(len(self.rows) - 1, table, -1) if any(self.rows[index][1:])), table) + 1
-        while blank < len(self.rows) and any(self.rows[blank]):
-            blank += 1
-        notes = [(index, row[0]) for index, row in enumerate(self.rows[blank:], start=blank) if row[0]]
+        end = max(index for index in range(table, len(self.rows)) if any(self.rows[index][1:])) + 1
+        while end < len(self.rows) and any(self.rows[end]):
+            end += 1
+        notes = [(index, row[0]) for index, row in enumerate(self.rows[end:], start=end) if row[0]]
         self.warnings += [f"line {index + 1} under the table, {note!r}, is left out" for index, note in notes]
-        return blank
+        return end
 
     def _line(self, columns: Sequence[Column], row: list[str], index: int) -> dict[str, Any]:
         """The values of a row by field."""
-        return template_columns.with_parts(
-            {
-                column.field: self._value(
-                    column.field,
-                    row[column.place] if column.place < len(row) else "",
-                    (index, column.place),
-                    column.factor,
-                )
-                for column in columns
-            }
-        )
+        cells = dict(enumerate(row))
+        values = {
+            one.field: self._value(one.field, cells.get(one.place, ""), (index, one.place), one.factor)
+            for one in columns
+        }
+        return template_columns.with_parts(values)
 
     def _columns(self, table: int, end: int) -> list[Column]:
         """The field of each column and the factor to its unit, each field once."""
@@ -252,11 +247,12 @@ class _Template:
         return cell
 
     def _time(self, cell: str, place: tuple[int, int]) -> str:
+        zone = time_zone()
         try:
-            time = iso_time(cell)
+            time = iso_time(cell, zone)
         except ValueError as error:
             raise self._error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
-        if time != cell and (said := _NO_ZONE.format(zone=time_zone())) not in self.warnings:
+        if time != cell and (said := _NO_ZONE.format(zone=zone)) not in self.warnings:
             self.warnings.append(said)
         return time
 
