@@ -40,7 +40,7 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
 
     here = written("here", "--workers", "1")
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
         there = written("there", "--scheduler", cluster.scheduler_address)
     assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]

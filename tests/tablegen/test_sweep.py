@@ -77,7 +77,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, 
 def test_a_dask_cluster_gives_the_same_table(uninterrupted: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
         make_sigma_table(tmp_path / "sigma.h5", SMALL, scheduler=cluster.scheduler_address)
     assert datasets(tmp_path / "sigma.h5") == datasets(uninterrupted)
