@@ -18,7 +18,7 @@ import numpy as np
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings.shown_values import LONGEST_NAME, named, shown
+from underskin.recordings.shown_values import LONGEST_NAME, CellText, named, shown
 from underskin.units import Floats, checked
 
 BuiltModel = TypeVar("BuiltModel")
@@ -292,7 +292,8 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    return errors.wrong_type(field, shown(value), allowed, index=index)
+    place = f" ({value.place})" if isinstance(value, CellText) else ""
+    return errors.wrong_type(field, shown(value), f"{allowed}{place}", index=index)
 
 
 Name = Annotated[str, name]
