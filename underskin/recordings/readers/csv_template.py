@@ -36,7 +36,6 @@ from underskin.units import LAB, LabField
 
 _FIRST_LINE = 2000
 _TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
-_BEFORE_UNIT = re.compile(r"^[^\[(]*")  # of a name, which may be in capitals; units may not
 _SEPARATORS = ("\t", ";", ",")
 _POSITION = ("position_x_mm", "position_y_mm")
 _SENSOR = ("id", "x_mm", "y_mm")
@@ -121,7 +120,7 @@ class _Template:
 
     def _above(self, row: list[str], index: int) -> tuple[str, str, Any]:
         """A line above the table: what it is about (campaign, skin or sensor), its field and its value."""
-        name = _BEFORE_UNIT.sub(lambda found: found[0].lower(), row[0])
+        name = template_columns.in_small_letters(row[0])
         self._require_few(row, index, 4 if name == "sensor" else 2)
         cell = row[1] if len(row) > 1 else ""
         if name == "sensor":

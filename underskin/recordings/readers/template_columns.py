@@ -88,6 +88,12 @@ def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
     return lab_field(heading) or lab_field(lower)
 
 
+def in_small_letters(name: str) -> str:
+    """A name whose letters may be capitals, but those of the unit in brackets behind it as they are."""
+    bracket = min((place for mark in "[(" if (place := name.find(mark)) >= 0), default=len(name))
+    return name[:bracket].lower() + name[bracket:]
+
+
 def _angle_of(place: int, heading: str, values: Sequence[float | None]) -> float:
     """The factor to rad of a phase whose unit its heading does not say, by its values; raises NoField where they may be
     either."""
