@@ -79,6 +79,7 @@ def fleet_report(
             [*_asides(lacking, orders), of_d33],
             populations,
             _expected(fleet),
+            [*results, *campaigns],
         ),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
@@ -235,6 +236,7 @@ def _statement(
     asides: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
     expected: Mapping[tuple[str, str], float],
+    names: Sequence[str],
 ) -> str:
     each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
@@ -252,7 +254,7 @@ def _statement(
             )
     told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
     told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
-    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides)
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides, names=names)
 
 
 def _unit(label: str) -> str:

@@ -260,7 +260,7 @@ def _statement(
     else:
         begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
         stated = f"{begin}: {', '.join(parts)} ({percent})"
-    return of_clauses([stated], said, [dated.order_clause(), of_d33])
+    return of_clauses([stated], said, [dated.order_clause(), of_d33], names=names)
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:
