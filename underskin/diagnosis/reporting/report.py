@@ -167,6 +167,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     present = averaged.presence(search, averaged.present(search, problem))
     # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
     unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
+    unseen |= {entry.mechanism for entry in d33.hidden}
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
     around = Around(

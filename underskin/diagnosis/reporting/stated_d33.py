@@ -20,6 +20,7 @@ from underskin.findings.formatting import in_digits
 from underskin.prediction import plausibility
 
 _LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
+_MOST_NAMED = 2  # mechanisms that would not show, beside a value to quote
 _ANSWERS = "several answers remain"
 BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
 
@@ -45,10 +46,18 @@ class StatedD33:
         """The value to quote, or why none is; empty where there is no d33."""
         if self.document is None:
             return ""
-        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
         if self.document["quotable"]:
-            return f"d33 to quote: {value} {self.document['unit']} (95 %: {low} to {high})"
+            return f"d33 to quote: {self.quoted()}"
         return f"d33 is not to be quoted: {self.interval()}"
+
+    def quoted(self) -> str:
+        """The value with its interval, and which physics that would not show would change it most beyond that."""
+        assert self.document is not None
+        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
+        largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
+        named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
+        hides = f", provided that no {named} hides" if named else ""
+        return f"{value} {self.document['unit']} (95 %: {low} to {high}){hides}"
 
     def interval(self) -> str:
         """Where it lies, and why it is not to be quoted."""
@@ -73,7 +82,7 @@ class StatedD33:
         """The report's entries, with what each would do to d33 beyond its interval."""
         hidden = {entry.mechanism: entry for entry in self.hidden}
         known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
-        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.declared]
+        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.hidden]
         return [
             {
                 "mechanism": entry.mechanism,

@@ -15,8 +15,7 @@ def of_campaigns(last: str, own: StatedD33) -> str:
         return f"no d33 is to be quoted: in {last}, the last campaign that has one, no answer explains the recordings"
     alone = f"d33 is not to be quoted of all campaigns, since it is of the recordings of {last} alone"
     if own.document["quotable"]:
-        value, low, high = (f"{own.document[key]:.3g}" for key in ("value", "low", "high"))
-        return f"{alone}: {value} {own.document['unit']} (95 %: {low} to {high})"
+        return f"{alone}: {own.quoted()}"
     return f"{alone}; nor of these: {own.interval()}"
 
 
@@ -46,6 +45,7 @@ def not_identifiable(each: Mapping[str, StatedD33]) -> list[dict[str, str]]:
         {**entry, "reason": f"{name} alone: {entry['reason']}"}
         for name, own in each.items()
         for entry in own.not_identifiable([])
+        if entry["mechanism"] in {one.mechanism for one in own.declared}
     ]
 
 
