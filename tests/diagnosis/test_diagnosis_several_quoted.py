@@ -27,7 +27,9 @@ def together(table: SigmaTable) -> dict[str, Any]:
 def test_that_of_several_campaigns_is_of_the_last_alone(together: dict[str, Any]) -> None:
     assert not together["d33"]["quotable"]
     *_, last = together["statement"].split(". ")
-    assert last.startswith("d33 is not to be quoted of all campaigns, since it is of the recordings of september alone")
+    assert last.startswith(
+        "d33 is not to be quoted of all campaigns, because it is of the recordings of september alone"
+    )
     assert f"{together['d33']['low']:.3g} to {together['d33']['high']:.3g}" in last
     shown = page(together)
     assert "of the last campaign alone" in shown
@@ -79,7 +81,7 @@ def test_the_statement_of_a_fleet_ends_with_it_and_names_quantities_in_words(tab
     fleet = diagnose_fleet(skins | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
     assert "One departs, soft, in Young's modulus: " in fleet["statement"]
     assert "youngs modulus" not in fleet["statement"]
-    assert fleet["statement"].split(". ")[-1].startswith("d33 is not to be quoted, since ")
+    assert fleet["statement"].split(". ")[-1].startswith("d33 is not to be quoted, because ")
     shown = page(fleet)
     assert "<td>Young&#39;s modulus</td>" in shown
     assert "youngs modulus" not in shown

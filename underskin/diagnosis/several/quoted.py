@@ -13,7 +13,7 @@ def of_campaigns(last: str, own: StatedD33) -> str:
     """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
     if own.document is None:
         return f"no d33 is to be quoted: in {last}, the last campaign that has one, no answer explains the recordings"
-    alone = f"d33 is not to be quoted of all campaigns, since it is of the recordings of {last} alone"
+    alone = f"d33 is not to be quoted of all campaigns, because it is of the recordings of {last} alone"
     if own.document["quotable"]:
         return f"{alone}: {own.quoted()}"
     return f"{alone}; nor of these: {own.interval()}"
@@ -34,7 +34,7 @@ def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Map
     others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
     told = ", ".join([*([f"of {_few(may)}"] if may else []), *others])
     return (
-        f"d33 is not to be quoted, since {mean:.3g} {unit} is the mean of the skins and no skin's own; "
+        f"d33 is not to be quoted, because {mean:.3g} {unit} is the mean of the skins and no skin's own; "
         f"by its own recordings alone it may be quoted {told}"
     )
 
