@@ -11,7 +11,7 @@ from typing import Any
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.reporting.report import DiagnosisResult, reported
 from underskin.diagnosis.several.dates import Dated, date_of, in_order
 from underskin.diagnosis.several.posteriors import Shared, values
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
@@ -65,10 +65,10 @@ def diagnose_together(
         progress((number + 1) / (len(ordered) + 1))
     alone = [_standing_alone(result) for result in results]
     results = _with_changed_sensors(ordered, results, alone, table, without)
-    reports = [report(result) for result in results]
+    reports = [reported(result) for result in results]
     usable = [number for number, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = next(entry for number, entry in enumerate(reports) if number not in usable)
+        lacking = next(entry.document for number, entry in enumerate(reports) if number not in usable)
         return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
     dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
     return together_report(name, ordered, results, reports, usable, dated, alone, table)

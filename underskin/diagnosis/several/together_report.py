@@ -7,9 +7,10 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult
+from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.several import quoted
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
 from underskin.diagnosis.several.dates import Dated
 from underskin.diagnosis.several.posteriors import Shared, combined, values
@@ -27,7 +28,7 @@ def together_report(
     name: str,
     campaigns: Sequence[Campaign],
     results: Sequence[DiagnosisResult],
-    reports: Sequence[dict[str, Any]],
+    reports: Sequence[Reported],
     usable: Sequence[int],
     dated: Dated,
     alone: Sequence[frozenset[str]],
@@ -56,11 +57,11 @@ def together_report(
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
-    last = reports[usable[-1]]
+    last_name, last = names[-1], reports[usable[-1]].d33
     findings = [
         {**finding, "statement": f"{campaign.name}: {finding['statement']}"}
         for campaign, own in zip(campaigns, reports, strict=True)
-        for finding in own["findings"]
+        for finding in own.document["findings"]
     ]
     return {
         "schema": SCHEMA,
@@ -68,7 +69,9 @@ def together_report(
         "campaigns": [campaign.name for campaign in campaigns],
         "verdict": verdict,
         "probability": round(probability, 3),
-        "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, dated),
+        "statement": _statement(
+            verdict, probability, leader, undescribed, mechanisms, changed, dated, quoted.of_campaigns(last_name, last)
+        ),
         "location": {
             "axes": [],
             "region": {},
@@ -79,18 +82,15 @@ def together_report(
         "presence": _presence(found, described),
         "unnamed": None,
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
-        "not_identifiable": [],
+        "not_identifiable": quoted.not_identifiable({last_name: last}),
         "findings": findings,
         "fit": None,
         "power": [],
-        "d33": {**(last["d33"] or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
+        "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
         "next_experiment": None,
         "provenance": {
             **results[usable[-1]].provenance,
-            "each": [
-                {"campaign": own["campaign"], "verdict": own["verdict"], "probability": own["probability"]}
-                for own in reports
-            ],
+            "each": [{key: own.document[key] for key in ("campaign", "verdict", "probability")} for own in reports],
         },
     }
 
@@ -239,6 +239,7 @@ def _statement(
     mechanisms: Sequence[dict[str, Any]],
     changed: Sequence[Change],
     dated: Dated,
+    of_d33: str,
 ) -> str:
     percent = in_percent(probability)
     names = dated.names
@@ -259,7 +260,7 @@ def _statement(
     else:
         begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
         stated = f"{begin}: {', '.join(parts)} ({percent})"
-    return of_clauses([stated], said, [dated.order_clause()])
+    return of_clauses([stated], said, [dated.order_clause(), of_d33], names=names)
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:
