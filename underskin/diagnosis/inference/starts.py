@@ -16,6 +16,7 @@ from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
+_SETTLING, _OWN_SETTLING = 1, 20  # steps of the noise levels from each start, and where mechanisms act on them
 _KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
 _PLACED_STARTS = 4  # of curves, whose contact points are looked for
 
@@ -36,13 +37,15 @@ def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]
     """Of each hypothesis the best of the local minima of a grid over the new mechanisms' prior quantiles, and of what
     recordings suggest."""
     grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
-    tried = fitter.settle(fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings]), 1)
+    begun = fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings])
+    tried = fitter.settle(begun, _OWN_SETTLING if fitter.own.size else _SETTLING)
     edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
     starts = []
     for number, (grid, beginning) in enumerate(zip(grids, beginnings, strict=True)):
         own = tried[edges[number] : edges[number + 1]]
         cost = own.cost[: grid.size].reshape(grid.shape)
-        lowest = own[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(grid.size, len(own)))]
+        on_grid = np.ones(grid.size, dtype=bool) if grid.settles else _are_lowest(cost).ravel()
+        lowest = own[np.append(np.flatnonzero(on_grid), np.arange(grid.size, len(own)))]
         if fitter.lines.curves:
             guessed = len(own) - grid.size
             starts.append(_of_curves(fitter, lowest, guessed, grid.new, beginning))
@@ -54,7 +57,8 @@ def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]
 class _Grid:
     """Coordinates of a hypothesis' mechanisms (points, own): a grid, then guesses.
 
-    Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are.
+    Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are;
+    `settles`, whether settled noise levels have left the grid, since all new parameters are such.
     """
 
     def __init__(self, hypothesis: Hypothesis, beginning: Beginning) -> None:
@@ -63,6 +67,7 @@ class _Grid:
         # New too is what has other parameters beside the mechanism that was added.
         self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
         parameters = {name: hypothesis.model.parameters[places[name]] for name in self.new}
+        self.settles = all(entry.moves_covariance for own in parameters.values() for entry in own)
         loose = sum(not entry.starts for own in parameters.values() for entry in own)
         quantiles = _QUANTILES.get(loose, (0.5,))
         if any(hypothesis.lines.mechanisms[name].begins_at_guesses for name in self.new):
