@@ -16,7 +16,7 @@ from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
-_SETTLING, _OWN_SETTLING = 1, 20  # steps of the noise levels from each start, and where mechanisms act on them
+_SETTLING, _SETTLING_ALONE = 1, 10  # steps of the noise levels from each start, and of a mechanism that acts on them
 _KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
 _PLACED_STARTS = 4  # of curves, whose contact points are looked for
 
@@ -26,11 +26,13 @@ class Beginning:
     """Where the fit of a hypothesis may begin.
 
     `parent`: fit coordinates of its mechanisms that were fitted without the others; None where none were. `begin`:
-    where the nuisances begin; None for their priors' centres.
+    where the nuisances begin; None for their priors' centres. `alone`: those of the others where these were fitted
+    alone, another guess.
     """
 
     parent: Mapping[str, Sequence[float]] | None
     begin: FitPoint | None
+    alone: Mapping[str, Sequence[float]]
 
 
 def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]:
@@ -38,14 +40,16 @@ def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]
     recordings suggest."""
     grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
     begun = fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings])
-    tried = fitter.settle(begun, _OWN_SETTLING if fitter.own.size else _SETTLING)
+    settles = fitter.own.size and all(entry.parent is None for entry in beginnings)
+    tried = fitter.settle(begun, _SETTLING_ALONE if settles else _SETTLING)
     edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
     starts = []
     for number, (grid, beginning) in enumerate(zip(grids, beginnings, strict=True)):
         own = tried[edges[number] : edges[number + 1]]
         cost = own.cost[: grid.size].reshape(grid.shape)
-        on_grid = np.ones(grid.size, dtype=bool) if grid.settles else _are_lowest(cost).ravel()
-        lowest = own[np.append(np.flatnonzero(on_grid), np.arange(grid.size, len(own)))]
+        # Noise levels that have settled have left the grid.
+        on_grid = np.arange(grid.size) if settles else np.flatnonzero(_are_lowest(cost))
+        lowest = own[np.append(on_grid, np.arange(grid.size, len(own)))]
         if fitter.lines.curves:
             guessed = len(own) - grid.size
             starts.append(_of_curves(fitter, lowest, guessed, grid.new, beginning))
@@ -57,8 +61,7 @@ def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]
 class _Grid:
     """Coordinates of a hypothesis' mechanisms (points, own): a grid, then guesses.
 
-    Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are;
-    `settles`, whether settled noise levels have left the grid, since all new parameters are such.
+    Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are.
     """
 
     def __init__(self, hypothesis: Hypothesis, beginning: Beginning) -> None:
@@ -67,7 +70,6 @@ class _Grid:
         # New too is what has other parameters beside the mechanism that was added.
         self.new = [name for name, place in places.items() if len(known.get(name, ())) != place.stop - place.start]
         parameters = {name: hypothesis.model.parameters[places[name]] for name in self.new}
-        self.settles = all(entry.moves_covariance for own in parameters.values() for entry in own)
         loose = sum(not entry.starts for own in parameters.values() for entry in own)
         quantiles = _QUANTILES.get(loose, (0.5,))
         if any(hypothesis.lines.mechanisms[name].begins_at_guesses for name in self.new):
@@ -82,6 +84,9 @@ class _Grid:
         self.shape = [len(axis) for axis in axes] or [1]
         self.size = len(points)
         points += map(tuple, _guesses(self.new, hypothesis))
+        alone = [value for name in self.new for value in beginning.alone.get(name, ())]
+        if self.new and len(alone) == len(free):
+            points.append(tuple(alone))
         self.own = np.zeros((len(points), hypothesis.own_parameters))
         for name, values in known.items():
             if name not in self.new:

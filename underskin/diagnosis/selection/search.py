@@ -135,7 +135,11 @@ class _Sets:
         """The best sets with one mechanism less, each with one more."""
         catalogue = self.problem.lines.mechanisms.named
         return [
-            Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
+            Request(
+                tuple(entry for entry in catalogue if entry in {*parent.names, name}),
+                parent,
+                self.explanations.get(frozenset([name])),
+            )
             for parent in _parents(self.search, size)
             for name in self.names
             if name not in parent.names
