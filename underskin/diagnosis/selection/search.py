@@ -59,7 +59,7 @@ def search(
         else:
             requests = [
                 Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
-                for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
+                for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size, asked_for)
                 for name in names
                 if name not in parent.names
             ]
@@ -116,11 +116,14 @@ def _integrated(
     return dict(zip(chosen, integrate([explanations[names] for names in chosen]), strict=True))
 
 
-def _parents(result: Search, size: int) -> list[Explanation]:
-    """The explanations, one mechanism smaller, from which sets of this size grow."""
+def _parents(result: Search, size: int, asked_for: Sequence[frozenset[str]]) -> list[Explanation]:
+    """The explanations, one mechanism smaller, from which sets of this size grow: the best of all, and of those that
+    were asked for, some of which are larger."""
     ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
     best = result.log_weight(ranked[0])
     if size > 2:
-        return ranked[:1] if len(ranked[0].names) == size - 1 else []
+        own = next(entry for entry in ranked if len(entry.names) < size)
+        asked = next((one for one in ranked if len(one.names) == size - 1 and frozenset(one.names) in asked_for), own)
+        return [one for one in ([own] if asked is own else [own, asked]) if len(one.names) == size - 1]
     smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
     return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]
