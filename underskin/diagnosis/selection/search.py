@@ -32,7 +32,8 @@ def search(
 
     What is `known` of them is taken over.
     """
-    sets = _Sets(problem, {frozenset(entry.names): entry for entry in known}, _unsupported(problem))
+    explained = {frozenset(entry.names): entry for entry in known}
+    sets = _Sets(problem, explained, _unsupported(problem), asked_for)
     catalogue = problem.lines.mechanisms.named
     nothing, singles = Request(()), [Request((name,)) for name in sets.names]
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
@@ -66,11 +67,12 @@ def _unsupported(problem: FittingProblem) -> dict[str, str]:
 @dataclass
 class _Sets:
     """The sets that were fitted so far, those that were `tried`, and those whose evidence is `integrated` over their
-    loose parameters."""
+    loose parameters; other kinds of recordings `asked_for` some."""
 
     problem: FittingProblem
     explanations: Explanations
     unsupported: dict[str, str]
+    asked_for: Sequence[frozenset[str]] = ()
     tried: set[frozenset[str]] = field(default_factory=set)
     integrated: set[frozenset[str]] = field(default_factory=set)
 
@@ -140,7 +142,7 @@ class _Sets:
                 parent,
                 self.explanations.get(frozenset([name])),
             )
-            for parent in _parents(self.search, size)
+            for parent in _parents(self.search, size, self.asked_for)
             for name in self.names
             if name not in parent.names
         ]
@@ -153,11 +155,14 @@ class _Sets:
         return bool(refitted)
 
 
-def _parents(result: Search, size: int) -> list[Explanation]:
-    """The explanations, one mechanism smaller, from which sets of this size grow."""
+def _parents(result: Search, size: int, asked_for: Sequence[frozenset[str]]) -> list[Explanation]:
+    """The explanations, one mechanism smaller, from which sets of this size grow: the best of all, and of those that
+    were asked for, some of which are larger."""
     ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
     best = result.log_weight(ranked[0])
     if size > 2:
-        return ranked[:1] if len(ranked[0].names) == size - 1 else []
+        own = next(entry for entry in ranked if len(entry.names) < size)
+        asked = next((one for one in ranked if len(one.names) == size - 1 and frozenset(one.names) in asked_for), own)
+        return [one for one in ([own] if asked is own else [own, asked]) if len(one.names) == size - 1]
     smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
     return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]
