@@ -20,20 +20,24 @@ def sent(
 
     `terms` as `client.campaigns.post_files` takes them; `progress` is called with the bytes that are sent.
     """
-    from underskin.client.content_key import content_key
-
     try:
-        if terms.get("together") is None and terms.get("corrects") is None and _is_export(files[0]):
+        if terms["together"] is None and _is_export(files[0]):
             brought = client.skins.load(files[0], progress)
             return [(True, f"skin {brought['skin_id']}: {brought['kept']} campaigns, {brought['present']} were there")]
-        key = content_key(files, terms)
-        results = client.campaigns.post_files(files, **terms, idempotency_key=key, progress=progress)
+        results = results_of(client, files, {**terms, "progress": progress})
     except UnderskinError as error:
         return [(False, str(error))]
     except OSError as error:
         place = f"{error.filename} " if len(files) > 1 else ""
         return [(False, f"{place}cannot be opened: {error.strerror}")]
     return [line for result in results for line in outcome(client, result)]
+
+
+def results_of(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What the service answers to files, the same however often they are sent; raises UnderskinError, OSError."""
+    from underskin.client.content_key import content_key
+
+    return client.campaigns.post_files(files, **terms, idempotency_key=content_key(files, terms))
 
 
 def _is_export(file: Path) -> bool:
