@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import changes, diagnose, mechanism, store, stored, stress
+from underskin.cli import changes, diagnose, mechanism, store, stored, stress, watch
 from underskin.cli.rigs import EstimatorOption, RigOption
 from underskin.errors import UnderskinError
 
@@ -204,7 +204,15 @@ app.command("import", no_args_is_help=True)(store.import_files)
 app.command("export", no_args_is_help=True)(store.export_skin)
 app.command()(stored.campaigns)
 app.command()(stored.skins)
-for _command in (stored.history, changes.withdraw, changes.exclude, changes.correct, changes.join, changes.adopt):
+for _command in (
+    stored.history,
+    changes.withdraw,
+    changes.exclude,
+    changes.correct,
+    changes.join,
+    changes.adopt,
+    watch.watch,
+):
     app.command(no_args_is_help=True)(_command)
 diagnose.add_commands(app)
 app.add_typer(mechanism.app, name="mechanism")
