@@ -1,5 +1,6 @@
 """The commands that read what the service keeps: campaigns, skins and history."""
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import typer
@@ -46,7 +47,7 @@ def skins(json: AsJson = False, url: Url = LOCAL, key: KeyOption = None) -> None
         write_json(entries)
     else:
         rows = ((entry["id"], moment(entry["created_at"]), str(entry["campaigns"])) for entry in entries)
-        write_rows(("skin", "since", "campaigns"), rows)
+        write_rows(("skin", "since (UTC)", "campaigns"), rows)
 
 
 def history(
@@ -83,10 +84,10 @@ def _row(entry: Document) -> tuple[str, ...]:
     return entry["id"], entry["skin_id"], entry["name"], recorded, f"{entry['recordings']}{excluded}", state_of(entry)
 
 
-def _show(detail: Document, diagnoses: list[Document]) -> None:
+def _show(detail: Document, diagnoses: Sequence[Document]) -> None:
     write_rows(("campaign", "skin", "name", "recorded (UTC)", "recordings", "state"), [_row(detail)])
     write_rows(
-        ("recording", "kind", "sensor", "recorded", "state"),
+        ("recording", "kind", "sensor", "recorded (UTC)", "state"),
         (
             (
                 entry["id"],
@@ -100,7 +101,7 @@ def _show(detail: Document, diagnoses: list[Document]) -> None:
     )
     if diagnoses:
         write_rows(
-            ("diagnosis", "asked", "state", "verdict"),
+            ("diagnosis", "asked (UTC)", "state", "verdict"),
             ((one["id"], moment(one["asked_at"]), one["state"], one["verdict"] or "-") for one in diagnoses),
         )
     for entry in detail["refused"]:

@@ -49,10 +49,10 @@ def test_the_query_and_the_form_choose_the_estimator(server: Server) -> None:
         assert answer.status_code == 201, answer.text
         ids[name] = answer.json()["id"]
     require_estimated(server, ids)
-    files = [("file", ("a.json", content)), ("estimator", (None, "Hv"))]
-    answer = server.http.post("/v1/campaigns", files=files)
+    file: list[tuple[str, Any]] = [("file", ("a.json", content))]
+    answer = server.http.post("/v1/campaigns", files=[*file, ("estimator", (None, "Hv"))])
     assert d33(server, answer.json()["campaigns"][0]["id"]) == d33(server, ids["Hv"])
-    answer = server.http.post("/v1/campaigns?estimator=H4", files=files[:1])
+    answer = server.http.post("/v1/campaigns?estimator=H4", files=file)
     assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "estimator")
     answer = server.http.post("/v1/campaigns?estimator=Hv", json=campaign("lines"))
     assert answer.json()["notes"] == ["Hv is for time series, which 6 of 6 recordings are not"]

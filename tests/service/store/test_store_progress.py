@@ -25,7 +25,7 @@ def on_a_terminal(place: Place, *arguments: str) -> str:
     """What a command that succeeds shows on a terminal, without the codes that move and colour."""
     ours, its = pty.openpty()
     environment = {**place.environment(), "TERM": "xterm", "COLUMNS": "140"}
-    command = [preloaded.UNDERSKIN, *arguments]  # anew: a forked one has the streams of its parent
+    command = [str(preloaded.UNDERSKIN), *arguments]  # anew: a forked one has the streams of its parent
     process = subprocess.Popen(command, env=environment, stdin=its, stdout=its, stderr=its)
     os.close(its)
     shown = b""
@@ -58,7 +58,8 @@ def test_an_import_counts_the_bytes_that_it_sends(server: Server, tmp_path: Path
     there = ["--url", str(server.http.base_url)]
     shown = on_a_terminal(server.place, "import", *map(str, files), "--skin", "palm", *there)
     size, unit = whole(shown, "importing")
-    assert (size, unit) == (pytest.approx(sum(file.stat().st_size for file in files) / 1e3, abs=0.06), "kB")
+    assert size == pytest.approx(sum(file.stat().st_size for file in files) / 1e3, abs=0.06)
+    assert unit == "kB"
     assert shown.count("of skin palm, 6 recordings") == 2
     with Client(str(server.http.base_url)) as client:
         told: list[int] = []
@@ -75,7 +76,8 @@ def test_a_backup_and_a_restore_count_the_bytes_that_they_copy(server: Server, t
     file = tmp_path / "kept.backup"
     shown = on_a_terminal(server.place, "backup", str(file))
     size, unit = whole(shown, "reading back")
-    assert (size, unit) == (pytest.approx(file.stat().st_size / 1e3, abs=0.06), "kB")
+    assert size == pytest.approx(file.stat().st_size / 1e3, abs=0.06)
+    assert unit == "kB"
     assert re.search(r"backing up\s.* [\d.]+/[\d.?]+ kB", shown), shown
     shown = on_a_terminal(server.place, "restore", str(file))
     assert whole(shown, "restoring") == (size, unit)
