@@ -25,7 +25,7 @@ from service.store.tables import metadata
 
 Progress = Callable[[str, int, int | None], object]
 _BACKING_UP, _READING_BACK, _RESTORING = "backing up", "reading back", "restoring"
-_STEP_PAGES = 1000  # of an SQLite database, copied between two words of progress
+STEP_PAGES = 1000  # of an SQLite database, copied between two words of progress
 _STEP_BYTES = 1 << 20
 _LOOK_S = 0.1
 
@@ -109,7 +109,7 @@ def _copy_sqlite(source: Path, target: Path, what: str, progress: Progress) -> N
             # would begin anew with each of their commits. The target is replaced in one transaction of its own.
             origin.execute("BEGIN")
             origin.execute("SELECT count(*) FROM sqlite_master").fetchone()
-            origin.backup(copy, pages=_STEP_PAGES, progress=told)
+            origin.backup(copy, pages=STEP_PAGES, progress=told)
     except sqlite3.Error as error:
         raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
 

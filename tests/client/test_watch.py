@@ -125,17 +125,20 @@ def test_what_is_saved_is_sent_once_complete_and_once_only(server: Server, tmp_p
         at.save(".hidden.json", small("hidden"))
         at.save("later.json.part", small("part"))
         at.wait_for(f"{Path('day', 'later.json')}: campaign c-")
+        (at.folder / os.fsdecode(b"\xfcber Nacht.json")).write_bytes(orjson.dumps(small("named")))  # not in UTF-8
+        at.wait_for("?ber Nacht.json: campaign c-")
         (at.folder / "slow.json").rename(at.folder / "renamed.json")
         at.wait_for("renamed.json: has the content of slow.json, and is not sent")
         assert at.end() == 0
-        assert names(server, "once") == ["before", "later", "slow"]
+        assert names(server, "once") == ["before", "later", "named", "slow"]
         at.start()
         at.save("last.json", small("last"))
         at.wait_for("last.json: campaign c-")
         assert at.end(signal.SIGINT) == 0
-        assert names(server, "once") == ["before", "last", "later", "slow"]
+        assert names(server, "once") == ["before", "last", "later", "named", "slow"]
         assert at.told.count("before.json: campaign") == 1
-        assert {entry["file"] for entry in at.journal()} == {"before.json", "slow.json", "day/later.json", "last.json"}
+        saved = {"before.json", "slow.json", "day/later.json", "last.json", os.fsdecode(b"\xfcber Nacht.json")}
+        assert {entry["file"] for entry in at.journal()} == saved
 
 
 def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server: Server, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from uuid import uuid4
 
 import orjson
 
+from underskin.client.content_key import label_of
 from underskin.client.counted_file import CountedFile
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
@@ -94,7 +95,8 @@ class Campaigns:
                 sources = [("file", Path(file), progress) for file in files]
                 sources += [] if rig is None else [("rig", Path(rig), _uncounted)]
                 parts = [
-                    (name, (path.name, opened.enter_context(CountedFile(path, read)))) for name, path, read in sources
+                    (name, (label_of(path), opened.enter_context(CountedFile(path, read))))
+                    for name, path, read in sources
                 ]
                 answer, received = self._session.answered(
                     "POST", "/v1/campaigns", **query, headers=headers, files=parts

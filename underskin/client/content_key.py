@@ -20,6 +20,11 @@ def content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
     return f"content {hashlib.sha256(repr([options, digests]).encode()).hexdigest()}"
 
 
+def label_of(file: Path) -> str:
+    """The name under which a file is sent; letters that its disk has in no encoding we know become question marks."""
+    return file.name.encode("utf-8", "replace").decode("utf-8")
+
+
 def content_sha256(file: Path) -> str:
     """The digest of a file's content; raises OSError."""
     with file.open("rb") as opened:

@@ -10,6 +10,7 @@ import pytest
 from tests.recordings.known_signals import RATE
 from tests.support.store_server import Server, campaign
 from underskin import Client
+from underskin.recordings.campaign import FrfRecording
 
 ESTIMATORS = ("H1", "H2", "Hv")
 
@@ -56,6 +57,16 @@ def test_the_query_and_the_form_choose_the_estimator(server: Server) -> None:
     assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "estimator")
     answer = server.http.post("/v1/campaigns?estimator=Hv", json=campaign("lines"))
     assert answer.json()["notes"] == ["Hv is for time series, which 6 of 6 recordings are not"]
+
+
+def test_the_estimator_stays_with_a_skin_that_moves(server: Server, elsewhere: Server, tmp_path: Path) -> None:
+    sent = server.http.post("/v1/campaigns?estimator=Hv&skin=palm", json=shaken("shaken")).json()["id"]
+    with Client(str(server.http.base_url)) as client, Client(str(elsewhere.http.base_url)) as other:
+        client.skins.export("palm", tmp_path / "palm.h5")
+        other.skins.load(tmp_path / "palm.h5")
+        moved = other.campaigns.load(sent)
+    assert {recording.estimator for recording in moved.recordings if isinstance(recording, FrfRecording)} == {"Hv"}
+    assert d33(elsewhere, sent) == d33(server, sent)
 
 
 def test_the_estimator_is_a_part_of_the_request_that_a_key_stands_for(server: Server) -> None:

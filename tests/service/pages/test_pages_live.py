@@ -1,6 +1,12 @@
 """What arrives while a skin's page is open is shown there without a reload; what the reader does stays."""
 
+import os
+from pathlib import Path
+
+import orjson
+
 from tests.service.pages.conftest import Visit
+from tests.support import preloaded
 from tests.support.diagnosed import asked, finished, report, sent
 from tests.support.store_server import Server, campaign
 
@@ -69,26 +75,16 @@ def test_the_choice_of_a_sensor_stays_and_works_after_the_page_was_renewed(reade
     page.wait_for_url("**/skins/chosen?**sensor=s0**")
 
 
-def test_a_mark_changes_with_what_the_page_shows_and_with_nothing_else(idle: Server) -> None:
-    def mark(skin: str) -> str:
-        return str(idle.http.get(f"/skins/{skin}/mark").json()["mark"])
-
-    campaign_id = sent(idle, campaign("first", sensors=1), "marked")
-    marks = [mark("marked")]
-    sent(idle, campaign("other", sensors=1), "unmarked")
-    assert mark("marked") == marks[0]
-    sent(idle, campaign("second", sensors=1), "marked")
-    marks.append(mark("marked"))
-    idle.http.post(f"/v1/campaigns/{campaign_id}/exclusions", json={"recording": "s0-1N", "reason": "cable"})
-    marks.append(mark("marked"))
-    asked(idle, campaign_id)
-    marks.append(mark("marked"))
-    finished(idle)
-    marks.append(mark("marked"))
-    idle.http.post("/v1/skins/marked/join", json={"skin_id": "unmarked", "reason": "one skin"})
-    marks.append(mark("marked"))
-    idle.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "wrong sphere"})
-    marks.append(mark("marked"))
-    assert len(set(marks)) == len(marks)
-    assert mark("unmarked") == mark("marked")
-    assert idle.http.get("/skins/nobody/mark").status_code == 404
+def test_what_a_bench_saves_is_on_the_page_at_once(reader: Visit, idle: Server, tmp_path: Path) -> None:
+    page = reader.page
+    sent(idle, campaign("yesterday", sensors=1), "bench")
+    reader.go("/skins/bench")
+    page.evaluate(MARK)
+    with (tmp_path / "log").open("wb") as log:
+        words = ["watch", str(tmp_path), "--skin", "bench", "--url", reader.address, "--settle-s", "0.3"]
+        watch = preloaded.start(words, os.environ, (0, log.fileno(), log.fileno()))
+    (tmp_path / "tonight.json").write_bytes(orjson.dumps(campaign("tonight", sensors=1)))
+    page.get_by_role("link", name="tonight", exact=True).wait_for(timeout=60_000)
+    assert page.evaluate(STAYED)
+    watch.terminate()
+    assert watch.wait(30) == 0

@@ -79,9 +79,8 @@ class Journal:
         """Keep what became of a content; it is on the disk afterwards. Raises UnderskinError."""
         at = datetime.now(UTC).isoformat(timespec="seconds")
         self._entries.append(Entry(sha256, file, target.url, target.skin, target.terms, list(campaigns), at))
-        text = json.dumps(
-            {"schema": _SCHEMA, "entries": list(map(asdict, self._entries))}, ensure_ascii=False, indent=1
-        )
+        document = {"schema": _SCHEMA, "entries": list(map(asdict, self._entries))}
+        text = json.dumps(document, indent=1)  # in ASCII: a name may hold letters that have no encoding
         part = self._path.with_name(f"{NAME}.part")
         try:
             with part.open("w", encoding="utf-8") as written:
