@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import orjson
 import pytest
 
@@ -95,7 +96,7 @@ def bench(tmp_path: Path, url: str, skin: str, *options: str) -> Iterator[Bench]
 
 def names(server: Server, skin: str) -> list[str]:
     """The campaigns of a skin by name."""
-    answer = server.http.get("/v1/campaigns", params={"skin": skin, "state": "all"})
+    answer = server.http.get("/v1/campaigns", params={"skin": skin, "state": "all", "limit": 200})
     return sorted(entry["name"] for entry in answer.json()["campaigns"])
 
 
@@ -259,6 +260,26 @@ def test_a_kill_between_the_sending_and_the_journal_doubles_nothing(server: Serv
         assert names(server, "killed") == ["first"]
         assert [entry["file"] for entry in at.journal()] == ["first.json"]
         assert through.posts == 2
+
+
+@pytest.mark.slow
+def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_path: Path) -> None:
+    """Two files are saved for each watch that is killed: in the end there is each of them, once."""
+    kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 6
+    moments = np.random.default_rng(900_013).uniform(SETTLE_S, SETTLE_S + 1.5, kills)
+    with bench(tmp_path, address(server), "random") as at:
+        for number, moment in enumerate(moments.tolist()):
+            at.start()
+            at.save(f"{number}-a.json", small(f"{number} a"))
+            time.sleep(moment / 2)
+            at.save(f"{number}-b.json", small(f"{number} b"))
+            time.sleep(moment / 2)
+            at.end(signal.SIGKILL)
+        at.start()
+        at.save("last.json", small("last"))
+        at.wait_for("last.json: campaign c-")
+        assert at.end() == 0
+    assert names(server, "random") == sorted(["last", *(f"{number} {one}" for number in range(kills) for one in "ab")])
 
 
 def test_a_server_that_goes_and_comes_back_gets_everything_once(tmp_path: Path) -> None:
