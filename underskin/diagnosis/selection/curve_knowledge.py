@@ -5,7 +5,7 @@ kinds then leaves something to be known. Mechanisms of the curves alone (a stage
 those that an apparent modulus may hide whatever the curves look like (friction at the platens).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from underskin.mechanisms.base import Kind, Unsupported
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
 
@@ -72,8 +73,7 @@ class OtherKind:
         self._explanations = {frozenset(entry.names): entry for entry in explanations}
         mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
         self.supported = tuple(name for name in mechanisms.named if self._supports(name))
-        may_hide = {name: mechanisms[name].hidden_in_modulus(conditions) for name in self.supported}
-        self._may_hide = {name: values for name, values in may_hide.items() if values}
+        self._may_hide = may_hide(mechanisms, conditions, self.supported)
         self.found: dict[frozenset[str], OfCurves] = {}
 
     def _supports(self, name: str) -> bool:
@@ -117,7 +117,7 @@ class OtherKind:
             for entry in (without, *beside)
         )
         quantities, mean, covariance = _mixture(each, both)
-        hidden = self._hidden(both)
+        hidden = hidden_factors(self._may_hide, both)
         values, shares = np.array(hidden).T
         mean[0] -= shares @ values
         covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
@@ -132,13 +132,21 @@ class OtherKind:
             self._explanations[names] = explanation
         return self._explanations[names]
 
-    def _hidden(self, both: frozenset[str]) -> tuple[tuple[float, float], ...]:
-        """What the apparent modulus may hide besides this set, with probabilities."""
-        hidden = [(0.0, 1.0)]
-        for values in (values for name, values in self._may_hide.items() if name not in both):
-            each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
-            hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
-        return tuple(hidden)
+
+def may_hide(mechanisms: Known, conditions: Conditions, names: Iterable[str]) -> Mapping[str, Sequence[float]]:
+    """Mechanisms that an apparent modulus may hide, with the logarithms of by how much it may be too large."""
+    hidden = {name: mechanisms[name].hidden_in_modulus(conditions) for name in names}
+    return {name: values for name, values in hidden.items() if values}
+
+
+def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]) -> tuple[tuple[float, float], ...]:
+    """By how much the logarithm of an apparent modulus may be too large by mechanisms of `hiding` that are not among
+    those `shown`, with probabilities."""
+    hidden = [(0.0, 1.0)]
+    for values in (values for name, values in hiding.items() if name not in shown):
+        each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
+        hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
+    return tuple(hidden)
 
 
 def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
