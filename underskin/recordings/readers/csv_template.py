@@ -39,7 +39,7 @@ _TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
 _SEPARATORS = ("\t", ";", ",")
 _POSITION = ("position_x_mm", "position_y_mm")
 _SENSOR = ("id", "x_mm", "y_mm")
-_TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
+_TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)) - {"conditions"}
 _ID = "id"
