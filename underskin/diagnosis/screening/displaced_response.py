@@ -51,7 +51,7 @@ def displaced_response(
         for entry, sensor in zip(entries, sensors, strict=True)
     )
     model = compose((), Conditions("contacts", skin, contacts), table, "frf")
-    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]), slopes=False)
+    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     assert prediction.position_slopes is not None
     shape = len(displacement_mm), len(entries)
     slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes))

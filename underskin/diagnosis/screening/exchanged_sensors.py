@@ -60,7 +60,7 @@ def without_exchanges(
     right, findings = list(entries), list[Finding]()
     if unasked.any():
         tells = np.flatnonzero(~silent & (level > _WEAK * usual * shape))
-        known = [entries[number] for number in tells]
+        known = [entries[number] for number in tells.tolist()]
         evidence = ExchangeEvidence(campaign.skin, known, level[tells], usual, table)
         for found in _exchanges(campaign, known, unasked[tells], evidence):
             findings.append(_finding(found, known, put_right=True))
@@ -108,7 +108,7 @@ def _pairs(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[st
 
 
 def _falling_silent(entries: Sequence[FrfRecording], silent: Mask) -> _Exchange | None:
-    """The two sensors that answer until some recording and never since, where others do; None where there are no two."""
+    """The two sensors that answer until some recording and never since, where others do; None where not two do so."""
     order = np.argsort(recording_order(entries), kind="stable").tolist()
     falling = dict[str, list[int]]()
     for name in {entry.sensor for entry in entries}:

@@ -79,7 +79,7 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the spread t of the sensors' gains."""
+    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the sensors' spread t."""
 
     evidence: float
     precision: Floats
