@@ -276,6 +276,16 @@ def test_exchanged_labels_are_told_where_all_contacts_miss_their_places(table: S
     ]
 
 
+def test_the_labels_of_an_array_of_two_sensors_are_exchanged(table: SigmaTable) -> None:
+    """No recording then answers as given."""
+    two = campaign(Made(sensors=2, repeats=2, lines=20), table)
+    inspected = inspect(changed(two, exchanged("s0", "s1")), table)
+    assert named(inspected) == [Reason.LABELS_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(two)
+    ]
+
+
 def test_a_single_recording_after_an_exchange_tells_it_by_its_place(good: Campaign, table: SigmaTable) -> None:
     last = max(number for number, entry in enumerate(frf_recordings(good)) if entry.sensor in ("s0", "s2"))
     inspected = inspect(changed(good, exchanged("s0", "s2", last)), table)

@@ -42,17 +42,15 @@ class ExchangeEvidence:
     """The evidence of exchanges among the sensors of a campaign."""
 
     def __init__(
-        self, skin: SkinDescription, entries: Sequence[FrfRecording], level: Floats, usual: float, table: SigmaTable
+        self, skin: SkinDescription, entries: Sequence[FrfRecording], level: Floats, largest: float, table: SigmaTable
     ) -> None:
-        """Work out the evidence of each recording as given; `level` [C/N] (recordings,), `usual` about level over S."""
+        """Work out the evidence as given; `level` (recordings,) over the usual one at the `largest` S [C/N]."""
         self._skin, self._entries, self._table = skin, entries, table
         angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         around = np.column_stack([np.cos(angles), np.sin(angles)])
         self._miss_mm = np.concatenate([np.zeros((1, 2)), *(distance * around for distance in _DISTANCES_MM)])
         own = self._response(entries, [entry.sensor for entry in entries])
-        self._largest = float(own.value[0].max())
-        self._level = level / (usual * self._largest)
-        self._own = own
+        self._largest, self._level, self._own = largest, level, own
         self._total = np.stack([self._density(own, self._level, at).sum(axis=-1) for at in range(len(self._miss_mm))])
         self._total += self._prior[:, None]
 

@@ -46,7 +46,7 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
     best = max(fitted, key=lambda one: one.gain, default=None)
     if best is None or best.gain < _GAIN:
         return None
-    cost_of_step = log(len(levels.value) - len(numbers))
+    cost_of_step = log(max(len(levels.value) - len(numbers), 1))
     steps = [levels.fit(levels.value, column).evidence - base.evidence for column in _steps(levels, best)]
     return best if best.gain > max(steps) - cost_of_step + _OVER_STEP else None
 

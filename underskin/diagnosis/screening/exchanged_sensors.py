@@ -9,7 +9,7 @@ was pressed.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
+from math import dist, log
 
 import numpy as np
 
@@ -50,18 +50,21 @@ def without_exchanges(
     if len(campaign.skin.sensors) < 2 or len(entries) < _FEWEST:
         return list(entries), []
     level = np.array([flat_level(entry) for entry in entries])
-    names = [entry.sensor for entry in entries]
-    shape = displaced_response(campaign.skin, entries, names, np.zeros((1, 2)), table).value[0]
+    own, near = [entry.sensor for entry in entries], [_nearest(campaign, entry) for entry in entries]
+    shape, pressed = (
+        displaced_response(campaign.skin, entries, names, np.zeros((1, 2)), table).value[0] for names in (own, near)
+    )
     silent, _ = no_response(entries)
-    usual = _usual(level, np.where(silent, 0.0, shape))
+    largest = float(max(shape.max(), pressed.max()))
+    usual = _usual(level, np.where(silent, 0.0, np.maximum(shape, pressed)))
     if usual is None:
         return list(entries), []
-    unasked = level - usual * shape > _ANSWERS * np.maximum(level, _LEAST_SHAPE * usual * shape.max())
+    unasked = level - usual * shape > _ANSWERS * np.maximum(level, _LEAST_SHAPE * usual * largest)
     right, findings = list(entries), list[Finding]()
     if unasked.any():
         tells = np.flatnonzero(~silent & (level > _WEAK * usual * shape))
         known = [entries[number] for number in tells.tolist()]
-        evidence = ExchangeEvidence(campaign.skin, known, level[tells], usual, table)
+        evidence = ExchangeEvidence(campaign.skin, known, level[tells] / (usual * largest), largest, table)
         for found in _exchanges(campaign, known, unasked[tells], evidence):
             findings.append(_finding(found, known, put_right=True))
             for number in found.since:
@@ -97,14 +100,15 @@ def _exchanges(
 
 def _pairs(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[str, str]]:
     """The sensors of these recordings, each with the sensor that is nearest to where it was pressed."""
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-
-    def nearest(entry: FrfRecording) -> str:
-        pressed = entry.position_mm or places[entry.sensor]
-        return min(places, key=lambda name: float(np.hypot(*np.subtract(places[name], pressed))))
-
-    pairs = {(entry.sensor, nearest(entry)) for entry in unasked}
+    pairs = {(entry.sensor, _nearest(campaign, entry)) for entry in unasked}
     return sorted({(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]})
+
+
+def _nearest(campaign: Campaign, entry: FrfRecording) -> str:
+    """The sensor that is nearest to where a recording was pressed."""
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    pressed = entry.position_mm or places[entry.sensor]
+    return min(places, key=lambda name: dist(places[name], pressed))
 
 
 def _falling_silent(entries: Sequence[FrfRecording], silent: Mask) -> _Exchange | None:
@@ -138,7 +142,7 @@ def _finding(found: _Exchange, entries: Sequence[FrfRecording], *, put_right: bo
 
 
 def _usual(level: Floats, shape: Floats) -> float | None:
-    """The level over the shape in recordings that are neither silent nor far from their sensor; None where one of them
+    """The level over the shape in recordings that are neither silent nor far from any sensor; None where one of them
     is off by far, which is a slip of units."""
     telling = shape > _LEAST_SHAPE * shape.max(initial=0.0)
     if not telling.any():
