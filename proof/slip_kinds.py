@@ -39,10 +39,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Slip:
-    """The campaign with a slip, and the χ² that it adds."""
+    """The campaign with a slip, the χ² that it adds, and how much of it no other cause explains (None: all)."""
 
     campaign: Campaign
     chi2: float
+    over_rivals: float | None = None
 
 
 Make = Callable[[Case, np.random.Generator], Slip | None]
@@ -96,11 +97,11 @@ def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | 
         replace(entry, sensor=second if entry.sensor == first else first) if wrong else entry
         for entry, wrong in zip(case.entries, turned, strict=True)
     ]
-    placed = case.entries[0].position_mm is not None
-    return Slip(
-        case.with_entries(entries),
-        _of_places(case, turned) if placed else _of_gains(case, turned, first, second) if since else 0.0,
-    )
+    wrong = case.with_entries(entries)
+    if case.entries[0].position_mm is not None:
+        return Slip(wrong, _of_places(case, turned))
+    each = _of_gains(case, turned, first, second) if since else (0.0, 0.0)
+    return Slip(wrong, sum(each), min(each))  # a step of either sensor alone, of any size, leaves the other one's
 
 
 def _of_places(case: Case, turned: Mask) -> float:
@@ -108,17 +109,21 @@ def _of_places(case: Case, turned: Mask) -> float:
     return float((np.minimum(case.scatter, 1.0)[turned] ** -2.0).sum())
 
 
-def _of_gains(case: Case, turned: Mask, first: str, second: str) -> float:
-    """What two sensors of unequal gains scatter about their means more than they did."""
+def _of_gains(case: Case, turned: Mask, first: str, second: str) -> tuple[float, float]:
+    """What each of two sensors of unequal gains scatters about its mean, by the labels given."""
     gains = case.recorded.response.sensor_gains
     ids = [sensor.id for sensor in case.campaign.skin.sensors]
     step = float(np.log(gains[ids.index(first)] / gains[ids.index(second)]))
-    total = 0.0
-    for name in (first, second):
-        own = np.array([entry.sensor == name for entry in case.entries])
-        both = turned[own].astype(float)
-        total += float((((both - both.mean()) * step / case.scatter[own]) ** 2).sum()) if own.any() else 0.0
-    return total
+    labels = np.array([entry.sensor for entry in case.entries])
+    given = np.where(turned, np.where(labels == first, second, first), labels)
+
+    def scattered(name: str) -> float:
+        own = (given == name) & np.isfinite(case.scatter)
+        weight = case.scatter[own] ** -2.0
+        other = turned[own].astype(float)
+        return float(step**2 * (weight * (other - np.average(other, weights=weight)) ** 2).sum()) if own.any() else 0.0
+
+    return scattered(first), scattered(second)
 
 
 def conjugated(share: float) -> Make:

@@ -52,19 +52,15 @@ class Levels:
         """
         spreads = _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
         added = 0.0 if further is None else further @ further.T
-        best, chosen, size = -np.inf, np.eye(len(value)), 1.0
+        best, chosen, best_spread = -np.inf, np.eye(len(value)), spreads[0]
         for spread, place, bend in product(spreads, self._places, _BENDS):
             fixed = self._expected(spread, bend, sensor) + np.diag((self.slope * place) ** 2) + added
             for scatter in _SCATTER:
                 covariance = fixed + np.diag(np.full(len(value), scatter**2))
                 density = _log_density(value, covariance)
                 if density > best:
-                    best, chosen, size = density, covariance, bend
-        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), size)
-
-    def without_smooth(self, fit: "LevelFit") -> Floats:
-        """y less the smooth functions as fitted (recordings,)."""
-        return np.asarray(self.value - fit.bend**2 * self.smooth @ (self.smooth.T @ (fit.precision @ self.value)))
+                    best, chosen, best_spread = density, covariance, spread
+        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
 
     def precision(self, scatter: float, bend: float) -> Floats:
         """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
@@ -83,11 +79,11 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the size of the smooth functions."""
+    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the sensors' spread t."""
 
     evidence: float
     precision: Floats
-    bend: float
+    spread: float
 
     def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
         """That of a column in y by generalised least squares, and its standard deviation."""
