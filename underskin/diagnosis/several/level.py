@@ -29,8 +29,8 @@ def unsure_of_changes(candidates: Sequence[Candidate], leader: Course) -> list[f
     for number in range(1, len(candidates)):
         before, after = (_moving(candidates[place], leader.sets[place]) for place in (number - 1, number))
         common = [name for name in before.names if name in after.names and _stays(before, after, name)]
-        both = zip(candidates[number - 1 : number + 1], (before, after), strict=True)
-        found.append(float(np.hypot(*(_added(candidate, fit, common) for candidate, fit in both))))
+        of_both = (_added(candidates[number - 1], before, common), _added(candidates[number], after, common))
+        found.append(float(np.hypot(*of_both)))
     return found
 
 
