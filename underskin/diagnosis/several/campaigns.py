@@ -83,7 +83,7 @@ def _with_changed_sensors(
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
     apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone)
+    single = changes(apart, alone, [0.0] * len(apart))
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)
@@ -100,7 +100,7 @@ def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> Se
     """The sensors under the answer of the campaign alone, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
     strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
-    return sensors_of(campaign, strengths, 0.0, table)
+    return sensors_of(campaign, strengths, table)
 
 
 def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
