@@ -20,11 +20,12 @@ MISLED = DrawnCase(900002, 29, "pair", WIDE)  # of a wrong thickness and gains o
 SHARP = DrawnCase(930001, 25, "pair", WIDE)  # a resonance of ζ = 0.005, between which and the priors' nothing leads
 STUCK = DrawnCase(43938, 107, "pair", WIDE)  # creep and a resonance, which find their places beside a third
 FAINT = DrawnCase(43938, 244, "single", WIDE)  # a charge from the mains that several widths of line suit
+MOVED = DrawnCase(940001, 175)  # a resonance that adhesion moves far from where it is found without that
 AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, which the evidence took 40 nats for
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [SHARP, STUCK, FAINT, AT_BOUNDS], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [SHARP, STUCK, FAINT, MOVED, AT_BOUNDS], ids=lambda case: case.name)
 def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
     entry = compared(case)
     assert not is_miss(entry)

@@ -199,8 +199,8 @@ def test_no_resonance_is_read_where_none_stands_out_within_the_band() -> None:
     frequency = np.geomspace(1.0, 100.0, 60)
     rising = 1 / (1 - (frequency / 110.0) ** 2 + 0.02j * frequency)
     flat = np.random.default_rng(6).normal(1.0, 0.02, 60)
-    assert resonance(Frf(frequency, rising, None)) is None
-    assert resonance(Frf(frequency, flat + 0j, None)) is None
+    assert resonance(Frf(frequency, rising.astype(np.complex128), None)) is None
+    assert resonance(Frf(frequency, flat.astype(np.complex128), None)) is None
 
 
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder")

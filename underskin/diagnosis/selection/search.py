@@ -17,11 +17,12 @@ from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import LARGEST
 from underskin.diagnosis.selection.smaller_sets import Explanations, from_larger
 from underskin.diagnosis.selection.unnamed_rivals import discrepancy
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Stage, Unsupported
 
 _PARENTS, _LARGEST = 3, 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_OF_CONTACTS = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT)  # that change contacts' stiffness
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -134,18 +135,20 @@ class _Sets:
                 self.explain(self._larger(size))
 
     def _larger(self, size: int) -> list[Request]:
-        """The best sets with one mechanism less, each with one more."""
-        catalogue = self.problem.lines.mechanisms.named
-        return [
-            Request(
-                tuple(entry for entry in catalogue if entry in {*parent.names, name}),
-                parent,
-                self.explanations.get(frozenset([name])),
-            )
-            for parent in _parents(self.search, size, self.asked_for)
-            for name in self.names
-            if name not in parent.names
-        ]
+        """The best sets with one mechanism less, each with one more; of two that move one and the same resonance, where
+        that leads nowhere, from starts over both: the mass that was found on other contacts is not theirs."""
+        known, catalogue = self.problem.lines.mechanisms, self.problem.lines.mechanisms.named
+        requests, over_both = [], []
+        for parent in _parents(self.search, size, self.asked_for):
+            rings = any(known[name].needs_stiffness for name in parent.names)
+            for name in self.names:
+                if name in parent.names:
+                    continue
+                names = tuple(entry for entry in catalogue if entry in {*parent.names, name})
+                requests.append(Request(names, parent, self.explanations.get(frozenset([name]))))
+                if size == 2 and rings and known[name].stage in _OF_CONTACTS:
+                    over_both.append(Request(names))
+        return [*requests, *over_both]
 
     def refit_smaller(self) -> bool:
         """Fit the best sets again without each of their mechanisms; whether any fits better for it."""
