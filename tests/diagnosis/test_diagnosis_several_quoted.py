@@ -68,6 +68,9 @@ def test_of_a_fleet_it_is_told_of_which_skins_it_may_be_quoted_and_why_of_others
     assert said.endswith("not of e (no answer explains its recordings)")
     many = quoted.of_skins(14.2, "pC/N", {f"s{number}": QUOTABLE for number in range(9)}, {})
     assert many.endswith("it may be quoted of s0, s1, s2 and 6 more")
+    assert quoted.of_skins(14.2, "pC/N", {"b": OPEN}, {}).endswith(
+        "it may be quoted of none, not of b (several answers remain and noise alone is 25 % of it)"
+    )
 
 
 def test_a_skin_in_which_the_fleet_finds_more_than_its_own_diagnosis_is_not_quoted() -> None:

@@ -32,7 +32,7 @@ def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Map
         reason = " and ".join(own.reasons or sisters)
         (by_reason.setdefault(reason, []) if reason else may).append(skin)
     others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
-    told = ", ".join([*([f"of {_few(may)}"] if may else []), *others])
+    told = ", ".join([f"of {_few(may) if may else 'none'}", *others])
     return (
         f"d33 is not to be quoted, because {mean:.3g} {unit} is the mean of the skins and no skin's own; "
         f"by its own recordings alone it may be quoted {told}"
