@@ -12,7 +12,7 @@ _MOST_NAMED = 3  # skins in a clause
 def of_campaigns(last: str, own: StatedD33) -> str:
     """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
     if own.document is None:
-        return f"no d33 is to be quoted: in {last}, the last campaign that has one, no answer explains the recordings"
+        return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
     alone = f"d33 is not to be quoted of all campaigns, because it is of the recordings of {last} alone"
     if own.document["quotable"]:
         return f"{alone}: {own.quoted()}"
