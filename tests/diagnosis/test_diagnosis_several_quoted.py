@@ -1,5 +1,6 @@
 """Reports of several campaigns, and of fleets, say why their d33 is not to be quoted, and of what one may be."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -68,11 +69,22 @@ def test_of_a_fleet_it_is_told_of_which_skins_it_may_be_quoted_and_why_of_others
     assert said.endswith("not of e (no answer explains its recordings)")
     many = quoted.of_skins(14.2, "pC/N", {f"s{number}": QUOTABLE for number in range(9)}, {})
     assert many.endswith("it may be quoted of s0, s1, s2 and 6 more")
+    assert quoted.of_skins(14.2, "pC/N", {"b": OPEN}, {}).endswith(
+        "it may be quoted of none, not of b (several answers remain and noise alone is 25 % of it)"
+    )
 
 
 def test_a_skin_in_which_the_fleet_finds_more_than_its_own_diagnosis_is_not_quoted() -> None:
     said = quoted.of_skins(14.2, "pC/N", {"a": QUOTABLE, "b": QUOTABLE}, {"b": ["thickness_error"]})
     assert said.endswith("it may be quoted of a, not of b (its own diagnosis lacks thickness error)")
+
+
+@pytest.mark.slow
+def test_of_a_skin_of_two_recordings_alone_no_d33_is_quoted(table: SigmaTable) -> None:
+    skins = {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(3)}
+    whole = made("few", seed=60)
+    fleet = diagnose_fleet(skins | {"few": [replace(whole, recordings=whole.recordings[:2])]}, table, "batch")
+    assert "not of few (its recordings say too little)" in fleet["statement"]
 
 
 @pytest.mark.slow

@@ -146,7 +146,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "next_experiment": None,
             "provenance": dict(diagnosis.provenance),
         }
-        return Reported(nothing, StatedD33(None))
+        return Reported(nothing, StatedD33(None, why_not=["its recordings say too little"]))
     search, problem = diagnosis.search, diagnosis.problem
     leader = search.answers[0]
     shown = search.shown_or_nothing(leader)

@@ -74,7 +74,7 @@ class StatedD33:
     def reasons(self) -> list[str]:
         """Why it is not to be quoted; none where it is."""
         if self.document is None:
-            return ["no answer explains its recordings"]
+            return list(self.why_not) or ["no answer explains its recordings"]
         hidden = in_words([one.mechanism for one in self.declared])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 

@@ -12,7 +12,7 @@ _MOST_NAMED = 3  # skins in a clause
 def of_campaigns(last: str, own: StatedD33) -> str:
     """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
     if own.document is None:
-        return f"no d33 is to be quoted: in {last}, the last campaign that has one, no answer explains the recordings"
+        return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
     alone = f"d33 is not to be quoted of all campaigns, because it is of the recordings of {last} alone"
     if own.document["quotable"]:
         return f"{alone}: {own.quoted()}"
@@ -32,7 +32,7 @@ def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Map
         reason = " and ".join(own.reasons or sisters)
         (by_reason.setdefault(reason, []) if reason else may).append(skin)
     others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
-    told = ", ".join([*([f"of {_few(may)}"] if may else []), *others])
+    told = ", ".join([f"of {_few(may) if may else 'none'}", *others])
     return (
         f"d33 is not to be quoted, because {mean:.3g} {unit} is the mean of the skins and no skin's own; "
         f"by its own recordings alone it may be quoted {told}"
