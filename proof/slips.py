@@ -15,13 +15,16 @@ from proof.markdown import table
 from proof.slip_kinds import SLIPS, Case
 from rig.draw import drawn, record
 from rig.recorded import RecordedLines, campaign
+from rig.true_response import TrueResponse
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.levels import levels
 from underskin.findings.codes import Reason
 from underskin.recordings.campaign import Campaign, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.units import Floats
 
 VISIBLE = 20.0
+_PLACES = 24  # draws of places
 _HIDDEN = ("none", "single")
 _SLIPS = {reason for _, reasons in SLIPS.values() for reason in reasons}
 
@@ -71,14 +74,24 @@ def _named(made: Campaign, sigma: SigmaTable) -> set[Reason]:
 
 
 def _case(made: Campaign, recorded: RecordedLines, sigma: SigmaTable) -> Case:
-    """With the scatter of each recording's level: gain, position where the response is steep, and lines."""
-    noise = recorded.response.experiment.noise
+    """With the scatter of each recording's level: gain, position and lines."""
     own = levels(made, frf_recordings(made), sigma)
     relative = recorded.line_variance / np.maximum(np.abs(recorded.exact) ** 2, 1e-300)
     scatter = np.full(len(recorded.exact), np.inf)
     lines = 1 / (1 / relative).sum(axis=1)
-    scatter[own.number] = np.sqrt(noise.gain**2 + (noise.position_mm * own.slope) ** 2 + lines[own.number])
+    noise = recorded.response.experiment.noise
+    scatter[own.number] = np.sqrt(noise.gain**2 + _of_place(recorded.response) + lines)[own.number]
     return Case(made, recorded, scatter)
+
+
+def _of_place(response: TrueResponse) -> Floats:
+    """The variance of ln level from the scatter of places (recordings,)."""
+    size = response.experiment.noise.position_mm
+    if size == 0:
+        return np.zeros(len(response.level))
+    random = np.random.default_rng([response.experiment.seed, 37])
+    drawn = [response.elsewhere(size * random.normal(size=response.missed_mm.shape)).level for _ in range(_PLACES)]
+    return np.asarray(np.var(np.log(np.maximum(np.abs(drawn), 1e-300)), axis=0, ddof=1))
 
 
 def shown(tally: Tally) -> str:
