@@ -32,12 +32,13 @@ _STRONGER = 1.5  # times its change of the levels at most
 _SPREAD, _SENSOR, _MODULUS, _THICKNESS = 0.25, 0.01, 0.02, 0.01  # standard deviations
 _STEP = 1e-3
 _DELAY = "timing_delay"
-_LADDER, _ONE_STEP = {"law": "ladder", "exponent": 0.0}, {"law": "step", "step": 0.0, "corner_hz": 1.0}
+_LADDER: Values = {"law": "ladder"}
+_ONE_STEP: Values = {"law": "step"}
 # Effects that turn the phase: what is fitted of each, and its law.
 _TURNING: tuple[tuple[str, tuple[str, ...], Values], ...] = (
     ("amplifier_high_pass", ("corner_hz",), {}),
-    ("sensor_relaxation", ("exponent",), dict(_LADDER)),
-    ("sensor_relaxation", ("step", "corner_hz"), dict(_ONE_STEP)),
+    ("sensor_relaxation", ("exponent",), _LADDER),
+    ("sensor_relaxation", ("step", "corner_hz"), _ONE_STEP),
     ("contact_resonance", ("tip_mass_g", "damping"), {}),
 )
 

@@ -1,8 +1,9 @@
 """FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
-Of some: the courses φ_i of phase over frequency are ±1 times one course φ. The signs q_i that align them are those that
-maximise T(q) = |Σ q_i w_i φ_i|²/Σ w_i, in units of noise, and are believed where T(q) − T(1) exceeds what choosing k
-of n signs costs. Of all: the mean course is far from every causal one (`phase_course`), and conjugated it is not.
+Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them best
+the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the phases
+must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain the
+conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from underskin.diagnosis.screening.phase_laws import Course, misfit, unlisted_mi
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.units import Complexes, Floats
+from underskin.units import Floats
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more

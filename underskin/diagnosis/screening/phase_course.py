@@ -113,4 +113,3 @@ def _logarithm(lines: Complexes) -> Complexes:
     phase = np.unwrap(np.angle(lines))
     start = np.pi * np.round(np.median(phase[: max(3, len(phase) // 8)]) / np.pi)
     return np.asarray(np.log(np.abs(lines)) + 1j * (phase - start))
-

@@ -1,9 +1,9 @@
 """How near the listed mechanisms come to a course of ln FRF over frequency, in the convention e^(+iωt).
 
-ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A relaxation, −n ln(if) + ln(1 + s/(1 + if/f_s)),
-lags where it falls. A delay −iωt0 lags. The resonance of a tip on its contact, −ln(1 − r² + 2iζr), lags where it rises.
-A conjugated FRF contradicts each of them. Strengths have the catalogue's priors, so that no relaxation far below the
-band, of a size that nothing has, stands for a conjugated high pass; a delay is one of the charge, t0 ≥ 0.
+ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A relaxation, −n ln(if) + ln(1 + s/(1 +
+if/f_s)), lags where it falls. A delay −iωt0 lags. The resonance of a tip on its contact, −ln(1 − r² + 2iζr), lags where
+it rises. A conjugated FRF contradicts each of them. Strengths have the catalogue's priors, so that no relaxation far
+below the band, of a size that nothing has, stands for a conjugated high pass; a delay is one of the charge, t0 ≥ 0.
 """
 
 from collections.abc import Callable, Mapping
