@@ -1,9 +1,9 @@
 """FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
-Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them best
-the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the phases
-must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain the
-conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is.
+Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
+best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
+phases must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain
+the conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is.
 """
 
 from collections.abc import Sequence
