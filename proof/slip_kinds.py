@@ -1,15 +1,18 @@
 """Slips that a lab makes, applied to a campaign of the rig: what the recordings say then, and by how much χ² changes.
 
 χ² counts what the slip adds to the recordings' levels over gain, position and line scatter, or to their phases over
-line scatter. Where a slip changes nothing that a campaign can show, it is 0.
+line scatter. Where a slip changes nothing that a campaign can show, it is 0. Of levels and phases it is also worked out
+what of this no other cause can explain (`slip_rivals`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from proof.slip_rivals import LevelRivals, left_of_conjugated, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
 from underskin.mechanisms.unnamed.axes import recording_order
@@ -26,6 +29,11 @@ class Case:
     campaign: Campaign
     recorded: RecordedLines
     scatter: Floats
+
+    @cached_property
+    def rivals(self) -> LevelRivals:
+        """What else may move the levels."""
+        return LevelRivals(self.recorded, self.scatter)
 
     @property
     def entries(self) -> list[FrfRecording]:
@@ -56,7 +64,8 @@ def _scaled(case: Case, logarithm: Floats) -> Slip:
     mean = float((weight * logarithm).sum() / weight.sum())
     factors = np.exp(logarithm)
     entries = [_times(entry, float(factor)) for entry, factor in zip(case.entries, factors, strict=True)]
-    return Slip(case.with_entries(entries), float((weight * (logarithm - mean) ** 2).sum()))
+    chi2 = float((weight * (logarithm - mean) ** 2).sum())
+    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.left_of(logarithm)))
 
 
 def _times(entry: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
@@ -137,7 +146,9 @@ def conjugated(share: float) -> Make:
             _times(entry, 1.0, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)
         ]
         phase = 4 * case.recorded.exact.imag**2 / case.recorded.line_variance
-        return Slip(case.with_entries(entries), float(phase[turned].sum()))
+        chi2 = float(phase[turned].sum())
+        rivals = left_of_conjugated(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
+        return Slip(case.with_entries(entries), chi2, min(chi2, rivals))
 
     return make
 

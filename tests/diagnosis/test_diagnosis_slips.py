@@ -161,6 +161,25 @@ def test_a_factor_that_all_recordings_share_and_one_of_no_meaning_are_no_slips(
     assert named(inspect(changed(good, lambda entry, n: times(entry, 1.65 if off[n] else 1.0)), table)) == []
 
 
+@pytest.mark.parametrize("factor", [0.5**0.5, 2**0.5])
+def test_rms_is_told_beside_a_scatter_that_no_rig_has(factor: float, table: SigmaTable) -> None:
+    """A campaign of the rig whose places scatter: levels of two kinds look like a gain that scatters by 16 %."""
+    made, _ = from_dict(recorded_campaign(record(drawn(900500, 11, "none"))))
+    off = np.random.default_rng(11).random(len(made.recordings)) < 1 / 3
+    assert named(inspect(made, table)) == []
+    inspected = inspect(changed(made, lambda entry, n: times(entry, factor if off[n] else 1.0)), table)
+    assert named(inspected) == [Reason.AMPLITUDE_FACTOR]
+
+
+def test_a_warm_up_is_told_where_nothing_else_moves_the_levels(table: SigmaTable) -> None:
+    """A campaign of the rig of one sensor, its preloads in rising order, that starts at 0.8 of its level."""
+    made, _ = from_dict(recorded_campaign(record(drawn(900500, 14, "none"))))
+    order = recording_order(frf_recordings(made))
+    cold = changed(made, lambda entry, n: times(entry, 1 - 0.2 * float(np.exp(-order[n] / 3.5))))
+    assert named(inspect(made, table)) == []
+    assert named(inspect(cold, table)) == [Reason.WARM_UP]
+
+
 def shuffled(made: Campaign) -> Campaign:
     """Recorded in another order than listed, by `recorded_at`; without load cycles, which may age a sensor."""
     order = np.random.default_rng(3).permutation(len(made.recordings))
