@@ -29,7 +29,8 @@ AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, wh
 def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
     entry = compared(case)
     assert not is_miss(entry)
-    assert abs(entry["lost_own"]) < 2.0  # evidence at several bounds differs by one between equally good fits
+    own = entry["lost_own"]  # None where a better set was found before it
+    assert own is None or abs(own) < 2.0  # evidence at several bounds differs by one between equally good fits
 
 
 @pytest.mark.slow

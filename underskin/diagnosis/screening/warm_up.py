@@ -1,7 +1,8 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
 A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis explains
-as well, a first recording that is off alone, or a step after the first recordings that explains far more.
+as well, a first recording that is off alone, or a step after the first recordings, or of one sensor, that explains far
+more.
 """
 
 from collections.abc import Sequence
@@ -22,6 +23,7 @@ _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _MOST_SHARE = 0.35  # of the recordings: τ is a few of them
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
 _LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
+_ONSETS_OF_STEP = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # quantiles of the order: of one sensor alone
 _AMPLITUDE = 0.5  # prior standard deviation of A
 _GAIN = 3.2  # of ln evidence
 # ln evidence by which it must exceed what else may do it, less where that is rarer: a drift over the whole campaign,
@@ -53,7 +55,7 @@ def warming(levels: Levels) -> WarmUp | None:
         return None
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
-    first, *steps = _steps(levels)
+    first, *steps = [*_steps(levels), *_sensor_steps(levels)]
     slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
     ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
     columns = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
@@ -81,6 +83,18 @@ def _without(levels: Levels, drift: Floats) -> LevelFit:
 def _steps(levels: Levels) -> list[Floats]:
     """1 in the first recordings, as many as a warm-up may last."""
     return [(levels.order < last).astype(float)[:, None] for last in range(1, _LONGEST_STEP + 1)]
+
+
+def _sensor_steps(levels: Levels) -> list[Floats]:
+    """1 in the later recordings of one of several sensors, from some on."""
+    if levels.sensor.max() == 0:
+        return []
+    onsets = np.unique(np.quantile(levels.order, _ONSETS_OF_STEP).round())
+    return [
+        ((levels.sensor == sensor) & (levels.order >= onset)).astype(float)[:, None]
+        for sensor in range(int(levels.sensor.max()) + 1)
+        for onset in onsets
+    ]
 
 
 def _drift(levels: Levels, time: float) -> Floats:
