@@ -165,8 +165,12 @@ class _Template:
         return end + single
 
     def _is_full(self, index: int, line: str) -> bool:
-        """Whether a line has anything behind its first cell."""
-        return self.separator in line and any(self.lines.cells(index, line)[1:])
+        """Whether a line has anything behind its first cell; one whose quotes do not close is refused when its turn
+        comes."""
+        try:
+            return self.separator in line and any(self.lines.cells(index, line)[1:])
+        except FileError:
+            return True
 
     def _columns(self, start: int, end: int) -> list[Column]:
         """The field of each column and the factor to its unit, each field once."""

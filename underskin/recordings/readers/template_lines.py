@@ -1,13 +1,12 @@
 """The lines of the CSV template as rows of cells, which may be gone through any number of times."""
 
-import csv
 import re
 from collections.abc import Iterator, Sequence
 
 from underskin.errors import FileError
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.readers import text
-from underskin.recordings.readers.text_blocks import BlockText
+from underskin.recordings.readers.text_blocks import BlockText, split_lines
 
 _FIRST_LINE = 2000
 _TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
@@ -81,15 +80,8 @@ class TemplateLines:
     def plain(self, lines: Sequence[str], width: int) -> list[list[str]] | None:
         """The cells of lines, `width` each and not stripped; None where any line says nothing or has more, so that
         `cells` must tell."""
-        if any('"' in line for line in lines):
-            reader = csv.reader(lines, delimiter=self.separator, skipinitialspace=True, strict=True)
-            try:
-                rows = list(reader)
-            except csv.Error:
-                return None
-        else:
-            rows = [line.split(self.separator) for line in lines]
-        if len(rows) != len(lines) or any(map(_may_say_nothing, {row[0] for row in rows if row})):
+        rows = split_lines(lines, self.separator)
+        if rows is None or any(map(_may_say_nothing, {row[0] for row in rows if row})):
             return None
         if all(len(row) == width for row in rows):
             return rows

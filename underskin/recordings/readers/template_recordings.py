@@ -183,7 +183,12 @@ class _Recording:
         entries = {field: line[field] for field in COLUMNS if field in line}
         if any(value is not None for value in entries.values()):  # one missing beside others is for the checks
             for field, value in entries.items():
-                self.columns.setdefault(field, []).append([value])
+                parts = self.columns.setdefault(field, [])
+                last = parts[-1] if parts else None
+                if isinstance(last, list):
+                    last.append(value)
+                else:
+                    parts.append([value])
         once = {field: value for field, value in line.items() if field not in COLUMNS and value is not None}
         if contradiction := self.contradiction(once):
             return contradiction

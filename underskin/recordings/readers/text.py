@@ -11,7 +11,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 _NUMBER = re.compile(r"[+-]?(\d+([.]\d*)?|[.]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _LOOKED_AT, _MOSTLY = 4096, 0.8  # bytes of a text without a mark, and how many of a half must be zero
-_MINUS = "\N{MINUS SIGN}"
+MINUS = "\N{MINUS SIGN}"
 _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -126,7 +126,7 @@ def ungrouped(cell: str) -> str:
 
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, or None where it holds something else."""
-    cell = cell.strip().replace(_MINUS, "-")
+    cell = cell.strip().replace(MINUS, "-")
     if decimal == ",":
         if "." in cell:
             return None
