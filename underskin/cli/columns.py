@@ -9,10 +9,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
+from underskin.errors import ErrorCode, FileError, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, without_labels
+from underskin.recordings.readers.formats import ZIP
+from underskin.recordings.reading import only_sheet
 from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
@@ -79,12 +81,12 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 
 def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
-        source = sys.stdin.fileno() if path == STANDARD_INPUT else path
-        with open(source, encoding="utf-8-sig", newline="", closefd=path != STANDARD_INPUT) as file:
-            columns, labels = without_labels(from_csv(file.read()), allowed)
+        columns, labels = without_labels(from_csv(_text_of(path)), allowed)
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
-        raise unreadable("input", path, f"must be a readable CSV file ({reason})") from error
+        raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({reason})") from error
+    except FileError as error:
+        raise error.of_field("input", path) from None
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
     for name in columns:
@@ -92,6 +94,16 @@ def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dic
             words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
             raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
     return {name: _numbers(name, cells) for name, cells in columns.items()}, labels
+
+
+def _text_of(path: str) -> str:
+    """The text of a CSV file, or of the only sheet of a workbook."""
+    source = sys.stdin.fileno() if path == STANDARD_INPUT else path
+    with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
+        content = file.read()
+    if content.startswith(ZIP):
+        return only_sheet(content, path)
+    return content.decode("utf-8-sig")
 
 
 def write_csv(

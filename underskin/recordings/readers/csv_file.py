@@ -28,8 +28,12 @@ _SHOWN = 30  # letters of a cell in a message
 _HEAD, _SAMPLED = 10_000, 50  # lines of the beginning of a long file, and of each block behind, that show its style
 
 
+class NoTable(FileError):
+    """A text without a table of numbers."""
+
+
 def read(stream: BinaryIO, file: str) -> Contents:
-    """The channels of a text table; raises FileError that names the line."""
+    """The channels of a text table; raises FileError that names the line, NoTable where there is no table."""
     source = BlockText(stream, file)
     head, table = _table(source, file)
     headings = table_headings.find(head, table, file)
@@ -70,7 +74,7 @@ def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
         head = list(source.lines())
         table = table_rows.find(head)
     if table is None:
-        raise FileError(file, "", _no_table(head))
+        raise NoTable(file, "", _no_table(head))
     return head, table
 
 

@@ -26,7 +26,7 @@ from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.recordings.shown_values import shown
 from underskin.recordings.time_zone import TIME_ZONE
 
-_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE)
+_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)
 _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
 
