@@ -12,7 +12,8 @@ from rich.text import Text
 from underskin.errors import ErrorCode, FileError, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, without_labels
+from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, told, without_labels
+from underskin.prediction.domain_limits import Words
 from underskin.recordings.readers.formats import ZIP
 from underskin.recordings.reading import only_sheet
 from underskin.units import LAB, Floats, Mask
@@ -107,18 +108,26 @@ def _text_of(path: str) -> str:
 
 
 def write_csv(
-    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+    columns: Mapping[str, Floats],
+    inside: Mask,
+    limits: Words | None,
+    count: int,
+    names: Mapping[str, Sequence[str]] = _NO_NAMES,
 ) -> None:
-    """All columns and `status` as CSV on standard output, numbers in full, NaN where there is no value.
+    """All columns, `limit` and `status` as CSV on standard output, numbers in full, NaN where there is no value.
 
-    `names`: columns of text, one a row, that go first.
+    `names`: columns of text, one a row, that go first; `limits`: which limit each row exceeds that is not inside.
     """
     full = {name: np.broadcast_to(values, (count,)) for name, values in columns.items()}
-    sys.stdout.write(to_csv({**names, **full, "status": statuses(inside, count)}, "\n"))
+    sys.stdout.write(to_csv({**names, **full, **told(inside, limits, count)}, "\n"))
 
 
 def write_table(
-    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+    columns: Mapping[str, Floats],
+    inside: Mask,
+    limits: Words | None,
+    count: int,
+    names: Mapping[str, Sequence[str]] = _NO_NAMES,
 ) -> None:
     """Columns that are constant as a list, the others as a table, rounded; `names` go first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
@@ -131,20 +140,26 @@ def write_table(
         if name not in varying:
             listed.add_row(_NAMES[name][0], _rounded(name, float(values.flat[0])), _unit(name))
     if count == 1:
-        listed.add_row("status", *statuses(inside.flat[:1], 1))
+        listed.add_row("status", *_statuses(inside.flat[:1], limits, 1))
     console.print(listed)
     if count > 1:
-        console.print(_rows_table(varying, np.broadcast_to(inside, (count,)), names))
+        console.print(_rows_table(varying, _statuses(inside, limits, count), names))
 
 
-def _rows_table(columns: Mapping[str, Floats], inside: Mask, names: Mapping[str, Sequence[str]]) -> Table:
+def _statuses(inside: Mask, limits: Words | None, count: int) -> list[str]:
+    """The status of each row, with the limit that it exceeds."""
+    pairs = zip(statuses(inside, count), limits or [None] * count, strict=True)
+    return [f"{status}: {limit}" if limit else status for status, limit in pairs]
+
+
+def _rows_table(columns: Mapping[str, Floats], status: Sequence[str], names: Mapping[str, Sequence[str]]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
     for name in names:
         table.add_column(name, overflow="fold")
     for name in columns:
         table.add_column(Text(f"{_NAMES[name][1]}\n{_unit(name)}"), justify="right", overflow="fold")
     table.add_column("status", overflow="fold")
-    for number, row_status in enumerate(statuses(inside, len(inside))):
+    for number, row_status in enumerate(status):
         texts = (Text(each[number]) for each in names.values())
         rounded = (_rounded(name, values[number]) for name, values in columns.items())
         table.add_row(*texts, *rounded, row_status)

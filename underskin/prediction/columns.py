@@ -40,6 +40,12 @@ def statuses(inside: Mask, count: int) -> list[str]:
     return ["ok" if row else "out_of_domain" for row in np.broadcast_to(inside, (count,)).tolist()]
 
 
+def told(inside: Mask, limits: Sequence[str | None] | None, count: int) -> dict[str, list[str]]:
+    """The last columns of a CSV: of each of `count` rows which limit it exceeds, empty where none, and its status."""
+    words = [""] * count if limits is None else [text or "" for text in limits]
+    return {"limit": words, "status": statuses(inside, count)}
+
+
 def from_csv(text: str) -> dict[str, list[str]]:
     """The cells of each column, by the names in the header; lines without a cell are skipped.
 
