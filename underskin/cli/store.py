@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from underskin.cli.alike import told_together
 from underskin.errors import UnderskinError
 from underskin.findings.formatting import significant
 
@@ -119,9 +120,8 @@ def _is_export(file: Path) -> bool:
 def _lines(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
     accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
     lines = [(False, _refused(error)) for error in result["errors"]]
-    lines += [
-        (False, f"{entry['id']} {_refused(error)}") for entry in result["recordings"] for error in entry["errors"]
-    ]
+    refused = ((entry["id"], _refused(error)) for entry in result["recordings"] for error in entry["errors"])
+    lines += [(False, f"{names} {reason}") for names, reason in told_together(refused)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"
