@@ -66,14 +66,27 @@ def solve(block: FiniteBlock, a: float, rho: Floats, order: int = 5) -> Solution
 
     `order` is that of the displacements, at least 4. Raises SolverError if the iteration does not converge.
     """
-    axes = _grid(block, a, order)
-    problem = _Problem(axes, block.bonded)
-    with threadpool_limits(1):  # many small products: threads cost more than they bring
-        displacement, pressure, iterations = problem.solve(_hertz_load(axes, a))
+    axes, problem, displacement, pressure, iterations = _solved(block, a, order)
     traction = _traction(axes, block.depth - 1.0, displacement, pressure)
     sigma = [-2 * np.pi / 3 * _disc_mean(axes, traction, radius) for radius in rho]
     force = -4 * float(axes[0].integral @ traction @ axes[1].integral)
     return Solution(np.array(sigma), force, problem.unknowns, iterations)
+
+
+def displacements(block: FiniteBlock, a: float, points: tuple[Floats, Floats, Floats], order: int = 5) -> Floats:
+    """Displacements (3, x, y, z) in units of F/(Gh) on the grid of `points` x, y ≥ 0 and z above the base, as `solve`'s
+    arguments else; x and y lie in the quarter that is solved."""
+    axes, _, displacement, _, _ = _solved(block, a, order)
+    factors = [axis.values(along) for axis, along in zip(axes, points, strict=True)]
+    return np.stack([_kronecker(factors, component) for component in displacement])
+
+
+def _solved(block: FiniteBlock, a: float, order: int) -> tuple[Axes, "_Problem", Floats, Floats, int]:
+    axes = _grid(block, a, order)
+    problem = _Problem(axes, block.bonded)
+    with threadpool_limits(1):  # many small products: threads cost more than they bring
+        displacement, pressure, iterations = problem.solve(_hertz_load(axes, a))
+    return axes, problem, displacement, pressure, iterations
 
 
 def _grid(block: FiniteBlock, a: float, order: int) -> Axes:

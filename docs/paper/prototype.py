@@ -20,6 +20,10 @@ INDENTERS_MM = (4.0, 10.0)
 PRELOADS_N = (0.5, 1.0, 2.0, 3.0)
 DYNAMIC_FORCE_N = 0.09
 BEST_FIT_D33_PC_PER_N = 14.0
+ARRAY = ((41, 3.0, 22.0), (12, 1.0, 14.0))  # sensors, preload [N], the d33 that fits them [pC/N]
+LINEAR_UP_TO_MPA = 2.0
+FLAT_UP_TO_HZ = 130.0
+CYLINDER_DIAMETER_MM, CYLINDER_HEIGHT_MM = 4.0, 2.5
 
 SKIN = Skin.from_lab(thickness_mm=THICKNESS_MM, youngs_modulus_mpa=MODULUS_MPA, sensor_radius_mm=SENSOR_RADIUS_MM)
 RHO = float(SKIN.rt_over_h)
@@ -42,10 +46,15 @@ class Press:
     table_error: Floats
 
 
-def press(table: SigmaTable, indenter_radius_mm: float, preload_n: ArrayLike) -> Press:
-    """The prototype under a sphere."""
+def press(
+    table: SigmaTable, indenter_radius_mm: float, preload_n: ArrayLike, youngs_modulus_mpa: float = MODULUS_MPA
+) -> Press:
+    """The prototype under a sphere, or one of another modulus."""
     preload = np.asarray(preload_n, dtype=float)
-    response = transmission(table, SKIN, Indenter.from_lab(indenter_radius_mm=indenter_radius_mm), preload)
+    skin = Skin.from_lab(
+        thickness_mm=THICKNESS_MM, youngs_modulus_mpa=youngs_modulus_mpa, sensor_radius_mm=SENSOR_RADIUS_MM
+    )
+    response = transmission(table, skin, Indenter.from_lab(indenter_radius_mm=indenter_radius_mm), preload)
     return Press(
         indenter_radius_mm=indenter_radius_mm,
         preload_n=preload,

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from docs.paper import deep_layer
-from docs.paper.block import FiniteBlock, solve
+from docs.paper.block import FiniteBlock, displacements, solve
 from tablegen import linear_layer
 from underskin.physics import half_space
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import hertz_transform
 
 A = 0.289
 RHO = np.array([0.0, 0.2, 0.6])
@@ -70,3 +72,15 @@ def test_a_narrow_column_carries_the_mean_pressure() -> None:
     side = 0.25
     column = solve(FiniteBlock(side, side, 2.0), 0.1, np.array([0.0, 0.1]), order=4)
     np.testing.assert_allclose(column.sigma, 2 * np.pi / 3 / side**2, rtol=1e-6)
+
+
+def test_the_displacement_under_the_load_is_the_endless_layers() -> None:
+    """w(0) = F/(4πG) ∫ K(k) J(k) dk in units of h: K the layer's compliance, J the Hertz pressure's transform."""
+    x, weight = np.polynomial.legendre.leggauss(400)
+    k, weight = 200 * (1 + x), 200 * weight
+    exact = float(weight @ (Layer().compliance(k).value * hertz_transform(k * A))) / (4 * np.pi)
+    points = (np.array([0.0, 1.0]), np.array([0.0]), np.array([0.0, 1.0]))
+    field = displacements(FiniteBlock(16.0, 16.0, 1.0), A, points, order=5)
+    assert -field[2, 0, 0, 1] == pytest.approx(exact, rel=1e-3)
+    np.testing.assert_allclose(field[:, :, :, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(field[:2, 0, 0, 1], 0.0, atol=1e-12)

@@ -12,7 +12,8 @@ from rich.text import Text
 from underskin.errors import ErrorCode, FileError, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, told, without_labels
+from underskin.prediction.columns import statuses, to_csv, told
+from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.prediction.domain_limits import Words
 from underskin.recordings.readers.formats import ZIP
 from underskin.recordings.reading import only_sheet
@@ -82,29 +83,25 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 
 def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
-        columns, labels = without_labels(from_csv(_text_of(path)), allowed)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({reason})") from error
+        found = from_csv(_content(path), allowed)
+    except OSError as error:
+        raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({error.strerror})") from error
     except FileError as error:
         raise error.of_field("input", path) from None
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
-    for name in columns:
-        if name not in allowed:
-            words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
-            raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
-    return {name: _numbers(name, cells) for name, cells in columns.items()}, labels
+    for name in found.unknown:
+        words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
+        raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
+    return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
 
 
-def _text_of(path: str) -> str:
-    """The text of a CSV file, or of the only sheet of a workbook."""
+def _content(path: str) -> bytes:
+    """A CSV file, or the only sheet of a workbook as one."""
     source = sys.stdin.fileno() if path == STANDARD_INPUT else path
     with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
         content = file.read()
-    if content.startswith(ZIP):
-        return only_sheet(content, path)
-    return content.decode("utf-8-sig")
+    return only_sheet(content, path).encode() if content.startswith(ZIP) else content
 
 
 def write_csv(

@@ -7,8 +7,9 @@ import numpy as np
 
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded, with_hidden
 from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.curve_knowledge import hidden_factors, may_hide
 from underskin.diagnosis.validation import cross_validation
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 
@@ -108,7 +109,14 @@ def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[st
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
-    """Young's modulus under an explanation, with its 95 % interval; from factors on what was declared, or free."""
+    """Young's modulus under an explanation, with its 95 % interval, which allows for what an apparent modulus hides;
+    from factors on what was declared, or free."""
+    mechanisms = problem.lines.mechanisms
+    hiding = may_hide(mechanisms, problem.lines.campaign, mechanisms.named)
+    return with_hidden(_apparent_modulus(problem, explanation), hidden_factors(hiding, explanation.names))
+
+
+def _apparent_modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
     fitted = parameter(explanation, place_of(explanation, "youngs_modulus"))
     declared = problem.lines.campaign.skin.youngs_modulus_mpa
     if declared is None:

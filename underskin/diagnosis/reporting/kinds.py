@@ -3,11 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, mixture_quantile, parameter, place_of, rounded
+from underskin.diagnosis.reporting.numbers import parameter, place_of, rounded, with_hidden
 from underskin.diagnosis.selection.curve_knowledge import OfCurves
 from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.findings.formatting import in_percent
@@ -36,12 +34,7 @@ def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
 
 def _of_elastomer(modulus: Mapping[str, Any], known: OfCurves) -> dict[str, Any]:
     """With an interval that allows for what an apparent modulus hides, and for how the skin's may differ."""
-    deviation = np.log(modulus["high"] / modulus["low"]) / (2 * SDS_OF_95)
-    hidden, shares = np.array(known.hidden).T
-    means, deviations = np.log(modulus["value"]) - hidden, np.full(len(hidden), np.hypot(deviation, known.tolerance))
-    levels = {"value": 0.5, "low": 0.025, "high": 0.975}
-    ends = {key: np.exp(mixture_quantile(level, shares, means, deviations)) for key, level in levels.items()}
-    return {**modulus, **{key: rounded(float(at)) for key, at in ends.items()}}
+    return with_hidden(modulus, known.hidden, known.tolerance)
 
 
 def _entry(stated: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Numbers as a report states them: rounded to stated digits, parameters with their 95 % intervals."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,21 @@ def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Fl
 
     far = 8 * deviations.max()
     return float(brentq(beyond, means.min() - far, means.max() + far))
+
+
+def with_hidden(
+    modulus: Mapping[str, Any], hidden: Sequence[tuple[float, float]], tolerance: float = 0.0
+) -> dict[str, Any]:
+    """A modulus with its 95 % interval, of which the logarithm may be too large by `hidden` values with probabilities,
+    and differs by a standard deviation of `tolerance` from the one sought."""
+    if len(hidden) == 1 and tolerance == 0:
+        return dict(modulus)
+    deviation = np.log(modulus["high"] / modulus["low"]) / (2 * SDS_OF_95)
+    excess, shares = np.array(hidden).T
+    means, deviations = np.log(modulus["value"]) - excess, np.full(len(excess), np.hypot(deviation, tolerance))
+    levels = {"value": 0.5, "low": 0.025, "high": 0.975}
+    ends = {key: np.exp(mixture_quantile(level, shares, means, deviations)) for key, level in levels.items()}
+    return {**modulus, **{key: rounded(float(at)) for key, at in ends.items()}}
 
 
 def place_of(explanation: Explanation, name: str) -> int:

@@ -5,7 +5,7 @@ kinds then leaves something to be known. Mechanisms of the curves alone (a stage
 those that an apparent modulus may hide whatever the curves look like (friction at the platens).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,15 +15,18 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.selection.priors import least_evidence, log_prior
+from underskin.diagnosis.selection.unknown_thickness import LayerOfUnknownThickness
 from underskin.mechanisms.base import Kind, Unsupported
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
 
 _BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
-_EXTRAPOLATED = 0.7  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_EXTRAPOLATED = 0.15  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_RATIO = 0.9  # correlation of quantities that are known as a ratio alone
 _HIDES = 0.5  # prior of what does not show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
@@ -57,6 +60,13 @@ class OfCurves:
         """Standard deviation of the logarithm of the skin's modulus."""
         return float(np.hypot(np.sqrt(self.covariance[0, 0]), self.tolerance))
 
+    def is_ratio(self, row: int) -> bool:
+        """Whether a quantity is known as a ratio to another one of its mechanism alone."""
+        mechanism = self.quantities[row][0]
+        deviation = np.sqrt(np.diag(self.covariance))
+        alike = np.abs(self.covariance[row]) > _RATIO * deviation[row] * deviation
+        return any(alike[other] and one[0] == mechanism for other, one in enumerate(self.quantities) if other != row)
+
     @property
     def log_weight(self) -> float:
         """The logarithm of the sum over the curves' own mechanisms."""
@@ -72,8 +82,7 @@ class OtherKind:
         self._explanations = {frozenset(entry.names): entry for entry in explanations}
         mechanisms, conditions = problem.lines.mechanisms, problem.lines.campaign
         self.supported = tuple(name for name in mechanisms.named if self._supports(name))
-        may_hide = {name: mechanisms[name].hidden_in_modulus(conditions) for name in self.supported}
-        self._may_hide = {name: values for name, values in may_hide.items() if values}
+        self._may_hide = may_hide(mechanisms, conditions, self.supported)
         self.found: dict[frozenset[str], OfCurves] = {}
 
     def _supports(self, name: str) -> bool:
@@ -117,7 +126,7 @@ class OtherKind:
             for entry in (without, *beside)
         )
         quantities, mean, covariance = _mixture(each, both)
-        hidden = self._hidden(both)
+        hidden = hidden_factors(self._may_hide, both)
         values, shares = np.array(hidden).T
         mean[0] -= shares @ values
         covariance[0, 0] += shares @ values**2 - (shares @ values) ** 2
@@ -132,20 +141,30 @@ class OtherKind:
             self._explanations[names] = explanation
         return self._explanations[names]
 
-    def _hidden(self, both: frozenset[str]) -> tuple[tuple[float, float], ...]:
-        """What the apparent modulus may hide besides this set, with probabilities."""
-        hidden = [(0.0, 1.0)]
-        for values in (values for name, values in self._may_hide.items() if name not in both):
-            each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
-            hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
-        return tuple(hidden)
+
+def may_hide(mechanisms: Known, conditions: Conditions, names: Iterable[str]) -> Mapping[str, Sequence[float]]:
+    """Mechanisms that an apparent modulus may hide, with the logarithms of by how much it may be too large."""
+    hidden = {name: mechanisms[name].hidden_in_modulus(conditions) for name in names}
+    return {name: values for name, values in hidden.items() if values}
+
+
+def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]) -> tuple[tuple[float, float], ...]:
+    """By how much the logarithm of an apparent modulus may be too large by mechanisms of `hiding` that are not among
+    those `shown`, with probabilities."""
+    hidden = [(0.0, 1.0)]
+    for values in (values for name, values in hiding.items() if name not in shown):
+        each = [(0.0, 1 - _HIDES), *((value, _HIDES / len(values)) for value in values)]
+        hidden = [(one + more, weight * other) for one, weight in hidden for more, other in each]
+    return tuple(hidden)
 
 
 def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
-    """The curves of one kind of a campaign, its modulus free; mechanisms `without` which all is to be explained."""
+    """The curves of one kind of a campaign, its modulus free and, of a layer, its thickness; mechanisms `without` which
+    all is to be explained."""
     mechanisms = Known({MODULUS_ERROR, *without})
     free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
     mechanisms.bind(free, table, kind)
+    mechanisms.replace(LayerOfUnknownThickness())
     return FittingProblem(replace(curve_lines(free, kind), mechanisms=mechanisms), table)
 
 

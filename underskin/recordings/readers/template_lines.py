@@ -21,7 +21,7 @@ def separator_of(start: str) -> str | None:
 
 def _first_cells(line: str, separator: str) -> list[str]:
     try:
-        return text.cells(line, separator)[:2]
+        return [cell.lower() for cell in text.cells(line, separator)[:2]]
     except ValueError:
         return []
 
