@@ -206,6 +206,22 @@ def test_declared_entities_are_refused(encoding: str) -> None:
     assert "declares a document type or entities" in error.reason
 
 
+NOT_READ = ("docProps/app.xml", "_rels/.rels", "xl/theme/theme1.xml")
+
+
+def parts() -> list[str]:
+    with zipfile.ZipFile(io.BytesIO(workbook({"May": cells(PLAIN)}))) as whole:
+        return [name for name in whole.namelist() if name not in NOT_READ]
+
+
+@pytest.mark.parametrize("part", parts())
+def test_xml_that_is_cut_in_a_sound_archive_is_refused(part: str) -> None:
+    def half(name: str, content: bytes) -> bytes:
+        return content[: len(content) // 2] if name == part else content
+
+    refusal(with_parts(workbook({"May": cells(PLAIN)}), half))
+
+
 def test_a_damaged_workbook_is_named_as_such() -> None:
     data = workbook({"May": cells(PLAIN)})
     assert "damaged workbook" in refusal(data[: len(data) // 2]).reason
