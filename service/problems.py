@@ -166,9 +166,9 @@ def parsed(kind: type[_Model], document: Any) -> _Model:
 # Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.
 _KNOWN = {
     "greater_than": (ErrorCode.OUT_OF_RANGE, ""),
-    "greater_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at least 0"),
+    "greater_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at least {ge:g}"),
     "less_than": (ErrorCode.OUT_OF_RANGE, ""),
-    "less_than_equal": (ErrorCode.OUT_OF_RANGE, ""),
+    "less_than_equal": (ErrorCode.OUT_OF_RANGE, "must be at most {le:g}"),
     "missing": (ErrorCode.REQUIRED, "is required"),
     "extra_forbidden": (ErrorCode.UNKNOWN_FIELD, "is not a field of this request"),
     "float_type": (ErrorCode.WRONG_TYPE, "must be a number (NaN and null are not)"),
@@ -194,7 +194,7 @@ def _as_invalid_input(detail: Mapping[str, Any]) -> InvalidInput:
     return InvalidInput(
         names[0] if names else "body",
         None if detail["type"] == "missing" else detail.get("input"),
-        words or message[:1].lower() + message[1:],
+        words.format(**detail.get("ctx", {})) or message[:1].lower() + message[1:],
         index=indices[0] if indices else None,
         code=code,
     )

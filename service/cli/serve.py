@@ -22,6 +22,7 @@ from service.store import open_store
 from underskin import ExtensionError, TableError
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
+from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 
@@ -44,6 +45,7 @@ def serve(
         use_folder_of_lab(settings)
         CATALOGUE.load()  # what other packages add is refused here, not at the first file or diagnosis
         formats_of_other_packages()
+        ParsingLimits.from_environment()
         store = open_store(settings.database_url, settings.data)
         requirement = KeyRequirement(keys, store)
         requirement.look()

@@ -1,7 +1,7 @@
 """Storing the campaigns of uploads in one transaction; a repeated request is answered as before."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,11 +136,17 @@ def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions
     if good and not (options.all_or_nothing and spoilt):
         return
     errors = [error for entry in arrived for error in _flat(entry, many=len(arrived) > 1)]
-    detail = f"Nothing was kept: {errors[0]['field']} {errors[0]['allowed']}" if errors else "No campaign was sent."
+    detail = f"Nothing was kept: {_first(arrived, errors[0])}" if errors else "No campaign was sent."
     more = len(errors) - 1 + sum(entry.unlisted for entry in arrived)
     if more > 0:
         detail += f"; and {more} more"
     raise Refusal(422, detail, title="Invalid input", errors=errors[:_MOST_ERRORS])
+
+
+def _first(arrived: Sequence[CheckedCampaign], error: Mapping[str, Any]) -> str:
+    """The first error in words; the field names the file where there are many."""
+    file = f"{arrived[0].file}: " if len(arrived) == 1 and arrived[0].file else ""
+    return f"{file}{error['field']} {error['allowed']}"
 
 
 def _flat(campaign: CheckedCampaign, *, many: bool) -> list[dict[str, Any]]:

@@ -28,7 +28,7 @@ def hot_route(table: SigmaTable) -> HotRoute:
             return None
         if values is None:
             return None
-        return dumps({**origin, "sigma": values[0], "rel_error": values[1], "status": "ok"})
+        return dumps({**origin, "sigma": values[0], "rel_error": values[1], "limit": None, "status": "ok"})
 
     origin = {"model": "layer", "table_sha256": table.sha256}
     return one

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, InstanceOf, Tag, WithJsonSchema
 
 from underskin.findings.codes import FindingCode
-from underskin.prediction.columns import statuses, to_csv
+from underskin.prediction.columns import statuses, to_csv, told
+from underskin.prediction.domain_limits import Words
 from underskin.units import Floats
 
 Status = Literal["ok", "out_of_domain"]
@@ -76,6 +77,13 @@ class AnswerInColumns(BaseModel):
         description="Per row: `ok`, or `out_of_domain` (values that depend on σ are null, never extrapolated)."
     )
 
+    limit: list[str | None] | None = Field(
+        default=None,
+        description="Of each row that is `out_of_domain` which limit it exceeds, with the highest force where a force "
+        "does it; null where all rows are `ok`.",
+        examples=[[None, "L = 1.17 exceeds 0.1: at most 25.6 N"]],
+    )
+
 
 class FindingModel(BaseModel):
     """A value that looks wrong."""
@@ -91,7 +99,7 @@ class Columns:
     """An answer: columns that broadcast to `rows`, which rows are inside the domain, and values for all rows.
 
     A column may have a second axis (lines of a spectrum), named by `line_hz`. `names`: columns of text, one a row, that
-    go before the others.
+    go before the others. `limits`: of each row that is not inside which limit it exceeds.
     """
 
     rows: int
@@ -102,6 +110,7 @@ class Columns:
     shared: Mapping[str, Any] = field(default_factory=dict)
     line_hz: Floats | None = None
     names: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    limits: Words | None = None
 
     def full(self, name: str) -> Floats:
         """A column in its full length, contiguous."""
@@ -121,6 +130,7 @@ class Columns:
             **self.shared,
             **self.names,
             **{name: self.full(name) for name in self.columns},
+            "limit": self.limits,
             "status": _json_of_statuses(np.broadcast_to(self.inside, (self.rows,))),
         }
         return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -131,6 +141,7 @@ class Columns:
             "model": self.model,
             "table_sha256": self.table_sha256,
             **{name: self.full(name)[0] for name in self.columns},
+            "limit": self.limits[0] if self.limits else None,
             "status": self.status()[0],
         }
         return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
@@ -145,7 +156,7 @@ class Columns:
             elif self.line_hz is not None:
                 frequencies = self.line_hz.tolist()
                 columns |= {f"{name}[{one!r} Hz]": line for one, line in zip(frequencies, values.T, strict=True)}
-        return to_csv({**columns, "status": self.status()}, "\r\n").encode()
+        return to_csv({**columns, **told(self.inside, self.limits, self.rows)}, "\r\n").encode()
 
     def npz(self) -> bytes:
         """The answer as arrays in NumPy's .npz, uncompressed, by the names of the JSON; what is null there is left out.
@@ -159,6 +170,7 @@ class Columns:
             **self.shared,
             **self.names,
             **{name: self.full(name) for name in self.columns},
+            "limit": None if self.limits is None else np.array([words or "" for words in self.limits]),
             "status": np.full(self.rows, "ok") if inside.all() else np.where(inside, "ok", "out_of_domain"),
         }
         if "findings" in self.shared:

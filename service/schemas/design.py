@@ -59,6 +59,7 @@ class DesignAnswer(BaseModel):
     status: Literal["ok", "out_of_domain"] = Field(
         description="`out_of_domain`: outside the table, and null what depends on it; never extrapolated."
     )
+    limit: str | None = Field(description="Which limit it exceeds, with the highest force; null where it is `ok`.")
     contact_radius_mm: float = Field(description="Radius a of the contact, Hertz [mm].")
     a_over_h: float = Field(description="a/h.")
     rt_over_h: float = Field(description="rT/h.")

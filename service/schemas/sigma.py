@@ -48,4 +48,5 @@ class OneSigma(BaseModel):
     table_sha256: str | None = Field(description="SHA-256 of the table that was read; null where none was.")
     sigma: float | None = Field(description="σ [-]: charge = d33 (3/2) (rT/h)² σ F; null outside the domain.")
     rel_error: float | None = Field(description="Bound on σ's relative error [-].")
+    limit: str | None = Field(description="Which limit it exceeds; null where it is `ok`.")
     status: Status = Field(description="`ok`, or `out_of_domain`.")

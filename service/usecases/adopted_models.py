@@ -1,6 +1,6 @@
 """A skin's adopted model: adopted, shown with its evidence, and from the store to rows of a request."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -16,10 +16,12 @@ from service.store import AnyRow, Conflict, Database, diagnoses, models, skins
 from service.usecases.mechanisms import catalogue
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
-from underskin.prediction.answers import pressed
+from underskin.prediction.answers import limits_of_pressed, pressed
+from underskin.prediction.domain_limits import NOT_FINITE, Words
+from underskin.prediction.pressed_skin import Transmission
 from underskin.recordings.conditions import frf_conditions
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Complexes, Floats, finite, non_negative
+from underskin.units import Complexes, Floats, Mask, finite, non_negative
 
 # Imported where it is needed: signal processing takes a second to load, which a start need not wait for.
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ _LARGEST_LINES = 100_000  # distinct rows times frequencies: some seconds
 _MOST_KNOWN = 100
 _known: "dict[str, AdoptedModel]" = {}  # by diagnosis, which do not change once done
 _ANY_LINE = np.array([1.0])
+_OUTSIDE = "outside the tables, or the range of the law, by the adopted model"
 _Responses = tuple[Complexes, NDArray[np.bool_]]
 
 
@@ -122,6 +125,12 @@ class RowsUnderModel:
     _request: PressedSkinColumns
     _respond: "partial[_Responses]"  # of the distinct rows, at frequencies
     _which: NDArray[np.intp]  # of each row
+    _by_paper: Callable[[Mask], Words | None]  # which limit of the paper's model each row exceeds that is not inside
+
+    def limits(self, inside: Mask) -> Words | None:
+        """Of each row that is not inside which limit it exceeds; None where all are."""
+        limits = self._by_paper(inside)
+        return limits and [_OUTSIDE if words == NOT_FINITE else words for words in limits]
 
     def response(self, frequency_hz: Floats) -> Complexes:
         """FRF over d33 (rows, lines) [-]."""
@@ -161,7 +170,14 @@ def press(model_in_force: ModelInForce, table: SigmaTable, request: PressedSkinC
         "rel_error": np.hypot(transmitted.rel_error, model_in_force.model.unsure),
         "mean_stress_mpa": none,
     }
-    return RowsUnderModel(model_in_force, columns, on_plateau, inside[which], request, respond, which)
+    by_paper = partial(_limits, table, transmitted, given, count)
+    return RowsUnderModel(model_in_force, columns, on_plateau, inside[which], request, respond, which, by_paper)
+
+
+def _limits(
+    table: SigmaTable, transmitted: Transmission, given: Mapping[str, Floats], count: int, inside: Mask
+) -> Words | None:
+    return limits_of_pressed(table, transmitted, given, inside, count)
 
 
 def _distinct_columns(request: PressedSkinColumns, given: Mapping[str, Floats]) -> dict[str, Floats]:

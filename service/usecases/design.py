@@ -7,6 +7,8 @@ import numpy as np
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.prediction.answers import limits_of_pressed
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
@@ -28,12 +30,15 @@ def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
 def design_answer(table: SigmaTable, asked: DesignRequest, designed: Design) -> DesignAnswer:
     """A design in lab units."""
     contact, resolution = designed.contact, designed.resolution
+    given = {"preload_n": np.array(asked.preload_n), "poisson_ratio": np.array(INCOMPRESSIBLE)}
+    limits = limits_of_pressed(table, contact, given, contact.inside, 1)
     frf = None
     if asked.d33_pc_per_n is not None:
         d33 = checked("d33_pc_per_n", asked.d33_pc_per_n, units_checked=asked.units_checked)
         frf = _number(to_lab("frf_pc_per_n", contact.frf(d33)))
     return DesignAnswer(
         table_sha256=table.sha256,
+        limit=None if limits is None else limits[0],
         status="ok" if bool(contact.inside) else "out_of_domain",
         contact_radius_mm=float(to_lab("contact_radius_mm", contact.contact_radius)),
         a_over_h=float(contact.a_over_h),

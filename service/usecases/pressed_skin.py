@@ -34,7 +34,7 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     if frequency is not None:
         results |= _flat_spectra(frequency, results["frf_pc_per_n"], count)
         shared["frequency_hz"] = frequency
-    return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency)
+    return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency, limits=answer.limits)
 
 
 def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
@@ -58,7 +58,8 @@ def _adopted_frf(table: SigmaTable, store: Database, request: FrfColumns) -> Col
         results["frf_re_pc_per_n"] = lines.real
         results["frf_im_pc_per_n"] = np.where(np.isnan(lines.real), np.nan, lines.imag)
         shared["frequency_hz"] = frequency
-    return Columns(count, request.model, table.sha256, inside, results, shared, frequency)
+    limits = pressed.limits(inside)
+    return Columns(count, request.model, table.sha256, inside, results, shared, frequency, limits=limits)
 
 
 def _asked_lines(request: FrfColumns) -> Floats | None:
@@ -88,7 +89,7 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}
     shared = {"findings": [finding.in_columns() for finding in answer.findings]}
     columns = {**leading, **plateau, **measured, **results}
-    return Columns(count, request.model, table.sha256, answer.inside, columns, shared)
+    return Columns(count, request.model, table.sha256, answer.inside, columns, shared, limits=answer.limits)
 
 
 def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:
@@ -116,7 +117,8 @@ def _adopted_d33(table: SigmaTable, store: Database, request: D33Columns) -> Col
     findings = [finding.in_columns() for finding in plausibility.of_rows(measured["frf_pc_per_n"], value)]
     shared = {"model_id": model_in_force.model_id, "findings": findings}
     inside = pressed.inside & np.isfinite(value)
-    return Columns(len(pressed.level), request.model, table.sha256, inside, columns, shared)
+    limits = pressed.limits(inside)
+    return Columns(len(pressed.level), request.model, table.sha256, inside, columns, shared, limits=limits)
 
 
 def _given(request: D33Columns) -> dict[str, Floats]:

@@ -18,4 +18,5 @@ def sigma(table: SigmaTable, _: object, request: SigmaColumns) -> Columns:
         table_sha256=table.sha256 if request.model == "layer" else None,
         inside=answer.inside,
         columns=answer.columns,
+        limits=answer.limits,
     )

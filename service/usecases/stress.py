@@ -21,4 +21,5 @@ def stress(table: InfluenceTable, request: LoadCase) -> Columns:
         },
         names={"sensor": result.sensors},
         columns=result.columns,
+        limits=result.limits,
     )

@@ -133,6 +133,7 @@ def test_only_sensors_that_no_load_reaches_are_out_of_the_domain(http: httpx.Cli
     far = [{"id": "near", "x_mm": 0.0, "y_mm": 0.0}, {"id": "far", "x_mm": 40.0, "y_mm": 0.0}]
     found = posted(http, document({**PRESS, "x_mm": 0.0}, sensors=far))
     assert found["status"] == ["ok", "out_of_domain"]
+    assert found["limit"] == [None, f"no load within {found['reach_mm']:g} mm"]
     assert found["reach_mm"] == pytest.approx(30.0)
     assert [value is None for value in found["charge_pc"]] == [False, True]
     both = posted(http, document({**PRESS, "x_mm": 0.0}, {**PRESS, "x_mm": 40.0}, sensors=far))
@@ -147,7 +148,7 @@ def test_csv_has_a_row_a_sensor(http: httpx.Client) -> None:
     plain = posted(http, document(PRESS, sensors=sensors))
     reply = http.post("/v1/stress", json=document(PRESS, sensors=sensors), headers={"Accept": "text/csv"})
     header, *lines = csv.reader(io.StringIO(reply.text, newline=""))
-    assert header == ["sensor", "x_mm", "y_mm", "charge_pc", "charge_error_pc", "mean_stress_mpa", "status"]
+    assert header == ["sensor", "x_mm", "y_mm", "charge_pc", "charge_error_pc", "mean_stress_mpa", "limit", "status"]
     assert [float(line[3]) for line in lines] == plain["charge_pc"]
     assert [line[0] for line in lines] == names
 
@@ -160,6 +161,7 @@ def test_client_and_command_give_the_services_numbers(http: httpx.Client, server
     assert found.sensor == tuple(plain["sensor"])
     assert found.charge_pc.tolist() == plain["charge_pc"]
     assert found.status.tolist() == plain["status"]
+    assert [words or None for words in found.limit.tolist()] == (plain["limit"] or [None] * len(found.limit))
     file = tmp_path / "load.json"
     file.write_text(json.dumps(request), encoding="utf-8-sig")  # as some editors write it
     written = preloaded.run("stress", file, "--csv").stdout

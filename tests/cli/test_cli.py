@@ -70,7 +70,16 @@ def test_sigma_of_both_models() -> None:
 @pytest.mark.slow
 def test_table_shows_units_and_what_a_status_means() -> None:
     shown = run(*FRF, "--preload-n", "1,300").stdout
-    for text in ("thickness h", "2.5", "mm", "16", "MPa", "7.3958", "pC/N", "out_of_domain"):
+    for text in (
+        "thickness h",
+        "2.5",
+        "mm",
+        "16",
+        "MPa",
+        "7.3958",
+        "pC/N",
+        "out_of_domain: L = 1.17 exceeds 0.1: at most 25.6 N",
+    ):
         assert text in shown
     assert "The domain is a/h 0 to 3" in shown
     assert run(*FRF, "--preload-n", "1").stdout.split()[-2:] == ["status", "ok"]
@@ -111,7 +120,10 @@ def test_csv_file_written_by_a_spreadsheet(tmp_path: Path) -> None:
         ),
         (["sigma", "--a-over-h", "-1", "--rt-over-h", "1"], "a_over_h = -1.0: must be finite and at least 0"),
         (["d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", "nan"], "frf_pc_per_n = nan: must be finite"),
-        (["sigma", "--input", "nowhere.csv"], "input = 'nowhere.csv': must be a readable CSV file (No such file"),
+        (
+            ["sigma", "--input", "nowhere.csv"],
+            "input = 'nowhere.csv': must be a readable CSV or .xlsx file (No such file",
+        ),
         (["sigma", "--model", "jelly", "--a-over-h", "1"], "'jelly' is not one of"),
         (["sigma", "--a-over-h", "1", "--b-over-h", "1"], "No such option: --b-over-h"),
         (["guess"], "No such command 'guess'"),

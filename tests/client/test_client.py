@@ -54,6 +54,7 @@ def test_single_numbers_give_single_numbers(client: Client) -> None:
 def test_rows_outside_the_table_are_nan_and_spoil_no_other(client: Client) -> None:
     answer = client.frf(**PRESSED, preload_n=[1.0, 300.0], d33_pc_per_n=14.0)
     assert answer.status.tolist() == ["ok", "out_of_domain"]
+    assert answer.limit.tolist() == ["", "L = 1.17 exceeds 0.1: at most 25.6 N"]
     assert np.isnan(answer.frf_pc_per_n).tolist() == np.isnan(answer.sigma).tolist() == [False, True]
     assert np.isfinite(answer.contact_radius_mm).all()
 

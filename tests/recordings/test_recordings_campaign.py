@@ -93,12 +93,18 @@ def test_all_that_is_wrong_with_a_recording_is_said_at_once() -> None:
     _, problems = from_dict(document(FRF, {**FRF, "id": "r2", "preload_n": -1, "sensor": None, "x": 1}))
     assert {problem.field for problem in problems} == {"preload_n", "sensor", "x"}
     assert {problem.recording for problem in problems} == {"r2"}
+    wrong = {"preload_n": -1, "sensor": "s99", "frf_im_pc_per_n": [1.0], "coherence": None}
+    _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **wrong}))
+    assert [problem.field for problem in problems] == ["preload_n", "sensor", "frf_im_pc_per_n"]
 
 
 def test_of_thousands_of_unknown_fields_some_are_said() -> None:
     _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **{f"x{number}": 1 for number in range(5000)}}))
     assert 1 <= len(problems) < 100
     assert {problem.recording for problem in problems} == {"r2"}
+    wrong = {"preload_n": -1, "sensor": "s99", "frf_im_pc_per_n": [1.0], "coherence": None}
+    _, problems = from_dict(document(FRF, {**FRF, "id": "r2", **wrong}))
+    assert [problem.field for problem in problems] == ["preload_n", "sensor", "frf_im_pc_per_n"]
 
 
 def test_an_id_given_twice_is_refused_the_second_time() -> None:

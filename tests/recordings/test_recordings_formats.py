@@ -214,7 +214,7 @@ def test_matlab_structures_and_matrices() -> None:
         (b"PK\x03\x04" + bytes(40), "ZIP archive"),
         (b"TDSh" + bytes(40), "TDMS index"),
         (b"\x7fELF\x00\x01", "no format that is read here"),
-        (b"hello", "no table of numbers"),
+        (b"hello", "no line holds any; line 1 is .hello."),
         (b"TDSm" + bytes(4), "first segment"),
         (b"MATLAB 5.0 MAT-file" + bytes(300), "no MATLAB file"),
         (b"MATLAB 7.3 MAT-file" + bytes(600), "no MATLAB file"),

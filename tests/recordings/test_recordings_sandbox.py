@@ -17,7 +17,8 @@ from tests.support.instrument_files import hdf5, tdms
 from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers.sandbox import ParsingLimits, call_apart, parse_apart
+from underskin.recordings.readers.parsing_limits import ParsingLimits
+from underskin.recordings.readers.sandbox import call_apart, parse_apart
 
 
 @pytest.fixture
@@ -54,7 +55,9 @@ def test_a_small_file_that_unfolds_beyond_the_memory_limit_is_refused() -> None:
     with tempfile.TemporaryFile() as stream:
         stream.write(data)
         stream.flush()
-        with pytest.raises(FileError, match=r"bomb\.mat: .*more than 0\.1 GB of memory"):
+        with pytest.raises(
+            FileError, match=r"bomb\.mat: .*more than 107\.374 MB of memory \(UNDERSKIN_READING_MEMORY_MB\)"
+        ):
             parse_apart("MATLAB", stream, "bomb.mat", ParsingLimits(memory_bytes=107_374_182))
 
 

@@ -38,6 +38,12 @@ class ArrayStress:
     contact_radius_mm: Floats
     findings: list[Finding]
 
+    @property
+    def limits(self) -> list[str | None] | None:
+        """Of each sensor that is not inside that no load is near enough; None where all are."""
+        far = f"no load within {self.reach_mm:g} mm"
+        return None if self.inside.all() else [None if inside else far for inside in self.inside.tolist()]
+
 
 def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     """Charge and mean stress on every sensor.

@@ -64,7 +64,7 @@ Input = Annotated[
     str | None,
     typer.Option("--input", metavar="FILE", help="CSV file with columns named as the options (_ for -); - is stdin."),
 ]
-Csv = Annotated[bool, typer.Option("--csv", help="Write CSV (inputs, results, status) instead of a table.")]
+Csv = Annotated[bool, typer.Option("--csv", help="Write CSV (inputs, results, limit, status) instead of a table.")]
 Files = Annotated[
     list[Path] | None, typer.Argument(help="Campaigns, or files as instruments write them; each is inverted by itself.")
 ]
@@ -192,9 +192,9 @@ def _answer(
     everything = {**gathered, **answer.columns}
     columns.write_findings(answer.findings)
     if as_csv:
-        columns.write_csv(everything, answer.inside, count, labels)
+        columns.write_csv(everything, answer.inside, answer.limits, count, labels)
     else:
-        columns.write_table(everything, answer.inside, count, labels)
+        columns.write_table(everything, answer.inside, answer.limits, count, labels)
         if not answer.inside.all():
             typer.echo(f"The domain is {answer.domain}.")
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from underskin.cli.alike import told_together
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes
 from underskin.errors import InvalidInput
@@ -62,7 +63,8 @@ class InvertedFile:
             notes.append(f"no d33: {why}")
         refused = [(problem.recording, problem.as_error(problem.field)) for problem in self.reading.problems]
         refused += [(one.recording, one.result) for one in self.moduli if isinstance(one.result, InvalidInput)]
-        notes += [f"left out: recording {recording}: {why}" for recording, why in refused]
+        for names, why in told_together((recording, str(why)) for recording, why in refused):
+            notes.append(f"left out: recording{'s' if ', ' in names else ''} {names}: {why}")
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
         return notes

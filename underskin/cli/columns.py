@@ -9,11 +9,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
+from underskin.errors import ErrorCode, FileError, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import statuses, to_csv
+from underskin.prediction.columns import statuses, to_csv, told
 from underskin.prediction.csv_columns import CsvError, from_csv
+from underskin.prediction.domain_limits import Words
+from underskin.recordings.readers.formats import ZIP
+from underskin.recordings.reading import only_sheet
 from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
@@ -80,11 +83,11 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 
 def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
-        source = sys.stdin.fileno() if path == STANDARD_INPUT else path
-        with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
-            found = from_csv(file.read(), allowed)
+        found = from_csv(_content(path), allowed)
     except OSError as error:
-        raise unreadable("input", path, f"must be a readable CSV file ({error.strerror})") from error
+        raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({error.strerror})") from error
+    except FileError as error:
+        raise error.of_field("input", path) from None
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
     for name in found.unknown:
@@ -93,19 +96,35 @@ def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dic
     return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
 
 
-def write_csv(
-    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
-) -> None:
-    """All columns and `status` as CSV on standard output, numbers in full, NaN where there is no value.
+def _content(path: str) -> bytes:
+    """A CSV file, or the only sheet of a workbook as one."""
+    source = sys.stdin.fileno() if path == STANDARD_INPUT else path
+    with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
+        content = file.read()
+    return only_sheet(content, path).encode() if content.startswith(ZIP) else content
 
-    `names`: columns of text, one a row, that go first.
+
+def write_csv(
+    columns: Mapping[str, Floats],
+    inside: Mask,
+    limits: Words | None,
+    count: int,
+    names: Mapping[str, Sequence[str]] = _NO_NAMES,
+) -> None:
+    """All columns, `limit` and `status` as CSV on standard output, numbers in full, NaN where there is no value.
+
+    `names`: columns of text, one a row, that go first; `limits`: which limit each row exceeds that is not inside.
     """
     full = {name: np.broadcast_to(values, (count,)) for name, values in columns.items()}
-    sys.stdout.write(to_csv({**names, **full, "status": statuses(inside, count)}, "\n"))
+    sys.stdout.write(to_csv({**names, **full, **told(inside, limits, count)}, "\n"))
 
 
 def write_table(
-    columns: Mapping[str, Floats], inside: Mask, count: int, names: Mapping[str, Sequence[str]] = _NO_NAMES
+    columns: Mapping[str, Floats],
+    inside: Mask,
+    limits: Words | None,
+    count: int,
+    names: Mapping[str, Sequence[str]] = _NO_NAMES,
 ) -> None:
     """Columns that are constant as a list, the others as a table, rounded; `names` go first."""
     console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
@@ -118,20 +137,26 @@ def write_table(
         if name not in varying:
             listed.add_row(_NAMES[name][0], _rounded(name, float(values.flat[0])), _unit(name))
     if count == 1:
-        listed.add_row("status", *statuses(inside.flat[:1], 1))
+        listed.add_row("status", *_statuses(inside.flat[:1], limits, 1))
     console.print(listed)
     if count > 1:
-        console.print(_rows_table(varying, np.broadcast_to(inside, (count,)), names))
+        console.print(_rows_table(varying, _statuses(inside, limits, count), names))
 
 
-def _rows_table(columns: Mapping[str, Floats], inside: Mask, names: Mapping[str, Sequence[str]]) -> Table:
+def _statuses(inside: Mask, limits: Words | None, count: int) -> list[str]:
+    """The status of each row, with the limit that it exceeds."""
+    pairs = zip(statuses(inside, count), limits or [None] * count, strict=True)
+    return [f"{status}: {limit}" if limit else status for status, limit in pairs]
+
+
+def _rows_table(columns: Mapping[str, Floats], status: Sequence[str], names: Mapping[str, Sequence[str]]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
     for name in names:
         table.add_column(name, overflow="fold")
     for name in columns:
         table.add_column(Text(f"{_NAMES[name][1]}\n{_unit(name)}"), justify="right", overflow="fold")
     table.add_column("status", overflow="fold")
-    for number, row_status in enumerate(statuses(inside, len(inside))):
+    for number, row_status in enumerate(status):
         texts = (Text(each[number]) for each in names.values())
         rounded = (_rounded(name, values[number]) for name, values in columns.items())
         table.add_row(*texts, *rounded, row_status)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from underskin.cli.alike import told_together
 from underskin.errors import UnderskinError
 from underskin.findings.formatting import significant
 
@@ -52,9 +53,8 @@ def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
     """What became of one campaign: its id and d33, remarks, and what was refused of it."""
     accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
     lines = [(False, _refused(error)) for error in result["errors"]]
-    lines += [
-        (False, f"{entry['id']} {_refused(error)}") for entry in result["recordings"] for error in entry["errors"]
-    ]
+    refused = ((entry["id"], _refused(error)) for entry in result["recordings"] for error in entry["errors"])
+    lines += [(False, f"{names} {reason}") for names, reason in told_together(refused)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"

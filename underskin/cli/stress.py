@@ -28,6 +28,4 @@ def stress(
     stresses = answer(load_influence(), read_file(request, pressure_map))
     columns.write_findings(stresses.findings)
     write = columns.write_csv if csv else columns.write_table
-    write(stresses.columns, stresses.inside, len(stresses.sensors), {"sensor": stresses.sensors})
-    if not csv and not stresses.inside.all():
-        typer.echo(f"Out of the domain are sensors with no load within {stresses.reach_mm:g} mm.")
+    write(stresses.columns, stresses.inside, stresses.limits, len(stresses.sensors), {"sensor": stresses.sensors})

@@ -12,11 +12,13 @@ from underskin.units import Floats
 
 @dataclass(frozen=True)
 class ServiceAnswer:
-    """Common to all answers in columns: the model, hash of the table (None where none was read), status per row."""
+    """Common to all answers in columns: the model, hash of the table (None where none was read), status per row, and
+    per row which limit it exceeds, empty where it is `ok`."""
 
     model: str
     table_sha256: str | None
     status: NDArray[np.str_]
+    limit: NDArray[np.str_]
 
 
 @dataclass(frozen=True)

@@ -192,9 +192,12 @@ def _shared(name: str, value: Any) -> Any:
 def _field(name: str, document: Mapping[str, Any], single: bool) -> Any:
     """A field of the answer: an array, without its rows' axis where single numbers were given."""
     value = document.get(name)
+    if name == "limit":  # null where all rows are inside
+        words = value if value is not None else [""] * len(document["status"])
+        value = np.asarray([text or "" for text in words])
     if name == "findings":
         return tuple(answers.FindingAnswer(**finding) for finding in value or ())
     if not isinstance(value, list | np.ndarray):
         return value
-    array = np.asarray(value, None if name in ("status", "sensor") else float)  # None becomes NaN
+    array = np.asarray(value, None if name in ("status", "limit", "sensor") else float)  # None becomes NaN
     return array[0, ...] if single and name != "frequency_hz" else array

@@ -10,6 +10,8 @@ from underskin.findings.finding import Finding
 from underskin.physics import half_space
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import plausibility
+from underskin.prediction.columns import rows
+from underskin.prediction.domain_limits import Words, in_words, of_numbers, of_pressed
 from underskin.prediction.pressed_skin import Transmission, transmission
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, finite, non_negative, to_lab, to_si
@@ -21,11 +23,13 @@ _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 @dataclass(frozen=True)
 class ComputedColumns:
-    """Columns by field name, and which rows are inside the `domain` (NaN in what depends on σ where not)."""
+    """Columns by field name, and which rows are inside the `domain` (NaN in what depends on σ where not); `limits` says
+    of each other row which limit it exceeds, and is None where all are inside."""
 
     columns: Mapping[str, Floats]
     inside: Mask
     domain: str
+    limits: Words | None
     findings: Sequence[Finding] = ()
 
 
@@ -33,10 +37,13 @@ def sigma(table: SigmaTable, given: Mapping[str, Floats], model: SigmaModelName)
     """σ from `a_over_h`, `rt_over_h` and `load_parameter`; raises InvalidInput."""
     a, rho, load = (non_negative(name, given[name]) for name in ("a_over_h", "rt_over_h", "load_parameter"))
     if model == "layer":
-        answer, domain = table.sigma(a, rho, load), _table_domain(table)
+        answer, domain, limited = table.sigma(a, rho, load), _table_domain(table), table.domain
     else:
         answer, domain = half_space.sigma_in_domain(a, rho), f"a/h and rT/h 0 to {half_space.DOMAIN_END:g}"
-    return ComputedColumns({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain)
+        limited = dict.fromkeys(("a_over_h", "rt_over_h"), (0.0, half_space.DOMAIN_END))
+    numbers = {"a_over_h": a, "rt_over_h": rho, "load_parameter": load}
+    limits = in_words(answer.inside, rows(numbers), of_numbers(numbers, limited))
+    return ComputedColumns({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain, limits)
 
 
 def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
@@ -61,7 +68,7 @@ def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     reached = pressed(table, given, units_checked)
     d33 = checked("d33_pc_per_n", given["d33_pc_per_n"], units_checked=units_checked)
     frf = to_lab("frf_pc_per_n", reached.frf(d33))
-    return _skin_answer(table, reached, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
+    return _skin_answer(table, reached, given, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
 
 
 def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
@@ -92,7 +99,8 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
         "d33_pc_per_n": to_lab("d33_pc_per_n", value),
         "d33_uncertainty_pc_per_n": to_lab("d33_uncertainty_pc_per_n", uncertainty),
     }
-    answer = _skin_answer(table, reached, {**plateau, **lab_columns(reached), **results}, results["d33_pc_per_n"])
+    columns = {**plateau, **lab_columns(reached), **results}
+    answer = _skin_answer(table, reached, given, columns, results["d33_pc_per_n"])
     return replace(answer, findings=plausibility.of_rows(plateau["frf_pc_per_n"], results["d33_pc_per_n"]))
 
 
@@ -125,11 +133,24 @@ def lab_columns(reached: Transmission) -> dict[str, Floats]:
 
 
 def _skin_answer(
-    table: SigmaTable, reached: Transmission, columns: Mapping[str, Floats], result: Floats
+    table: SigmaTable,
+    reached: Transmission,
+    given: Mapping[str, Floats],
+    columns: Mapping[str, Floats],
+    result: Floats,
 ) -> ComputedColumns:
     """A row whose result is not finite is outside, as one that the table does not hold."""
     domain = f"{_table_domain(table)}, Poisson's ratio 0.5"
-    return ComputedColumns(columns, reached.inside & np.isfinite(result), domain)
+    inside = reached.inside & np.isfinite(result)
+    return ComputedColumns(columns, inside, domain, limits_of_pressed(table, reached, given, inside, rows(given)))
+
+
+def limits_of_pressed(
+    table: SigmaTable, reached: Transmission, given: Mapping[str, Floats], inside: Mask, count: int
+) -> Words | None:
+    """Which limit each row of a pressed skin exceeds that is not inside; `given`: preload and Poisson's ratio."""
+    limits = of_pressed(reached, given["preload_n"], table.domain)
+    return in_words(inside, count, limits, given["poisson_ratio"])
 
 
 def _table_domain(table: SigmaTable) -> str:

@@ -32,6 +32,12 @@ def statuses(inside: Mask, count: int) -> list[str]:
     return ["ok" if row else "out_of_domain" for row in np.broadcast_to(inside, (count,)).tolist()]
 
 
+def told(inside: Mask, limits: Sequence[str | None] | None, count: int) -> dict[str, list[str]]:
+    """The last columns of a CSV: of each of `count` rows which limit it exceeds, empty where none, and its status."""
+    words = [""] * count if limits is None else [text or "" for text in limits]
+    return {"limit": words, "status": statuses(inside, count)}
+
+
 def to_csv(columns: Mapping[str, Floats | Sequence[Any]], line_end: str) -> str:
     """Columns of equal length as CSV (RFC 4180): arrays in full, `NaN` where there is no value; lists as they are."""
     text = io.StringIO()

@@ -203,27 +203,29 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
     if not isinstance(kind, str) or kind not in KINDS:
         return None, [errors.not_one_of("kind", shown(kind), KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
-    if refused:
-        return None, refused
-    recording = KINDS[kind](**{**values, "kind": kind})
-    return recording, [*_unmet_needs(recording, skin), *_unequal_lengths(recording)]
+    known = {error.field for error in refused}
+    together = [*_unmet_needs(kind, document, values, skin), *_unequal_lengths(values)]
+    refused += [error for error in together if error.field not in known]
+    return (None if known else KINDS[kind](**{**values, "kind": kind})), refused
 
 
-def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInput]:
-    """What the recording's kind needs of the skin, and of its own fields together."""
+def _unmet_needs(
+    kind: str, document: Mapping[str, Any], values: Mapping[str, Any], skin: SkinDescription
+) -> list[InvalidInput]:
+    """What the recording's kind needs of the skin, and of its own fields together; `values`: those that are good."""
     refused = []
-    sensor = None if isinstance(recording, CompressionRecording) else recording.sensor
+    sensor = None if kind == "compression" else values.get("sensor")
     if sensor is not None and sensor not in (known.id for known in skin.sensors):
         refused.append(
             InvalidInput("sensor", sensor, "must be the id of one of the skin's sensors", code=ErrorCode.NOT_ONE_OF)
         )
-    if isinstance(recording, FrfRecording):
+    if kind == "frf":
         refused += [
             errors.required(f"skin.{name}", "required by a recording of kind frf")
             for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")
             if getattr(skin, name) is None
         ]
-        refused += _not_one_of_two_forms(recording)
+        refused += _not_one_of_two_forms(document)
     return refused
 
 
@@ -231,24 +233,21 @@ _LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
 _TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
 
 
-def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
+def _not_one_of_two_forms(document: Mapping[str, Any]) -> list[InvalidInput]:
     """An FRF or the time series it is estimated from: one of the two, whole."""
-    series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
-    lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
-    if recording.estimator is not None and not series:
-        return [errors.conflicting("estimator", recording.estimator, "must be absent where there is no time series")]
+    series = [name for name in _TIME_SERIES if document.get(name) is not None]
+    lines = [name for name in (*_LINES, "coherence") if document.get(name) is not None]
+    if document.get("estimator") is not None and not series:
+        allowed = "must be absent where there is no time series"
+        return [errors.conflicting("estimator", shown(document["estimator"]), allowed)]
     if series and lines:
         return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
     needed = _TIME_SERIES if series else _LINES
-    return [errors.required(name) for name in needed if getattr(recording, name) is None]
+    return [errors.required(name) for name in needed if document.get(name) is None]
 
 
-def _unequal_lengths(recording: Recording) -> list[InvalidInput]:
-    columns = {
-        entry.name: len(column)
-        for entry in fields(recording)
-        if isinstance(column := getattr(recording, entry.name), np.ndarray)
-    }
+def _unequal_lengths(values: Mapping[str, Any]) -> list[InvalidInput]:
+    columns = {name: len(column) for name, column in values.items() if isinstance(column, np.ndarray)}
     if len(set(columns.values())) < 2:
         return []
     first, length = next(iter(columns.items()))

@@ -14,9 +14,10 @@ from underskin.recordings.campaign import Campaign, FrfRecording, Recording, Rec
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.readers import formats
-from underskin.recordings.readers.sandbox import parse_apart
+from underskin.recordings.readers.sandbox import call_apart, parse_apart
 from underskin.recordings.rig_description import RigDescription
 
+_ONLY_SHEET = "underskin.recordings.readers.xlsx_file:only_sheet"
 _LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
 
 
@@ -80,6 +81,12 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
         if formats.is_parsed_apart(kind) or (kind != "JSON" and size > _LARGEST_TEXT):
             return parse_apart(kind, stream, name)
         return formats.parse(kind, stream, name)
+
+
+def only_sheet(content: bytes, name: str) -> str:
+    """The only sheet of a workbook as text, cells separated by tabs; raises FileError."""
+    with _opened(content, name) as stream:
+        return str(call_apart(_ONLY_SHEET, stream, name, what="XLSX")["text"])
 
 
 @contextmanager

@@ -10,7 +10,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,14 +21,14 @@ import orjson
 from underskin.errors import FileError
 from underskin.recordings.readers import hdf5_input
 from underskin.recordings.readers.hdf5_file import MAGIC
-from underskin.recordings.readers.sandbox import ParsingLimits, call_apart
+from underskin.recordings.readers.parsing_limits import ParsingLimits
+from underskin.recordings.readers.sandbox import call_apart
 from underskin.units import Floats
 
 SCHEMA = "skin-export/1"
 _ANY_SCHEMA = "skin-export/"
 _NOTHING = np.empty(0)
-# A column of a simulated campaign may hold one value, and its gzip next to nothing.
-_LIMITS = ParsingLimits(unfolding=1000.0)
+_EXPANSION = 1000.0  # a column of a simulated campaign may hold one value, and its gzip next to nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,26 +81,30 @@ def write_campaign(target: Any, name: str, campaign: ExportedCampaign) -> None:
         group.create_dataset(f"arrays/{column}", data=np.concatenate(parts), compression="gzip", shuffle=True)
 
 
+def _limits() -> ParsingLimits:
+    return replace(ParsingLimits.from_environment(), expansion=_EXPANSION)
+
+
 def is_export(stream: BinaryIO, file: str) -> bool:
     """Whether a file is an export, of whatever version, by its content; one that cannot be read is none."""
     stream.seek(0)
     if stream.read(len(MAGIC)) != MAGIC:
         return False
     try:
-        return bool(call_apart(f"{__name__}:_is_export", stream, file, what="HDF5", limits=_LIMITS)["is_export"])
+        return bool(call_apart(f"{__name__}:_is_export", stream, file, what="HDF5", limits=_limits())["is_export"])
     except FileError:
         return False
 
 
 def read_overview(stream: BinaryIO, file: str) -> Overview:
     """What an export holds, read in a child process; raises FileError where it is none, or damaged."""
-    return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA, limits=_LIMITS))
+    return Overview(**call_apart(f"{__name__}:_overview", stream, file, what=SCHEMA, limits=_limits()))
 
 
 def read_campaigns(stream: BinaryIO, file: str, names: Sequence[str]) -> list[ExportedCampaign]:
     """Some campaigns of an export, read in a child process; raises FileError."""
     content = call_apart(
-        f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_LIMITS
+        f"{__name__}:_campaigns", stream, file, orjson.dumps(names).decode(), what=SCHEMA, limits=_limits()
     )
     return [ExportedCampaign(**campaign) for campaign in content["campaigns"]]
 

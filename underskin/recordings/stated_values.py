@@ -45,7 +45,7 @@ def spring_constant(value: float | Property, stated: Stated, file: str) -> float
 
 def _number(given: str | float) -> float | None:
     """As a file writes it, with a point or a comma; None where a comma may part thousands."""
-    return text.number(given, text.decimal_mark([[given]], "\t")) if isinstance(given, str) else given
+    return text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
 
 
 def _said(value: Property, stated: Stated, file: str) -> str | float:

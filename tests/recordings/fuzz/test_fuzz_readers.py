@@ -16,6 +16,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.recordings.test_recordings_workbooks import with_values, workbook
 from tests.support import instrument_files as examples
 from tests.support.campaign_documents import EVERYTHING
 from tests.support.repository import ROOT
@@ -32,6 +33,7 @@ CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}"
 def sound_files() -> dict[str, list[bytes]]:
     """Small files without a fault, by format."""
     csv = b"Sample,palm\n\nforce,amplifier\n1000,0\n1100,-0.007\n900,0.007\n1000,-0.001\n"
+    sheet: list[list[object]] = [["force", "amplifier"], [1000, 0], [1100, -0.007], [900, 0.007], [1000, -0.001]]
     structure = {**examples.matlab_variables(), "run": {"force": examples.FORCE, "fs": 2.0}, "cell": [{"a": 1}, "x"]}
     datasets = examples.time_datasets()
     return {
@@ -47,6 +49,7 @@ def sound_files() -> dict[str, list[bytes]]:
             examples.matlab_73(examples.matlab_variables()),
         ],
         "HDF5": [examples.hdf5(EVERYTHING), without_checksums(examples.hdf5(EVERYTHING))],
+        "XLSX": [workbook({"run": sheet}), with_values(workbook({"run": [*sheet, ["=500+500", 0]]}), "1000")],
     }
 
 

@@ -44,6 +44,7 @@ def test_csv_both_ways_is_the_json_answer(http: httpx.Client) -> None:
     assert answer.headers["underskin-table-sha256"] == same["table_sha256"]
     assert answer.headers["underskin-model"] == same["model"] == "paper"
     assert columns.pop("status") == same["status"] == ["ok", "ok", "out_of_domain"]
+    assert [words or None for words in columns.pop("limit")] == same["limit"]
     for name, cells in columns.items():
         expected = [np.nan if value is None else value for value in same[name]]
         np.testing.assert_array_equal([float(cell) for cell in cells], expected, err_msg=name)

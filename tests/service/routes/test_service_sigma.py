@@ -175,7 +175,9 @@ def test_csv_out_has_all_digits_and_nan(http: httpx.Client) -> None:
     assert reply.headers["underskin-model"] == plain["model"] == "layer"
     assert reply.headers["underskin-table-sha256"] == plain["table_sha256"] == TABLE.sha256
     columns = table_of(reply.text)
-    assert list(columns) == ["sigma", "rel_error", "status"]
+    assert list(columns) == ["sigma", "rel_error", "limit", "status"]
+    assert columns["limit"] == ["", "a/h = 4 exceeds 3", ""]
+    assert plain["limit"] == [None, "a/h = 4 exceeds 3", None]
     assert columns["status"] == plain["status"] == ["ok", "out_of_domain", "ok"]
     for name in ("sigma", "rel_error"):
         assert columns[name][1] == "NaN"

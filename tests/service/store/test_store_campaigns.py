@@ -228,6 +228,8 @@ def test_odd_texts_are_refused_and_break_nothing(server: Server) -> None:
         assert server.http.get(f"/v1/{path}").status_code in (404, 422), path
     for query in ("skin=%00", "name_contains=%00%25", "cursor=-1", "cursor=9" + 30 * "9", "state=gone", "limit=0"):
         assert server.http.get(f"/v1/campaigns?{query}").status_code in (200, 422), query
+    for limit, allowed in ((0, "must be at least 1"), (201, "must be at most 200")):
+        assert server.http.get(f"/v1/campaigns?limit={limit}").json()["errors"][0]["allowed"] == allowed
     for band in ("inf", "nan", "1e308", "-1"):
         answer = server.http.get(f"/v1/campaigns/{name}/d33?band_low_hz=1&band_high_hz={band}")
         assert answer.status_code in (200, 422), band

@@ -11,13 +11,13 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import BinaryIO
 
-import numpy as np
-
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
 from underskin.recordings.readers import table_headings, table_rows, text
 from underskin.recordings.readers.table_headings import Headings
-from underskin.recordings.readers.table_rows import BLANKS, Section, Table
+from underskin.recordings.readers.table_rows import BLANKS, Table
+from underskin.recordings.readers.table_sections import Lines, Section, SectionReader
+from underskin.recordings.readers.text_blocks import BlockText
 from underskin.recordings.readers.unit_labels import unit
 
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
@@ -25,92 +25,104 @@ _WITH_UNIT = re.compile(r"(?P<value>[-+]?[\d.,]+([eE][-+]?\d+)?)\s*(?P<unit>[^\s
 _SEPARATOR_WORDS = {"\t": "tabs", ";": "semicolons", ",": "commas", BLANKS: "blanks"}
 _DECIMAL_WORDS = {".": "points", ",": "commas"}
 _SHOWN = 30  # letters of a cell in a message
+_HEAD, _SAMPLED = 10_000, 50  # lines of the beginning of a long file, and of each block behind, that show its style
+
+
+class NoTable(FileError):
+    """A text without a table of numbers."""
 
 
 def read(stream: BinaryIO, file: str) -> Contents:
-    """The channels of a text table; raises FileError that names the line."""
-    lines = text.lines(text.content(stream, file))
-    table = table_rows.find(lines)
-    if table is None:
-        raise FileError(
-            file,
-            "",
-            "holds no table of numbers alone, of at least two columns and two rows; names go into the CSV template",
+    """The channels of a text table; raises FileError that names the line, NoTable where there is no table."""
+    source = BlockText(stream, file)
+    head, table = _table(source, file)
+    headings = table_headings.find(head, table, file)
+    repeated = frozenset(head[line].strip() for line in headings.lines)
+    reader = SectionReader(table, repeated, file)
+    reader.take_all(source)
+    _refuse_other_rows(head[: table.start], reader.under, table, file)
+    left_out = _left_out(reader, table, headings, file)
+    above, *between, under = (
+        [line for line in lines if line.strip() not in repeated]
+        for lines in (
+            head[: table.start],
+            *([line for _, line in section.between] for section in reader.sections[1:]),
+            [line for _, line in reader.under],
         )
-    headings = table_headings.find(lines, table, file)
-    repeated = frozenset(lines[line].strip() for line in headings.lines)
-    sections = table_rows.sections(lines, table, repeated, file)
-    _refuse_other_rows(lines, table, sections[-1].lines[-1] + 1, file)
-    left_out = _left_out(lines, table, headings, sections, file)
-    above, *between, under = _about(lines, sections, headings)
+    )
     properties, warnings = _properties([*above, *under], table)
     blocks = []
-    for number, (section, own) in enumerate(zip(sections, [above, *between], strict=True), start=1):
-        name = str(number) if len(sections) > 1 else ""
+    for number, (section, own) in enumerate(zip(reader.sections, [above, *between], strict=True), start=1):
+        name = str(number) if len(reader.sections) > 1 else ""
         blocks.append(Block(name, _channels(table, headings, section), group_starts=section.group_starts))
         if name:
             told, _ = _properties(own, table)
             properties |= {f"{name}.{of}": value for of, value in told.items()}
-    return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, sections))
+    return Contents(tuple(blocks), properties, (*warnings, *left_out), _layout(table, headings, reader.sections))
+
+
+def _table(source: BlockText, file: str) -> tuple[Sequence[str], Table]:
+    """The lines at the beginning, and the table whose rows begin among them and go on under them; of a long file its
+    style is that of some lines everywhere."""
+    blocks = source.blocks()
+    head = next(blocks).split("\n")
+    sample = [line for block in blocks for line in block.split("\n", _SAMPLED)[:_SAMPLED]]
+    if sample:
+        head = head[:_HEAD]
+    table = table_rows.find([*head, *sample])
+    if sample and (table is None or table.start >= len(head)):
+        head = list(source.lines())
+        table = table_rows.find(head)
+    if table is None:
+        raise NoTable(file, "", _no_table(head))
+    return head, table
+
+
+def _no_table(lines: Sequence[str]) -> str:
+    """That there is no table, and what was found."""
+    most, index = table_rows.most_numbers(lines)
+    line = next(number for number, line in enumerate(lines) if line.strip() or number == len(lines) - 1)
+    found = (
+        f"line {index + 1} holds most, {most}: {lines[index][:_SHOWN]!r}"
+        if most
+        else f"no line holds any; line {line + 1} is {lines[line][:_SHOWN]!r}"
+    )
+    return f"holds no table, two rows of at least two numbers each: {found}; names go into the CSV template"
 
 
 def _channels(table: Table, headings: Headings, section: Section) -> tuple[Channel, ...]:
-    columns = np.array(section.rows, dtype=np.float64).T.copy()
     names = [headings.names[column] for column in table.columns]
+    columns = section.columns()
     return with_distinct_names([Channel(*name, column) for name, column in zip(names, columns, strict=True)])
 
 
-def _refuse_other_rows(lines: Sequence[str], table: Table, end: int, file: str) -> None:
+def _refuse_other_rows(above: Sequence[str], under: Lines, table: Table, file: str) -> None:
     """Refuses numbers under the rows, and rows above them with thousands apart: they would be lost."""
-    for index in range(end, len(lines)):
-        first = lines[index].strip().partition(table.separator)[0].strip().strip('"')
+    for index, line in under:
+        first = line.strip().partition(table.separator)[0].strip().strip('"')
         if text.number(first, table.decimal) is not None:
-            raise table_rows.no_row(lines, index, table, file)
-    for index in range(table.start):
-        cells = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in table.cells(lines[index])]
+            raise table_rows.no_row(index, line, table, file)
+    for index, line in enumerate(above):
+        cells = [cell.replace(",", "") if text.is_grouped(cell) else cell for cell in table.cells(line)]
         if len(cells) == table.width and all(text.number(cell, table.decimal) is not None for cell in cells):
-            raise table_rows.no_row(lines, index, table, file)
+            raise table_rows.no_row(index, line, table, file)
 
 
-def _left_out(
-    lines: Sequence[str], table: Table, headings: Headings, sections: Sequence[Section], file: str
-) -> list[str]:
+def _left_out(reader: SectionReader, table: Table, headings: Headings, file: str) -> list[str]:
     """In words, the columns that hold text; raises FileError where one holds numbers in most rows."""
-    if len(table.columns) == table.width:
-        return []
-    rows = [line for section in sections for line in section.lines]
-    texts: dict[int, list[tuple[int, str]]] = {
-        column: [] for column in range(table.width) if column not in table.columns
-    }
-    for line in rows:
-        cells = table.cells(lines[line])
-        for column, found in texts.items():
-            cell = cells[column] if column < len(cells) else ""
-            if text.number(cell, table.decimal) is None:
-                found.append((line, cell))
     warnings = []
-    for column, found in texts.items():
-        if len(found) < len(rows) / 2:
-            raise table_rows.no_row(lines, found[0][0], table, file)
-        example = next((cell for _, cell in found if cell), "")
-        if example:
+    for column, told in reader.texts.items():
+        if told.first is not None and told.count < reader.count / 2:
+            raise table_rows.no_row(*told.first, table, file)
+        if told.example:
             name = headings.names[column][0]
-            warnings.append(f"column {name!r} holds text, such as {example[:_SHOWN]!r}, and is left out")
+            warnings.append(f"column {name!r} holds text, such as {told.example[:_SHOWN]!r}, and is left out")
     return warnings
-
-
-def _about(lines: Sequence[str], sections: Sequence[Section], headings: Headings) -> list[list[str]]:
-    """The lines above the first section, between each and the next, and under the last, without the headings."""
-    repeated = {lines[line].strip() for line in headings.lines}
-    starts = [section.lines[0] for section in sections]
-    ends = [section.lines[-1] + 1 for section in sections]
-    edges = zip([0, *ends], [*starts, len(lines)], strict=True)
-    return [[line for line in lines[start:end] if line.strip() not in repeated] for start, end in edges]
 
 
 def _layout(table: Table, headings: Headings, sections: Sequence[Section]) -> str:
     """How the file was read, in words."""
-    first, last = sections[0].lines[0] + 1, sections[-1].lines[-1] + 1
+    first, last = sections[0].first + 1, sections[-1].last + 1
     numbers = f"rows of {len(table.columns)} numbers from line {first} to {last}"
     written = f"separated by {_SEPARATOR_WORDS[table.separator]}, with decimal {_DECIMAL_WORDS[table.decimal]}"
     if not headings.lines:

@@ -24,25 +24,29 @@ MODULES = {
     "UFF": "uff_file",
     "MATLAB": "mat_file",
     "HDF5": "hdf5_file",
+    "XLSX": "xlsx_file",
 }
 _TABLES = ("CSV template", "CSV", "LVM")
-BINARY = ("TDMS", "UFF", "MATLAB", "HDF5")
+BINARY = ("TDMS", "UFF", "MATLAB", "HDF5", "XLSX")
 GROUP = "underskin.readers"
-_SUFFIXES = (".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5")  # of the formats of MODULES
+_SUFFIXES = (  # of the formats of MODULES
+    *(".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5", ".xlsx", ".xlsm"),
+)
 _HEAD_BYTES = 4096
 _JSON_LIST = re.compile(r"\[(?!\s*[A-Za-z])")  # not [Header], which begins some instruments' texts
 _FOREIGN = {
     b"TDSh": "a TDMS index: send the .tdms file itself",
-    b"PK\x03\x04": "a ZIP archive: send the files in it",
     b"\x1f\x8b": "a gzip archive: send the file in it",
-    b"\xd0\xcf\x11\xe0": "an old Office document: save the table as CSV",
+    b"\xd0\xcf\x11\xe0": "an old Office document, or one with a password: save the table as .xlsx or CSV",
     b"%PDF": "a PDF",
 }
+ZIP = b"PK\x03\x04"
 _STARTS = {
     b"TDSm": "TDMS",
     b"MATLAB 5.0 MAT-file": "MATLAB",
     b"MATLAB 7.3 MAT-file": "MATLAB",
     b"\x89HDF\r\n\x1a\n": "HDF5",
+    ZIP: "XLSX",  # or another ZIP archive, which its reader names
 }
 
 
@@ -131,7 +135,7 @@ def _text_format(head: bytes, file: str) -> str:
     try:
         start = text.decode(head[: len(head) // 2 * 2 or 1], file).lstrip()
     except FileError as error:
-        known = "campaign JSON and HDF5, CSV, TDMS, LVM, UFF58 and MATLAB files"
+        known = "campaign JSON and HDF5, CSV, XLSX, TDMS, LVM, UFF58 and MATLAB files"
         raise FileError(file, error.place, f"is of no format that is read here: {known}") from None
     if start[:1] == "{" or _JSON_LIST.match(start):
         return "JSON"

@@ -11,7 +11,7 @@ import struct
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -20,34 +20,22 @@ import orjson
 from underskin.errors import ErrorCode, FileError
 from underskin.parallel import limit_process
 from underskin.recordings.channels import Block, Channel, Contents, Document
+from underskin.recordings.readers import parsing_limits
 from underskin.recordings.readers.formats import parse
+from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.recordings.shown_values import shown
 from underskin.recordings.time_zone import TIME_ZONE
 
-
-@dataclass(frozen=True)
-class ParsingLimits:
-    """What one file may take: `memory_bytes` beyond the interpreter's own, `seconds` by the clock. The answer about it
-    may be `unfolding` times as long as the file, and 16 MB."""
-
-    memory_bytes: int = 1 << 30
-    seconds: float = 60.0
-    unfolding: float = 16.0
-
-    def answer_bytes(self, file_bytes: int) -> int:
-        """How long the answer about a file of this size may be."""
-        return min(self.memory_bytes, _SHORT_ANSWER + int(self.unfolding * file_bytes))
-
-
-_DEFAULT = ParsingLimits()
-_SHORT_ANSWER = 16 << 20
-_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE)
+_INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)
 _LAST_WORDS = 500
 _LENGTH = struct.Struct("<Q")
 
 
-def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = _DEFAULT) -> Contents | Document:
-    """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit."""
+def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits | None = None) -> Contents | Document:
+    """As formats.parse, in a child process; raises FileError also where the child dies or breaks a limit.
+
+    Without limits, those of the settings.
+    """
     contents = call_apart(f"{__name__}:_parsed", stream, file, name, what=name, limits=limits)
     if "document" in contents:
         return Document(contents["document"], tuple(contents["warnings"]))
@@ -59,14 +47,15 @@ def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits = 
 
 
 def call_apart(
-    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: ParsingLimits = _DEFAULT
+    function: str, stream: BinaryIO, file: str, *given: str, what: str, limits: ParsingLimits | None = None
 ) -> dict[str, Any]:
     """What `function` ("module:name", called with the stream and the texts given) answers, in a child process.
 
     The answer is made of what JSON has and arrays of one axis; `what` the file is read as goes into errors. Raises
     FileError as `parse_apart`.
     """
-    longest = limits.answer_bytes(stream.seek(0, os.SEEK_END))
+    limits = limits or ParsingLimits.from_environment()
+    longest = limits.content_bytes(stream.seek(0, os.SEEK_END))
     stream.seek(0)
     environment = {key: os.environ[key] for key in _INHERITED if key in os.environ}
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "HDF5_PLUGIN_PATH": os.devnull}
@@ -79,6 +68,7 @@ def call_apart(
             status = child.wait(limits.seconds)
         except subprocess.TimeoutExpired:
             reason = f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
+            reason += f" ({parsing_limits.SECONDS})"
             raise FileError(file, "", reason) from None
         finally:
             child.kill()
@@ -136,11 +126,13 @@ def _main() -> None:
         with os.fdopen(0, "rb") as stream:
             answer = _encoded(getattr(importlib.import_module(module), name)(stream, *given))
         if sum(memoryview(part).nbytes for part in answer) > int(longest):
-            raise FileError("", "", f"it unfolds to more than {int(longest) >> 20} MB, too much for a file of its size")
+            setting = parsing_limits.MEMORY_MB if longest == memory_bytes else parsing_limits.EXPANSION
+            most = f"{int(longest) / 1e6:.0f} MB, too much for a file of its size ({setting})"
+            raise FileError("", "", f"it unfolds to more than {most}")
     except FileError as error:
         answer = _encoded({"error": {"place": error.place, "reason": error.reason, "code": error.code}})
     except MemoryError:
-        reason = f"reading it takes more than {int(memory_bytes) / (1 << 30):.3g} GB of memory"
+        reason = f"reading it takes more than {int(memory_bytes) / 1e6:g} MB of memory ({parsing_limits.MEMORY_MB})"
         answer = _encoded({"error": {"place": "", "reason": reason, "code": ErrorCode.UNREADABLE_FILE}})
     with os.fdopen(1, "wb") as out:
         for part in answer:

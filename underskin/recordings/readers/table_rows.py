@@ -1,4 +1,4 @@
-"""Where the numbers of a text table are: separator, decimal mark, which columns hold numbers, groups of rows.
+"""Where the numbers of a text table are: separator, decimal mark, which columns hold numbers.
 
 A row holds a number in every column of numbers; other columns hold text. The separator and the decimal mark are those
 with the longest run of rows, among equals those with the fewest columns of text.
@@ -16,8 +16,7 @@ BLANKS = " "
 _STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","))
 _TOKEN = re.compile(r'"[^"]*"|\S+')
 _COMMENT = re.compile(r"\s*(#|%|//|!)+\s*")
-_LEAST = 2  # columns of numbers, rows of a table, rows of a group
-_MOST_GROUPS = 1000
+_LEAST = 2  # columns of numbers, rows of a table
 
 
 @dataclass(frozen=True)
@@ -41,16 +40,6 @@ class Table:
             return None
         numbers = [text.number(cells[column], self.decimal) for column in self.columns]
         return None if None in numbers else [number for number in numbers if number is not None]
-
-
-@dataclass(frozen=True)
-class Section:
-    """Rows under one line of headings: the lines that hold them, from 0, their numbers, and the groups that blank or
-    comment lines part them into, by the row at which each begins (empty where there is one)."""
-
-    lines: Sequence[int]
-    rows: Sequence[Sequence[float]]
-    group_starts: tuple[int, ...]
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -104,6 +93,18 @@ def find(lines: Sequence[str]) -> Table | None:
     return replace(best, start=next(index for index, line in enumerate(lines) if best.row(line) is not None))
 
 
+def most_numbers(lines: Sequence[str]) -> tuple[int, int]:
+    """How many numbers the line with most of them holds, however it is separated, and its index."""
+    counts = [max(_count(line, *style) for style in _STYLES) for line in lines]
+    most = max(counts)
+    return most, counts.index(most)
+
+
+def _count(line: str, separator: str, decimal: str) -> int:
+    cells = split(line, separator) or [line]
+    return sum(text.number(cell, decimal) is not None for cell in cells)
+
+
 def _columns(line: str, separator: str, decimal: str) -> tuple[int, ...]:
     """Which cells of a line are numbers; none where fewer than two are."""
     cells = split(line, separator)
@@ -123,42 +124,8 @@ def _longest_run(columns_of: Sequence[tuple[int, ...]]) -> tuple[tuple[int, ...]
     return best
 
 
-def sections(lines: Sequence[str], table: Table, headings: frozenset[str], file: str) -> list[Section]:
-    """The rows, a section for each time that the `headings` stand above some.
-
-    Raises FileError at the first line that is none and has rows above and under it, unless it is blank, a comment, or
-    followed by the headings.
-    """
-    parts: list[tuple[list[int], list[list[float]], list[int]]] = [([], [], [])]
-    between: list[int] = []  # lines since the last row
-    for index in range(table.start, len(lines)):
-        row = table.row(lines[index])
-        if row is None:
-            between.append(index)
-            continue
-        foreign = [line for line in between if lines[line].strip() and not is_comment(lines[line])]
-        if foreign and not any(lines[line].strip() in headings for line in foreign):
-            raise no_row(lines, foreign[0], table, file)
-        if foreign:
-            parts.append(([], [], []))
-        places, rows, starts = parts[-1]
-        if between or not rows:
-            starts.append(len(rows))
-        places.append(index)
-        rows.append(row)
-        between = []
-    return [Section(places, rows, _groups(starts, len(rows))) for places, rows, starts in parts]
-
-
-def _groups(starts: Sequence[int], count: int) -> tuple[int, ...]:
-    """The same starts, unless a group is too short to be one, as where every second line is blank."""
-    ends = [*starts[1:], count]
-    short = any(end - start < _LEAST for start, end in zip(starts, ends, strict=True))
-    return () if short or not 1 < len(starts) <= _MOST_GROUPS else tuple(starts)
-
-
-def no_row(lines: Sequence[str], index: int, table: Table, file: str) -> FileError:
+def no_row(index: int, line: str, table: Table, file: str) -> FileError:
     """What is wrong with a line among the rows."""
     where = "" if len(table.columns) == table.width else f" in {table.width} columns"
-    expected = f"must be a row of {len(table.columns)} numbers{where}, as above it; found {lines[index][:60]!r}"
+    expected = f"must be a row of {len(table.columns)} numbers{where}, as above it; found {line[:60]!r}"
     return FileError(file, f"line {index + 1}", expected)

@@ -7,7 +7,7 @@ names no field, are left out.
 
 import cmath
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -17,7 +17,7 @@ from underskin.recordings.readers.unit_labels import in_brackets, lab_field, uni
 
 FURTHER = "conditions."  # what else the lab noted, a column each
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
-_PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
+PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _PHASE_ALONE, _TURN = "frf_phase", 2 * math.pi
 NO_NAME = ("", "unnamed: 0")  # the second by pandas
@@ -43,7 +43,7 @@ class NoField(ValueError):
 
 
 def columns(
-    headings: Sequence[str], rows: Sequence[Sequence[str]], known: Collection[str], decimal: str
+    headings: Sequence[str], rows: Iterable[Sequence[str]], known: Collection[str], decimal: str
 ) -> tuple[list[Column], list[str]]:
     """The columns that hold fields, and which are left out, in words; `rows` are the cells under the headings.
 
@@ -51,14 +51,14 @@ def columns(
     """
     found: dict[str, Column] = {}
     left_out: list[str] = []
-    for place, heading in enumerate(headings):
-        cells = [cell for row in rows for cell in row[place : place + 1] if cell]
-        meant = field_of(heading, known)
+    meanings = [field_of(heading, known) for heading in headings]
+    others = _under([place for place, meant in enumerate(meanings) if meant is None], rows)
+    for place, (heading, meant) in enumerate(zip(headings, meanings, strict=True)):
         if meant is None and heading.strip().lower().replace(" ", "_") == _PHASE_ALONE:
-            meant = PHASE, _angle_of(place, heading, [text.number(cell, decimal) for cell in cells])
+            meant = PHASE, _angle_of(place, heading, [text.number(cell, decimal) for cell in others[place]])
             left_out.append(f"{heading!r} is read as degrees: it has values beyond 2π")
         if meant is None:
-            left_out += _without(place, heading, cells, known, decimal)
+            left_out += _without(place, heading, others[place], known, decimal)
             continue
         field, factor = meant
         if field in found:
@@ -66,6 +66,17 @@ def columns(
         found[field] = Column(place, field, factor, heading)
     _require_whole(found)
     return list(found.values()), left_out
+
+
+def _under(places: Sequence[int], rows: Iterable[Sequence[str]]) -> dict[int, list[str]]:
+    """The cells under the headings at some places, without the empty ones."""
+    under: dict[int, list[str]] = {place: [] for place in places}
+    if places:
+        for row in rows:
+            for place in places:
+                if place < len(row) and row[place]:
+                    under[place].append(row[place])
+    return under
 
 
 def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
@@ -128,7 +139,7 @@ def _require_whole(found: dict[str, Column]) -> None:
     if len(given) == 1:
         other = PHASE if given[0].field == MAGNITUDE else MAGNITUDE
         raise NoField(given[0].place, f"{given[0].heading!r} needs {other} beside it")
-    if given and any(part in found for part in _PARTS):
+    if given and any(part in found for part in PARTS):
         raise NoField(given[0].place, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
 
 
@@ -139,8 +150,8 @@ def with_parts(line: dict[str, Any]) -> dict[str, Any]:
     others = {field: value for field, value in line.items() if field not in (MAGNITUDE, PHASE)}
     magnitude, phase = line[MAGNITUDE], line[PHASE]
     if magnitude is None and phase is None:
-        return {**others, **dict.fromkeys(_PARTS)}
+        return {**others, **dict.fromkeys(PARTS)}
     if not isinstance(magnitude, float) or not isinstance(phase, float):
-        return {**others, _PARTS[0]: magnitude, _PARTS[1]: phase}  # for the campaign's checks to refuse
+        return {**others, PARTS[0]: magnitude, PARTS[1]: phase}  # for the campaign's checks to refuse
     value = cmath.rect(magnitude, phase)
-    return {**others, _PARTS[0]: value.real, _PARTS[1]: value.imag}
+    return {**others, PARTS[0]: value.real, PARTS[1]: value.imag}

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import BinaryIO
 
 from underskin.errors import FileError
@@ -11,7 +11,7 @@ _LINE_END = re.compile(r"\r\n|\r|\n")
 _NUMBER = re.compile(r"[+-]?(\d+([.]\d*)?|[.]\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 _LOOKED_AT, _MOSTLY = 4096, 0.8  # bytes of a text without a mark, and how many of a half must be zero
-_MINUS = "\N{MINUS SIGN}"
+MINUS = "\N{MINUS SIGN}"
 _BOMS = {b"\xef\xbb\xbf": "utf-8", b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -27,18 +27,30 @@ def decode(data: bytes, file: str) -> str:
 
     Raises FileError where the bytes are no text.
     """
-    for mark, encoding in _BOMS.items():
-        if data.startswith(mark):
-            return _decoded(data[len(mark) :], encoding, file)
+    marked = marked_encoding(data)
+    if marked is not None:
+        encoding, start = marked
+        try:
+            return data[start:].decode(encoding)
+        except UnicodeDecodeError as error:
+            raise no_text(file, error.start, encoding, error.reason) from None
     zero = data.find(0)
-    if zero in (0, 1) and (encoding := _unmarked(data)):
-        return _decoded(data, encoding, file)
     if zero >= 0:
         raise FileError(file, f"byte {zero}", "is no text: it holds a zero byte")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError:
         return data.decode("latin-1")
+
+
+def marked_encoding(head: bytes) -> tuple[str, int] | None:
+    """The encoding that the first bytes of a text say, and where the text begins behind their mark; None where they
+    say none."""
+    for mark, encoding in _BOMS.items():
+        if head.startswith(mark):
+            return encoding, len(mark)
+    unmarked = _unmarked(head) if head.find(0) in (0, 1) else ""
+    return (unmarked, 0) if unmarked else None
 
 
 def _unmarked(data: bytes) -> str:
@@ -51,11 +63,9 @@ def _unmarked(data: bytes) -> str:
     return "utf-16-be" if first > second else "utf-16-le"
 
 
-def _decoded(data: bytes, encoding: str, file: str) -> str:
-    try:
-        return data.decode(encoding)
-    except UnicodeDecodeError as error:
-        raise FileError(file, f"byte {error.start}", f"is no {encoding.upper()} text: {error.reason}") from None
+def no_text(file: str, place: int, encoding: str, reason: str) -> FileError:
+    """What is wrong with a text at a byte, counted from behind its mark."""
+    return FileError(file, f"byte {place}", f"is no {encoding.upper()} text: {reason}")
 
 
 def lines(text: str) -> list[str]:
@@ -84,18 +94,18 @@ def _quoted(line: str, separator: str) -> list[str]:
         ) from None
 
 
-def decimal_mark(rows: Sequence[Sequence[str]], separator: str) -> str:
-    """The decimal mark of a table, by its cells.
+def decimal_mark(holding: Callable[[str], Iterable[Sequence[str]]], separator: str) -> str:
+    """The decimal mark of a table, by its cells; `holding` gives the rows in which a mark may be.
 
     A comma where a cell is a number only that way and cannot have its thousands apart instead. Beside semicolons, which
     stand for commas that are decimal marks, any such cell says so; between commas none does where others have points.
     """
-    if separator == "," and _has_number(rows, "."):
+    if separator == "," and _has_number(holding("."), "."):
         return "."
-    return "," if _has_number(rows, ",", grouped=separator == ";") else "."
+    return "," if _has_number(holding(","), ",", grouped=separator == ";") else "."
 
 
-def _has_number(rows: Sequence[Sequence[str]], decimal: str, *, grouped: bool = False) -> bool:
+def _has_number(rows: Iterable[Sequence[str]], decimal: str, *, grouped: bool = False) -> bool:
     """Whether a cell is a number with this decimal mark; `grouped`: even if that may part its thousands instead."""
     return any(
         decimal in cell and number(cell, decimal) is not None and (grouped or not is_grouped(cell))
@@ -116,7 +126,7 @@ def ungrouped(cell: str) -> str:
 
 def number(cell: str, decimal: str) -> float | None:
     """The number in a cell, or None where it holds something else."""
-    cell = cell.strip().replace(_MINUS, "-")
+    cell = cell.strip().replace(MINUS, "-")
     if decimal == ",":
         if "." in cell:
             return None

@@ -1,0 +1,183 @@
+"""The rows of a text table, block by block: sections under one line of headings each, groups, columns of text."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from underskin.recordings.readers import text
+from underskin.recordings.readers.table_rows import BLANKS, Table, is_comment, no_row
+from underskin.recordings.readers.text_blocks import BlockText, numbers, split_lines
+from underskin.units import Floats
+
+_FEW = 64  # lines that are not worth being parted
+_LOOSE = 4096  # rows that are kept as lists
+_LEAST = 2  # rows of a group
+_MOST_GROUPS = 1000
+Lines = list[tuple[int, str]]  # with their numbers, from 0
+
+
+@dataclass
+class Section:
+    """Rows under one line of headings: the first and the last line that hold some, from 0; the lines `between` it and
+    the section above; and the row at which each group begins that blank or comment lines part."""
+
+    first: int
+    last: int
+    between: Lines
+    _starts: list[int] = field(default_factory=list)
+    _count: int = 0
+    _loose: list[Sequence[float]] = field(default_factory=list)
+    _parts: list[list[Floats]] = field(default_factory=list)
+
+    @property
+    def group_starts(self) -> tuple[int, ...]:
+        """Empty where there is one group, or one too short to be one, as where every second line is blank."""
+        ends = [*self._starts[1:], self._count]
+        short = any(end - start < _LEAST for start, end in zip(self._starts, ends, strict=True))
+        return () if short or not 1 < len(self._starts) <= _MOST_GROUPS else tuple(self._starts)
+
+    def begin_group(self) -> None:
+        """The next row begins a group."""
+        self._starts.append(self._count)
+
+    def add(self, last: int, row: Sequence[float]) -> None:
+        """Take a row."""
+        self.last = last
+        self._count += 1
+        self._loose.append(row)
+        if len(self._loose) == _LOOSE:
+            self._gather()
+
+    def add_rows(self, last: int, columns: Sequence[Floats]) -> None:
+        """Take many rows by their columns."""
+        self._gather()
+        self.last = last
+        self._count += len(columns[0])
+        self._parts.append(list(columns))
+
+    def _gather(self) -> None:
+        if self._loose:
+            self._parts.append([column.copy() for column in np.array(self._loose, dtype=np.float64).T])
+            self._loose = []
+
+    def columns(self) -> list[Floats]:
+        """The columns of numbers; the section is empty afterwards, so that they are not in memory twice."""
+        self._gather()
+        whole = []
+        for place in range(len(self._parts[0])):
+            whole.append(np.concatenate([part[place] for part in self._parts]))
+            for part in self._parts:
+                part[place] = part[place][:0]
+        return whole
+
+
+@dataclass
+class TextColumn:
+    """A column that holds text in some rows: in how many, the first of them, and an example."""
+
+    count: int = 0
+    first: tuple[int, str] | None = None
+    example: str = ""
+
+
+class SectionReader:
+    """Takes the lines of a file from the table's start on.
+
+    Raises FileError at the first line that is no row and has rows above and under it, unless it is blank, a comment, or
+    followed by the `headings`.
+    """
+
+    def __init__(self, table: Table, headings: frozenset[str], file: str) -> None:
+        self._table = table
+        self._headings = headings
+        self._file = file
+        self.sections: list[Section] = []
+        self.under: Lines = []  # lines since the last row
+        self.texts = {column: TextColumn() for column in range(table.width) if column not in table.columns}
+        self.count = 0
+
+    def take_all(self, source: BlockText) -> None:
+        """Take the lines of a text."""
+        first = 0
+        for block in source.blocks():
+            lines = block.split("\n")
+            skipped = max(0, self._table.start - first)
+            if skipped < len(lines):
+                self._take(first + skipped, lines[skipped:])
+            first += len(lines)
+
+    def _take(self, first: int, lines: Sequence[str]) -> None:
+        cells = self._cells(lines)
+        columns = None if cells is None else self._numbers(cells)
+        if cells is not None and columns is not None:
+            self._section(first).add_rows(first + len(lines) - 1, columns)
+            self.count += len(lines)
+            for column in self.texts:
+                self._see(column, first, lines, cells[column])
+        elif len(lines) > _FEW:  # most lines may be plain rows
+            half = len(lines) // 2
+            self._take(first, lines[:half])
+            self._take(first + half, lines[half:])
+        else:
+            for index, line in enumerate(lines, start=first):
+                self._take_line(index, line)
+
+    def _cells(self, lines: Sequence[str]) -> list[tuple[str, ...]] | None:
+        """The cells of each column; None where lines are not split alike."""
+        separator, width = self._table.separator, self._table.width
+        if separator == BLANKS:
+            rows = [line.split() for line in lines]
+            if any('"' in line or "\t" in line or ";" in line for line in lines):
+                return None
+        elif (split := split_lines(lines, separator)) is not None:
+            rows = split
+        else:
+            return None
+        if any(len(row) != width for row in rows):
+            if max(map(len, rows)) > width:
+                return None
+            rows = [[*row, *[""] * (width - len(row))] for row in rows]
+        return list(zip(*rows, strict=True))
+
+    def _numbers(self, cells: Sequence[Sequence[str]]) -> list[Floats] | None:
+        columns = [numbers(cells[column], self._table.decimal) for column in self._table.columns]
+        whole = [column for column in columns if column is not None]
+        return whole if len(whole) == len(columns) else None
+
+    def _take_line(self, index: int, line: str) -> None:
+        row = self._table.row(line)
+        if row is None:
+            self.under.append((index, line))
+            return
+        self._section(index).add(index, row)
+        self.count += 1
+        cells = self._table.cells(line)
+        for column in self.texts:
+            self._see(column, index, [line], [cells[column] if column < len(cells) else ""])
+
+    def _section(self, index: int) -> Section:
+        """The section that a row at an index belongs to."""
+        foreign = [one for one in self.under if one[1].strip() and not is_comment(one[1])]
+        if foreign and not any(line.strip() in self._headings for _, line in foreign):
+            raise no_row(*foreign[0], self._table, self._file)
+        if foreign or not self.sections:
+            self.sections.append(Section(index, index, self.under if self.sections else []))
+            self.sections[-1].begin_group()
+        elif self.under:
+            self.sections[-1].begin_group()
+        self.under = []
+        return self.sections[-1]
+
+    def _see(self, column: int, first: int, lines: Sequence[str], cells: Sequence[str]) -> None:
+        """Note what a column of text holds in some rows."""
+        told = self.texts[column]
+        for cell, count in Counter(cells).items():
+            if text.number(cell, self._table.decimal) is not None:
+                continue
+            told.count += count
+            told.example = told.example or cell.strip()
+            if told.first is None:
+                place = cells.index(cell)
+                told.first = (first + place, lines[place])

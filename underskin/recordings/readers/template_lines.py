@@ -1,0 +1,94 @@
+"""The lines of the CSV template as rows of cells, which may be gone through any number of times."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+from underskin.errors import FileError
+from underskin.recordings.campaign import SCHEMA
+from underskin.recordings.readers import text
+from underskin.recordings.readers.text_blocks import BlockText, split_lines
+
+_FIRST_LINE = 2000
+_TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
+_SEPARATORS = ("\t", ";", ",")
+
+
+def separator_of(start: str) -> str | None:
+    """The separator of a template that begins so; None where this is none."""
+    first = next((line for line in text.lines(start[:_FIRST_LINE]) if not _says_nothing(line)), "")
+    return next((mark for mark in _SEPARATORS if _first_cells(first, mark) == ["schema", SCHEMA]), None)
+
+
+def _first_cells(line: str, separator: str) -> list[str]:
+    try:
+        return [cell.lower() for cell in text.cells(line, separator)[:2]]
+    except ValueError:
+        return []
+
+
+def _says_nothing(line: str) -> bool:
+    """Whether a line is blank, a comment, or tells a spreadsheet its separator."""
+    bare = line.strip().strip('"')
+    return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
+
+
+class TemplateLines:
+    """The lines, and the cells of each; a line that says nothing has one empty cell."""
+
+    def __init__(self, source: BlockText, separator: str, file: str) -> None:
+        self._source = source
+        self.separator = separator
+        self._file = file
+
+    def __iter__(self) -> Iterator[list[str]]:
+        for index, line in enumerate(self._source.lines()):
+            yield self.cells(index, line)
+
+    def cells(self, index: int, line: str) -> list[str]:
+        """The cells of the line at an index, from 0; raises FileError where its quotes do not close."""
+        try:
+            cells = text.cells(line, self.separator)
+        except ValueError as error:
+            if not _says_nothing(line):
+                raise FileError(self._file, f"line {index + 1}", str(error)) from None
+            cells = [""]
+        # An id may begin with #, as numbers of presses do: then numbers follow it.
+        counts = any(text.number(cell, mark) is not None for cell in cells[1:] for mark in ".,")
+        return cells if counts or not _says_nothing(line) else [""]
+
+    def holding(self, mark: str) -> Iterator[list[str]]:
+        """The cells of the lines that hold a mark."""
+        first = 0
+        for block in self._source.blocks():
+            lines = block.split("\n")
+            if mark in block:
+                for index, line in enumerate(lines, start=first):
+                    if mark in line:
+                        yield self.cells(index, line)
+            first += len(lines)
+
+    def blocks(self, start: int, end: int | None = None) -> Iterator[tuple[int, list[str]]]:
+        """The lines from one index to another, some at a time, with the index of the first of them."""
+        first = 0
+        for block in self._source.blocks():
+            lines = block.split("\n")
+            some = lines[max(0, start - first) : None if end is None else max(0, end - first)]
+            if some:
+                yield max(start, first), some
+            first += len(lines)
+
+    def plain(self, lines: Sequence[str], width: int) -> list[list[str]] | None:
+        """The cells of lines, `width` each and not stripped; None where any line says nothing or has more, so that
+        `cells` must tell."""
+        rows = split_lines(lines, self.separator)
+        if rows is None or any(map(_may_say_nothing, {row[0] for row in rows if row})):
+            return None
+        if all(len(row) == width for row in rows):
+            return rows
+        if any(cell.strip() for row in rows for cell in row[width:]):
+            return None
+        return [[*row[:width], *[""] * (width - len(row))] for row in rows]
+
+
+def _may_say_nothing(first: str) -> bool:
+    return first.lstrip()[:4].lower().startswith(("#", "sep="))
