@@ -27,6 +27,7 @@ router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
 
 _FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
+_CAMPAIGN: dict[str, Any] = {"$ref": "#/components/schemas/Campaign"}
 _EXAMPLE: dict[str, Any] = {
     "schema": "campaign/1",
     "name": "first day",
@@ -60,7 +61,13 @@ _BODY: dict[str, Any] = {
         "channels are. What the query says may be fields of the form instead; what both say must be the same. "
         "Other fields that are no files are refused.",
         "content": {
-            "application/json": {"schema": {"type": "object", "description": "campaign/1"}, "example": _EXAMPLE},
+            "application/json": {
+                "schema": {
+                    "anyOf": [_CAMPAIGN, {"type": "array", "items": _CAMPAIGN, "minItems": 1}],
+                    "description": "One campaign, or a list of them.",
+                },
+                "example": _EXAMPLE,
+            },
             "application/octet-stream": {**_FILE, "example": orjson.dumps(_EXAMPLE).decode()},
             "multipart/form-data": {
                 "schema": {
@@ -165,7 +172,7 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     responses={
         200: {
             "content": {
-                "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
+                "application/json": {"schema": _CAMPAIGN},
                 "application/x-hdf5": _FILE,
             }
         }

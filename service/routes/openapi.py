@@ -8,9 +8,16 @@ from pydantic import BaseModel, Field
 
 from service.auth.access_control import OPEN
 from service.problems import MEDIA_TYPE, Problem
+from service.schemas.campaign_document import campaign_schemas
+from service.schemas.design import DesignRequest
+from service.schemas.pressed_skin import D33Columns, FrfColumns
+from service.schemas.sigma import SigmaColumns
 from service.schemas.stress import StressRequest
 
 router = APIRouter(tags=["openapi"])
+
+# Requests that routes read themselves, so that FastAPI does not know them.
+_READ_BY_ROUTES = (SigmaColumns, FrfColumns, D33Columns, StressRequest, DesignRequest)
 
 DESCRIPTION = """\
 What is happening under the skin: σ, FRF and d33 of a piezoelectric electronic skin pressed by a sphere.
@@ -63,9 +70,10 @@ def _describe(api: FastAPI) -> dict[str, Any]:
     """The document without what depends on the keys; kept for the next time."""
     document = get_openapi(title=api.title, version=api.version, description=api.description, routes=api.routes)
     components = document["components"]
-    for model in (Problem, UmbridgeProblem, StressRequest):
+    components["schemas"].update(campaign_schemas())
+    for model in (Problem, UmbridgeProblem, *_READ_BY_ROUTES):
         schema = model.model_json_schema(ref_template="#/components/schemas/{model}")
-        components["schemas"].update(schema.pop("$defs"))
+        components["schemas"].update(schema.pop("$defs", {}))
         components["schemas"][model.__name__] = schema
     for unused in ("HTTPValidationError", "ValidationError"):
         components["schemas"].pop(unused, None)

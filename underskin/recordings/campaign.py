@@ -221,17 +221,17 @@ def _unmet_needs(recording: Recording, skin: SkinDescription) -> list[InvalidInp
     return refused
 
 
-_LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
-_TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
+LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
+TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
 
 
 def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     """An FRF or the time series it is estimated from: one of the two, whole."""
-    series = [name for name in _TIME_SERIES if getattr(recording, name) is not None]
-    lines = [name for name in (*_LINES, "coherence") if getattr(recording, name) is not None]
+    series = [name for name in TIME_SERIES if getattr(recording, name) is not None]
+    lines = [name for name in (*LINES, "coherence") if getattr(recording, name) is not None]
     if series and lines:
         return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
-    needed = _TIME_SERIES if series else _LINES
+    needed = TIME_SERIES if series else LINES
     return [errors.required(name) for name in needed if getattr(recording, name) is None]
 
 

@@ -24,11 +24,11 @@ from underskin.units import Floats, checked
 BuiltModel = TypeVar("BuiltModel")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
-_LARGEST_COUNT = 2**53
-_FREQUENCIES_HZ = (1e-6, 1e9)
+LARGEST_COUNT = 2**53
+FREQUENCIES_HZ = (1e-6, 1e9)
 _MOST_UNKNOWN = 20  # unknown fields of one object that are listed; a document may hold millions
-_CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_MOST_CONDITIONS = 100
+CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+MOST_CONDITIONS = 100
 BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
     (
         *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
@@ -38,7 +38,7 @@ BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
         *("phase", "day"),
     )
 )
-_COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
+COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
 def check_fields(
@@ -48,7 +48,7 @@ def check_fields(
 
     `model` is a dataclass; a field that has a default may be left out or null.
     """
-    known = _checks(model)
+    known = checks_of(model)
     refused = _unknown_fields(document, known, f"unknown field; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
@@ -94,7 +94,7 @@ def build(model: type[BuiltModel], prefix: str, document: Any, units_checked: bo
 
 
 @cache
-def _checks(model: Any) -> dict[str, tuple[Check, Any]]:
+def checks_of(model: Any) -> dict[str, tuple[Check, Any]]:
     """Each field's check and default."""
     hints = get_type_hints(model, include_extras=True)
     return {field.name: (_annotated_check(hints[field.name]), field.default) for field in fields(model)}
@@ -166,8 +166,8 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
 def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
     """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
-    if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
-        raise _wrong_type(field, value, f"must be a whole number, 0 to {_LARGEST_COUNT}")
+    if result < 0 or not result.is_integer() or int(value) > LARGEST_COUNT:
+        raise _wrong_type(field, value, f"must be a whole number, 0 to {LARGEST_COUNT}")
     return int(value)
 
 
@@ -225,7 +225,7 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    low, high = _FREQUENCIES_HZ
+    low, high = FREQUENCIES_HZ
     for bad, allowed in (
         (column <= 0, "must be greater than 0 (leave out the line at 0 Hz)"),
         ((column < low) | (column > high), f"must be {low:g} to {high:g} Hz"),
@@ -245,7 +245,7 @@ def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    bad = (column < 0) | (column > 1 + _COHERENCE_ROUNDING)
+    bad = (column < 0) | (column > 1 + COHERENCE_ROUNDING)
     _refuse_where(field, column, bad, "must be 0 to 1", ErrorCode.OUT_OF_RANGE)
     return column
 
@@ -254,11 +254,11 @@ def further(field: str, value: Any, units_checked: bool) -> dict[str, float | st
     """What else a lab noted, by names of its own: numbers or short words; null where it was not noted."""
     document = mapping(field, value)
     noted: dict[str, float | str] = {}
-    if len(document) > _MOST_CONDITIONS:
-        raise errors.out_of_range(field, len(document), f"must be at most {_MOST_CONDITIONS} columns")
+    if len(document) > MOST_CONDITIONS:
+        raise errors.out_of_range(field, len(document), f"must be at most {MOST_CONDITIONS} columns")
     for key, entry in document.items():
         place = f"{field}.{named(key)}"
-        if not isinstance(key, str) or not _CONDITION.fullmatch(key):
+        if not isinstance(key, str) or not CONDITION.fullmatch(key):
             raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
         if key in BUILT_IN_AXES:
             raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")
