@@ -46,6 +46,8 @@ _EXPERIMENT: dict[str, Any] = {
     "noise": {"gain": 0.01, "line": 0.005},
     "effects": {"contact_resonance": {"tip_mass_g": 6, "damping": 0.04}},
 }
+
+
 @dataclass
 class Walk:
     """A client of a server, and what it was asked and answered so far, by operation."""
@@ -135,7 +137,9 @@ def _umbridge(walked: Walk) -> None:
 def _campaigns(walked: Walk) -> None:
     of_campaign = "/v1/campaigns/{campaign_id}"
     sent = walked.ask("post_campaigns", "POST", "/v1/campaigns", campaigns.EXAMPLE)
-    other = walked.ask("", "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, kept=False, params={"skin": "palm-3b"})
+    other = walked.ask(
+        "", "POST", "/v1/campaigns", {**campaigns.EXAMPLE, "name": "another"}, kept=False, params={"skin": "palm-3b"}
+    )
     walked.ask("campaigns", "GET", "/v1/campaigns", params={"skin": sent["skin_id"]})
     walked.ask("campaign_document", "GET", f"{of_campaign}/document", campaign_id=sent["id"])
     walked.ask("campaign_d33", "GET", f"{of_campaign}/d33", campaign_id=sent["id"])
@@ -164,14 +168,13 @@ def _diagnoses(walked: Walk) -> None:
     while walked.ask("diagnosis", "GET", "/v1/diagnoses/{diagnosis_id}", diagnosis_id=diagnosed)["state"] != "done":
         time.sleep(0.1)
     one = {"diagnosis_id": diagnosed}
-    of_model = {"skin_id": skins[0]}
-    walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", one, **of_model)
-    walked.ask("skin_model", "GET", "/v1/skins/{skin_id}/model", **of_model)
+    walked.ask("adopt_model", "POST", "/v1/skins/{skin_id}/model", one, skin_id=skins[0])
+    walked.ask("skin_model", "GET", "/v1/skins/{skin_id}/model", skin_id=skins[0])
     reason = {"reason": "the tip was changed"}
-    walked.ask("withdraw_model", "DELETE", "/v1/skins/{skin_id}/model", params=reason, **of_model)
-    walked.ask("skin_model_versions", "GET", "/v1/skins/{skin_id}/model/versions", **of_model)
+    walked.ask("withdraw_model", "DELETE", "/v1/skins/{skin_id}/model", params=reason, skin_id=skins[0])
+    walked.ask("skin_model_versions", "GET", "/v1/skins/{skin_id}/model/versions", skin_id=skins[0])
     export = walked.http.get(f"/v1/skins/{skins[0]}/export").content
-    walked.examples["export_skin"] = {"given": of_model}
+    walked.examples["export_skin"] = {"given": {"skin_id": skins[0]}}
     headers = {"Content-Type": "application/octet-stream"}
     imported = walked.http.post("/v1/skins/import", content=export, headers=headers)
     walked.examples["import_skin"] = {"answer": imported.raise_for_status().json()}

@@ -81,7 +81,7 @@ _WORDS: Mapping[str, str] = {
     "load_cycles": "Load cycles that the skin had seen [-].",
     "dwell_s": "How long the preload had been held [s].",
     "position_mm": "Commanded place of the sphere, x and y in the sensors' frame [mm]; by default the sensor's centre.",
-    "conditions": "What else the lab noted, numbers or short words by names of its own; each is an axis of a diagnosis.",
+    "conditions": "What else the lab noted, numbers or short words by names of its own, each an axis of diagnoses.",
     "frequency_hz": "Lines of the FRF, increasing [Hz].",
     "frf_re_pc_per_n": "Real part of the FRF, charge over force, one entry a line, positive in compression for a "
     "positive d33 [pC/N].",
@@ -107,8 +107,12 @@ def campaign_schemas() -> dict[str, Schema]:
         "FrfTimeSeries": _frf(
             TIME_SERIES, (*LINES, "coherence"), "Force and charge over time, from which charge over force is estimated."
         ),
-        "IndentationRecording": _object(IndentationRecording, "The force on a sphere that is pressed in.", "indentation"),
-        "CompressionRecording": _object(CompressionRecording, "The force on a cylinder between platens.", "compression"),
+        "IndentationRecording": _object(
+            IndentationRecording, "The force on a sphere that is pressed in.", "indentation"
+        ),
+        "CompressionRecording": _object(
+            CompressionRecording, "The force on a cylinder between platens.", "compression"
+        ),
     }
     recordings = [{"$ref": f"{_REF}{name}"} for name in parts if name not in ("Sensor", "Skin")]
     campaign = {

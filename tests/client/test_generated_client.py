@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import httpx
@@ -88,7 +87,9 @@ def test_a_refusal_is_a_problem_with_its_fields(generated: Generated) -> None:
     answer = module.sync_detailed(client=generated.client, body=asked)
     assert answer.status_code == 422
     problem = generated.models.Problem.from_dict(json.loads(answer.content))
-    assert [(str(error.code), error.field, error.index) for error in problem.errors] == [("out_of_range", "a_over_h", 1)]
+    assert [(str(error.code), error.field, error.index) for error in problem.errors] == [
+        ("out_of_range", "a_over_h", 1)
+    ]
 
 
 def test_a_campaign_is_sent_read_and_diagnosed(generated: Generated) -> None:

@@ -12,6 +12,8 @@ from underskin.errors import UnderskinError
 from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
+    from underskin.client.campaigns import SentFile
+    from underskin.client.documents.campaigns import Refused
     from underskin.client.service_client import Client
 
 Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the service is.")]
@@ -87,7 +89,7 @@ def _sent(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> 
     try:
         if terms["together"] is None and _is_export(files[0]):
             brought = client.skins.load(files[0])
-            return [(True, f"skin {brought['skin_id']}: {brought['kept']} campaigns, {brought['present']} were there")]
+            return [(True, f"skin {brought.skin_id}: {brought.kept} campaigns, {brought.present} were there")]
         results = client.campaigns.post_files(files, **terms, idempotency_key=_content_key(files, terms))
     except UnderskinError as error:
         return [(False, str(error))]
@@ -116,26 +118,24 @@ def _is_export(file: Path) -> bool:
         return is_export(opened, str(file))
 
 
-def _lines(client: "Client", result: dict[str, Any]) -> list[tuple[bool, str]]:
-    accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
-    lines = [(False, _refused(error)) for error in result["errors"]]
-    lines += [
-        (False, f"{entry['id']} {_refused(error)}") for entry in result["recordings"] for error in entry["errors"]
-    ]
-    lines += [(True, note) for note in result["notes"]]
-    if result["status"] == "ok":
+def _lines(client: "Client", result: "SentFile") -> list[tuple[bool, str]]:
+    accepted = [entry for entry in result.recordings if entry.status == "ok"]
+    lines = [(False, _refused(error)) for error in result.errors]
+    lines += [(False, f"{entry.id} {_refused(error)}") for entry in result.recordings for error in entry.errors]
+    lines += [(True, note) for note in result.notes]
+    if result.id is not None:
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"
-        figures, remarks = _figures(client, result["id"])
-        before = ", was there" if result["repeated"] else ""
-        lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}{before}, {count}: {figures}"))
+        figures, remarks = _figures(client, result.id)
+        before = ", was there" if result.repeated else ""
+        lines.insert(0, (True, f"campaign {result.id} of skin {result.skin_id}{before}, {count}: {figures}"))
         lines += [(True, remark) for remark in remarks]
     return lines
 
 
-def _refused(error: Mapping[str, Any]) -> str:
+def _refused(error: "Refused") -> str:
     """A refused value in words; without the value where none was sent."""
-    value = "" if error["value"] is None else f" = {error['value']!r}"
-    return f"{error['field']}{value}: {error['allowed']}"
+    value = "" if error.value is None else f" = {error.value!r}"
+    return f"{error.field}{value}: {error.allowed}"
 
 
 def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
@@ -145,17 +145,17 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
     except UnderskinError as error:  # the campaign is stored nevertheless
         return f"no d33: {error}", []
     moduli = [
-        f"E {significant(one['youngs_modulus_mpa'], 4)} ± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
-        for one in answer["moduli"]
+        f"E {significant(one.youngs_modulus_mpa, 4)} ± {significant(one.youngs_modulus_uncertainty_mpa, 2)} MPa"
+        for one in answer.moduli
     ]
-    array = answer["array"]
-    if array is not None:
-        d33 = f"d33 {significant(array['d33_pc_per_n'], 3)} ± {significant(array['d33_uncertainty_pc_per_n'], 2)} pC/N"
+    array = answer.array
+    if array is not None and array.d33_pc_per_n is not None and array.d33_uncertainty_pc_per_n is not None:
+        d33 = f"d33 {significant(array.d33_pc_per_n, 3)} ± {significant(array.d33_uncertainty_pc_per_n, 2)} pC/N"
     else:
-        d33 = f"no d33: {answer['reason'] or 'every sensor stands out'}"
-    results = moduli if moduli and answer["status"] == "none" else [d33, *moduli]
-    remarks = [f"look at: {finding}" for finding in answer["findings"]]
-    for left in answer["left_out"]:
-        of = "" if left["recording"] is None else f"recording {left['recording']}: "
-        remarks.append(f"left out: {of}{left['reason']}")
+        d33 = f"no d33: {answer.reason or 'every sensor stands out'}"
+    results = moduli if moduli and answer.status == "none" else [d33, *moduli]
+    remarks = [f"look at: {finding}" for finding in answer.findings]
+    for left in answer.left_out:
+        of = "" if left.recording is None else f"recording {left.recording}: "
+        remarks.append(f"left out: {of}{left.reason}")
     return ", ".join(results), remarks

@@ -29,6 +29,7 @@ class Sensor:
 
 
 def read_sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
+    """The sensors of an array, each with an id of its own."""
     if not isinstance(value, list | tuple):
         raise wrong_type(name, shown(value), "must be a list of sensors")
     sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]

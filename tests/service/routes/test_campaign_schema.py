@@ -1,4 +1,4 @@
-"""`campaign/1` in the OpenAPI document is what the service reads: it accepts what is kept, and refuses no such thing."""
+"""`campaign/1` in the OpenAPI document is what the service reads: what the one refuses, the other does."""
 
 import os
 from collections.abc import Iterator
