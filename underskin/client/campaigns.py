@@ -231,7 +231,7 @@ def _again(send: Callable[[], _Answer]) -> _Answer:
     return send()
 
 
-def pages(kind: type[_Entry], session: Session, path: str, noun: str, **filters: str | None) -> Iterator[_Entry]:
+def pages(kind: type[_Entry], session: Session, path: str, noun: str, /, **filters: str | None) -> Iterator[_Entry]:
     """The entries of a list, page after page."""
     cursor: str | None = None
     while True:
