@@ -21,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve unit test check docs tables paper tour mechanisms proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour openapi mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -61,6 +61,10 @@ paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 tour: $(VENV)/.dev ## regenerate docs/tour.md and its screenshots
 	@scripts/system-packages.sh chromium
 	$(PYTHON) -m docs.tour
+
+openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the client's typed answers
+	$(PYTHON) -m scripts.openapi_examples
+	$(PYTHON) -m scripts.client_documents
 
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
