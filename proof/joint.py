@@ -88,13 +88,28 @@ def _dates(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[
     changed = [entry for entry in hidden if entry["since"]]
     scopes = {entry["name"]: entry["scope"] for entry in together["mechanisms"]}
     expected = {entry["effect"] for entry in hidden}
-    since = [entry["effect"] in scopes and scopes[entry["effect"]].get("since") == entry["since"] for entry in changed]
+    since = [entry["since"] in _dates_of(entry["effect"], together) for entry in changed]
     return {
         "right": {"together": set(scopes) == expected, "alone": set(answer(diagnosed(documents[-1]))) == expected},
         "since": since,
         "false": not changed and any("since" in scope for scope in scopes.values()),
         "answers": {"together": [together["verdict"], {name: scope.get("since") for name, scope in scopes.items()}]},
     }
+
+
+def _dates_of(effect: str, together: Report) -> set[str | None]:
+    """The dates since which it is said to be there, by itself or as one of the group that a change of level may be."""
+    groups = [set(entry["mechanisms"]) for entry in together["presence"]]
+    dates = set()
+    for entry in together["mechanisms"]:
+        stated = {entry["name"]}
+        if "statement" in entry:
+            stated = stated.union(
+                *(group for group in groups if entry["name"] in group and "sensors" not in entry["scope"])
+            )
+        if effect in stated:
+            dates.add(entry["scope"].get("since"))
+    return dates
 
 
 def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:

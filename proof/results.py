@@ -17,6 +17,7 @@ from proof import (
     real,
     search_misses,
     sensitivity,
+    slips,
     unlisted,
     wrong_modulus,
 )
@@ -105,6 +106,7 @@ PARTS: dict[str, Part] = {
     "coverage": coverage.judge_coverage,
     "sensitivity": sensitivity.judge_sensitivity,
     "wrong_modulus": wrong_modulus.judge_wrong_modulus,
+    "slips": slips.judge_slips,
 }
 
 

@@ -1,15 +1,18 @@
 """Slips that a lab makes, applied to a campaign of the rig: what the recordings say then, and by how much χ² changes.
 
 χ² counts what the slip adds to the recordings' levels over gain, position and line scatter, or to their phases over
-line scatter. Where a slip changes nothing that a campaign can show, it is 0.
+line scatter. Where a slip changes nothing that a campaign can show, it is 0. Of levels and phases it is also worked out
+what of this no other cause can explain (`slip_rivals`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from proof.slip_rivals import LevelRivals, left_of_conjugated, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
 from underskin.mechanisms.unnamed.axes import recording_order
@@ -27,6 +30,11 @@ class Case:
     recorded: RecordedLines
     scatter: Floats
 
+    @cached_property
+    def rivals(self) -> LevelRivals:
+        """What else may move the levels."""
+        return LevelRivals(self.recorded, self.scatter)
+
     @property
     def entries(self) -> list[FrfRecording]:
         """Its recordings."""
@@ -39,10 +47,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Slip:
-    """The campaign with a slip, and the χ² that it adds."""
+    """The campaign with a slip, the χ² that it adds, and how much of it no other cause explains (None: all)."""
 
     campaign: Campaign
     chi2: float
+    over_rivals: float | None = None
 
 
 Make = Callable[[Case, np.random.Generator], Slip | None]
@@ -55,7 +64,8 @@ def _scaled(case: Case, logarithm: Floats) -> Slip:
     mean = float((weight * logarithm).sum() / weight.sum())
     factors = np.exp(logarithm)
     entries = [_times(entry, float(factor)) for entry, factor in zip(case.entries, factors, strict=True)]
-    return Slip(case.with_entries(entries), float((weight * (logarithm - mean) ** 2).sum()))
+    chi2 = float((weight * (logarithm - mean) ** 2).sum())
+    return Slip(case.with_entries(entries), chi2, min(chi2, case.rivals.left_of(logarithm)))
 
 
 def _times(entry: FrfRecording, factor: float, conjugate: float = 1.0) -> FrfRecording:
@@ -96,11 +106,11 @@ def _exchanged(case: Case, random: np.random.Generator, since: float) -> Slip | 
         replace(entry, sensor=second if entry.sensor == first else first) if wrong else entry
         for entry, wrong in zip(case.entries, turned, strict=True)
     ]
-    placed = case.entries[0].position_mm is not None
-    return Slip(
-        case.with_entries(entries),
-        _of_places(case, turned) if placed else _of_gains(case, turned, first, second) if since else 0.0,
-    )
+    wrong = case.with_entries(entries)
+    if case.entries[0].position_mm is not None:
+        return Slip(wrong, _of_places(case, turned))
+    each = _of_gains(case, turned, first, second) if since else (0.0, 0.0)
+    return Slip(wrong, sum(each), min(each))  # a step of either sensor alone, of any size, leaves the other one's
 
 
 def _of_places(case: Case, turned: Mask) -> float:
@@ -108,17 +118,21 @@ def _of_places(case: Case, turned: Mask) -> float:
     return float((np.minimum(case.scatter, 1.0)[turned] ** -2.0).sum())
 
 
-def _of_gains(case: Case, turned: Mask, first: str, second: str) -> float:
-    """What two sensors of unequal gains scatter about their means more than they did."""
+def _of_gains(case: Case, turned: Mask, first: str, second: str) -> tuple[float, float]:
+    """What each of two sensors of unequal gains scatters about its mean, by the labels given."""
     gains = case.recorded.response.sensor_gains
     ids = [sensor.id for sensor in case.campaign.skin.sensors]
     step = float(np.log(gains[ids.index(first)] / gains[ids.index(second)]))
-    total = 0.0
-    for name in (first, second):
-        own = np.array([entry.sensor == name for entry in case.entries])
-        both = turned[own].astype(float)
-        total += float((((both - both.mean()) * step / case.scatter[own]) ** 2).sum()) if own.any() else 0.0
-    return total
+    labels = np.array([entry.sensor for entry in case.entries])
+    given = np.where(turned, np.where(labels == first, second, first), labels)
+
+    def scattered(name: str) -> float:
+        own = (given == name) & np.isfinite(case.scatter)
+        weight = case.scatter[own] ** -2.0
+        other = turned[own].astype(float)
+        return float(step**2 * (weight * (other - np.average(other, weights=weight)) ** 2).sum()) if own.any() else 0.0
+
+    return scattered(first), scattered(second)
 
 
 def conjugated(share: float) -> Make:
@@ -132,7 +146,9 @@ def conjugated(share: float) -> Make:
             _times(entry, 1.0, -1.0) if wrong else entry for entry, wrong in zip(case.entries, turned, strict=True)
         ]
         phase = 4 * case.recorded.exact.imag**2 / case.recorded.line_variance
-        return Slip(case.with_entries(entries), float(phase[turned].sum()))
+        chi2 = float(phase[turned].sum())
+        rivals = left_of_conjugated(case.recorded) if turned.all() else over_one_sign(case.recorded, turned, share)
+        return Slip(case.with_entries(entries), chi2, min(chi2, rivals))
 
     return make
 

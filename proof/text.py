@@ -13,6 +13,7 @@ from proof.statistics import Share, calibration, share
 from proof.text_curves import curves, quiet_curves
 from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
+from proof.text_slips import slips
 from proof.text_unlisted import alarms, hidden, left_out
 from proof.text_wide import coverage, search_misses, sensitivity
 from proof.text_wrong_modulus import wrong_modulus
@@ -54,6 +55,7 @@ def document(parts: Mapping[str, Result]) -> str:
         "search": search_misses,
         "sensitivity": sensitivity,
         "wrong_modulus": wrong_modulus,
+        "slips": slips,
         "recordings": recordings,
         "paper": paper_array,
     }

@@ -54,7 +54,8 @@ def _of_dates(entries: Sequence[Result]) -> str:
     return (
         f"Of {len(entries)} pairs of dates the set of mechanisms is right together in "
         f"{_of([entry['right']['together'] for entry in entries])}, from the last date alone in "
-        f"{_of([entry['right']['alone'] for entry in entries])}; what changed is named with its date in {_of(since)}; "
+        f"{_of([entry['right']['alone'] for entry in entries])}; what changed is named with its date, a change "
+        f"of level as one of the mechanisms that would make it, in {_of(since)}; "
         f"where nothing that shows changed, a change is stated in {_of(quiet)}.\n"
     )
 

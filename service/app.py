@@ -40,6 +40,7 @@ from service.routes.query_guard import known_query
 from service.settings import Settings
 from service.store import Database
 from service.store.write_turns import THREADS
+from service.usecases.scheduled_backups import ScheduledBackups
 from underskin import __version__
 from underskin.surrogate.sigma_table import SIGMA_TABLE, SigmaTable
 
@@ -52,10 +53,14 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     state.access.requirement.start()
     state.runner.start()
+    if state.backups is not None:
+        state.backups.start()
     yield
     await run_in_threadpool(state.access.requirement.stop)
     await run_in_threadpool(state.runner.stop)
     await run_in_threadpool(state.planner.stop)
+    if state.backups is not None:
+        await run_in_threadpool(state.backups.stop)
     state.uploads.close()
     state.store.close()
     request_log.flush()
@@ -82,6 +87,11 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
         settings.tables / SIGMA_TABLE, table.sha256, memory_bytes, keeps_ready=settings.diagnosis_ready
     )
     api.state.runner = Runner(store, processes, settings.diagnosis_workers)
+    api.state.backups = (
+        None
+        if settings.backup_to is None
+        else ScheduledBackups(store, settings.backup_to, settings.backup_every, settings.backup_keep)
+    )
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])

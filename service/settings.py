@@ -64,9 +64,18 @@ class Settings(BaseSettings):
         "127.0.0.1, [::1] and the address it is bound to. A request with another Host is refused.",
     )
 
-    @field_validator("data")
+    backup_to: Path | None = Field(
+        default=None,
+        description="Folder into which the server writes backups of its store on a schedule; left out: it makes none.",
+    )
+    backup_every: float = Field(default=24.0, gt=0, le=8760, description="Hours between two of them.")
+    backup_keep: int = Field(default=14, ge=1, le=10_000, description="How many are kept; older ones are deleted.")
+
+    @field_validator("data", "backup_to")
     @classmethod
-    def _home(cls, data: Path) -> Path:
+    def _home(cls, data: Path | None) -> Path | None:
+        if data is None:
+            return None
         try:
             return data.expanduser()
         except RuntimeError as error:

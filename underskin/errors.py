@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
+from http import HTTPStatus
 from typing import Any, Self
 
 
@@ -222,13 +223,17 @@ class SolverError(UnderskinError):
     """A finite-element solve that did not converge, even with smaller steps; the message names the point."""
 
 
+_KEY = " (api_key of Client, --key or UNDERSKIN_API_KEY of the command line)"
+
+
 class ServiceError(UnderskinError):
     """The server refused or failed; carries the RFC 9457 problem (`problem`) and the HTTP `status`."""
 
     def __init__(self, status: int, problem: dict[str, Any]) -> None:
         self.status = status
         self.problem = problem
-        super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}")
+        where = _KEY if status == HTTPStatus.UNAUTHORIZED else ""
+        super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}{where}")
 
 
 class Unreachable(UnderskinError):

@@ -13,6 +13,7 @@ from service.store import Database, StorageFull, StoreError, database, key_requi
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
+from underskin.cli.progress import byte_steps
 from underskin.mechanisms.declared.document import FOLDER
 
 
@@ -25,7 +26,8 @@ def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file 
         if store.is_sqlite and not Path(str(store.url.database)).exists():
             raise UnderskinError(f"there is no store in {settings.data}: set UNDERSKIN_DATA to the server's folder")
         _remember_mechanisms(store)
-        backups.make(store, file)
+        with byte_steps() as progress:
+            backups.make(store, file, progress)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error
     typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
@@ -42,7 +44,8 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
         store.make()
         if migrate.version(store) is not None:
             _remember_mechanisms(store)
-        migrate.restore(store, file, before)
+        with byte_steps() as progress:
+            migrate.restore(store, file, before, progress)
         needed = store.read(key_requirement.is_needed)
     except (StoreError, OSError) as error:
         raise UnderskinError(str(error)) from error

@@ -16,6 +16,7 @@ from service.store import Database, answers, campaigns, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
 
@@ -35,6 +36,7 @@ class IngestOptions:
     idempotency_key: str | None
     sender: str | None
     most_json_bytes: int
+    estimator: Estimator | None = None
 
     def __post_init__(self) -> None:
         """Raises InvalidInput."""
@@ -50,9 +52,11 @@ class IngestOptions:
         """What makes a repetition of this request recognisable."""
         if self.idempotency_key is None:
             return None
-        options = [self.skin, self.corrects, self.reason, self.all_or_nothing]
+        options: list[Any] = [self.skin, self.corrects, self.reason, self.all_or_nothing]
         if self.together is not None:  # otherwise as it always was: keys hold for as long as the store
             options.append(self.together)
+        if self.estimator is not None:
+            options.append({"estimator": self.estimator})
         sent = [[upload.field, upload.label, upload.sha256] for upload in uploads]
         digest = hashlib.sha256(repr([options, sent]).encode()).hexdigest()
         return answers.KnownRequest(self.sender or "", self.idempotency_key, digest)
@@ -116,7 +120,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     for upload in uploads:
         if upload.field != RIG:
             more = look(upload, rig, options.most_json_bytes).campaigns
-            files += more
+            files += [one.with_estimator(options.estimator) for one in more]
             recordings += sum(one.recordings for one in more)
             require_few(len(files), recordings)
     if options.together is None or not files:

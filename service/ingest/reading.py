@@ -15,6 +15,7 @@ from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requir
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
 from underskin.recordings.channels import Contents
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
 from underskin.recordings.rig_description import RigDescription
@@ -48,6 +49,10 @@ class ReadCampaign:
             return 0
         refused = {problem.recording for problem in self.reading.problems}
         return len(refused) + len(self.reading.campaign.recordings)
+
+    def with_estimator(self, estimator: Estimator | None) -> "ReadCampaign":
+        """The same with the FRFs of its time series estimated so."""
+        return replace(self, reading=None if self.reading is None else self.reading.with_estimator(estimator))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, InvalidInput, wrong_type
-from underskin.prediction.columns import CsvError, from_csv, without_labels
+from underskin.prediction.csv_columns import CsvColumn, CsvError, from_csv
 
 try:
     import simdjson
@@ -109,29 +109,23 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
 
 def _from_csv(kind: type[ColumnsRequest], body: bytes) -> tuple[dict[str, Any], dict[str, list[str]]]:
     try:
-        columns, labels = without_labels(from_csv(body.decode("utf-8-sig")), kind.model_fields)
-    except UnicodeDecodeError as error:
-        raise Refusal(400, f"The body is not CSV in UTF-8: {error}.") from None
+        found = from_csv(body, kind.model_fields)
     except CsvError as error:
         raise Refusal(400, f"The CSV of the body {error}.") from None
-    return {name: _cells(kind, name, cells) for name, cells in columns.items()}, labels
+    # The request's own checks refuse unknown columns.
+    return {
+        **found.unknown,
+        **{name: _cells(kind, name, column) for name, column in found.fields.items()},
+    }, found.labels
 
 
-def _cells(kind: type[ColumnsRequest], name: str, cells: list[str]) -> Any:
+def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn) -> Any:
     if name in kind.lists:
-        raise wrong_type(name, cells[0], f"cannot be sent as CSV; send application/json or {NPZ}")
-    if name in kind.constants:
-        return _constant(name, cells)
-    numbers = []
-    for row, cell in enumerate(cells):
-        try:
-            numbers.append(float(cell))
-        except ValueError:
-            raise wrong_type(name, cell, index=row) from None
-    return numbers
+        raise wrong_type(name, column.cells[0], f"cannot be sent as CSV; send application/json or {NPZ}")
+    return _constant(name, column.cells) if name in kind.constants else column.numbers(name)
 
 
-def _constant(name: str, cells: list[str]) -> str | bool:
+def _constant(name: str, cells: Sequence[str]) -> str | bool:
     for row, cell in enumerate(cells):
         if cell != cells[0]:
             raise InvalidInput(

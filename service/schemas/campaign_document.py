@@ -6,9 +6,10 @@ sensor that the skin must have, only the reader can say; each field is described
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING
-from typing import Any
+from typing import Any, get_args
 
 from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.recordings import noted_columns
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import (
     LINES,
@@ -17,8 +18,10 @@ from underskin.recordings.campaign import (
     CompressionRecording,
     FrfRecording,
     IndentationRecording,
+    read_estimator,
 )
 from underskin.recordings.conditions import Sensor, SkinDescription, read_sensors
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.shown_values import LONGEST_NAME
 from underskin.units import LAB
 
@@ -48,15 +51,16 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
     field.frequencies: _column(minimum=_LOWEST_HZ, maximum=_HIGHEST_HZ),
     field.not_falling: _column(),
     field.coherence: _column(minimum=0, maximum=1 + field.COHERENCE_ROUNDING),
-    field.further: {
+    noted_columns.further: {
         "type": "object",
-        "maxProperties": field.MOST_CONDITIONS,
+        "maxProperties": noted_columns.MOST_CONDITIONS,
         "propertyNames": {
-            "pattern": f"^{field.CONDITION.pattern}$",
-            "not": {"enum": sorted(field.BUILT_IN_AXES)},
+            "pattern": f"^{noted_columns.CONDITION.pattern}$",
+            "not": {"enum": sorted(noted_columns.BUILT_IN_AXES)},
         },
         "additionalProperties": {"anyOf": [{"type": "number"}, _NAME, _NULL]},
     },
+    read_estimator: {"type": "string", "enum": list(get_args(Estimator))},
     read_sensors: {"type": "array", "items": {"$ref": f"{_REF}Sensor"}},
 }
 
@@ -88,6 +92,8 @@ _WORDS: Mapping[str, str] = {
     "frf_im_pc_per_n": "Imaginary part of the FRF by e^(+iωt), one entry a line [pC/N].",
     "coherence": "Coherence γ² of each line, 0 to 1 [-].",
     "sample_rate_hz": "Sampling rate of the time series [Hz].",
+    "estimator": "How the FRF is estimated: `H1` is unbiased by noise in the charge, `H2` by noise in the force, `Hv` "
+    "by equal relative noise in both; `H1` where it is left out.",
     "force_n": "Force, one entry a sample, compression positive [N].",
     "charge_pc": "Charge, one entry a sample [pC].",
     "displacement_mm": "Displacement, one entry a sample, loading and unloading in order, compression positive [mm].",
@@ -103,7 +109,7 @@ def campaign_schemas() -> dict[str, Schema]:
     parts = {
         "Sensor": _object(Sensor, "A sensor of the array."),
         "Skin": _object(SkinDescription, "The skin as the lab declares it."),
-        "FrfRecording": _frf(LINES, (*TIME_SERIES,), "Charge over force, line by line."),
+        "FrfRecording": _frf(LINES, (*TIME_SERIES, "estimator"), "Charge over force, line by line."),
         "FrfTimeSeries": _frf(
             TIME_SERIES, (*LINES, "coherence"), "Force and charge over time, from which charge over force is estimated."
         ),

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, WithJsonSc
 
 from service.problems import validated
 from underskin.errors import ErrorCode, conflicting
+from underskin.recordings.frf.estimators import Estimator
 
 State = Literal["current", "corrected", "withdrawn"]
 
@@ -31,6 +32,11 @@ class SendOptions(BaseModel):
         description="Join all that is sent, such as a file a press, into one campaign of this name. All must be of "
         "one skin; a file that cannot be read is a refused recording, by the file's name.",
         examples=["palm 3 on Monday"],
+    )
+    estimator: Estimator | None = Field(
+        default=None,
+        description="How FRFs are estimated from time series, whatever the campaigns or the rig description say: `H1` "
+        "is unbiased by noise in the charge, `H2` by noise in the force, `Hv` by equal relative noise in both.",
     )
 
     def with_form(self, fields: Mapping[str, str]) -> "SendOptions":

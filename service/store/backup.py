@@ -2,6 +2,8 @@
 
 SQLite: a copy by its online backup, an ordinary database file. PostgreSQL: pg_dump's custom format. Either is read back
 whole before it counts: by SQLite's integrity_check, by pg_restore into nothing.
+
+Progress is told as what is done, in how many bytes, of how many; None where that is not known.
 """
 
 import os
@@ -9,14 +11,27 @@ import shutil
 import sqlite3
 import subprocess
 import tempfile
+import time
+from collections.abc import Callable
 from contextlib import closing, suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import IO
 
 from service import durable
 from service.store.engine import Database
 from service.store.errors import StoreError
 from service.store.tables import metadata
+
+Progress = Callable[[str, int, int | None], object]
+_BACKING_UP, _READING_BACK, _RESTORING = "backing up", "reading back", "restoring"
+STEP_PAGES = 1000  # of an SQLite database, copied between two words of progress
+_STEP_BYTES = 1 << 20
+_LOOK_S = 0.1
+
+
+def untold(_what: str, _done: int, _of: int | None) -> None:
+    """Progress that nobody looks at."""
 
 
 def place(database: Database, folder: Path, occasion: str) -> Path:
@@ -25,20 +40,20 @@ def place(database: Database, folder: Path, occasion: str) -> Path:
     return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{suffix}"
 
 
-def make(database: Database, file: Path) -> None:
+def make(database: Database, file: Path, progress: Progress = untold) -> None:
     """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + ".part")
     part.unlink(missing_ok=True)
     try:
         if database.is_sqlite:
-            _copy_sqlite(_sqlite_file(database), part)
+            _copy_sqlite(_sqlite_file(database), part, _BACKING_UP, progress)
             _make_one_file(part)
         else:
-            address, password = _address(database)
-            options = ("--format=custom", "--no-owner", "--file", str(part))
-            _run("pg_dump", "--dbname", address, *options, environment=password)
+            _dump_pg(database, part, progress)
+        progress(_READING_BACK, 0, None)
         verify(database, part)
+        progress(_READING_BACK, part.stat().st_size, part.stat().st_size)
         with part.open("rb") as written:
             os.fsync(written.fileno())
         durable.replace(part, file)
@@ -73,19 +88,28 @@ def verify(database: Database, file: Path) -> str:
     return rows[0]
 
 
-def replace_with(database: Database, file: Path) -> None:
+def replace_with(database: Database, file: Path, progress: Progress = untold) -> None:
     """Put a backup in place of the store in one transaction; running servers see it from their next request on."""
     verify(database, file)
     if database.is_sqlite:
-        _copy_sqlite(file, _sqlite_file(database))
+        _copy_sqlite(file, _sqlite_file(database), _RESTORING, progress)
     else:
-        _replace_pg(database, file)
+        _replace_pg(database, file, progress)
 
 
-def _copy_sqlite(source: Path, target: Path) -> None:
+def _copy_sqlite(source: Path, target: Path, what: str, progress: Progress) -> None:
     try:
         with closing(_open_sqlite(source)) as origin, closing(sqlite3.connect(target, timeout=60)) as copy:
-            origin.backup(copy)  # in one step: a store in use is replaced whole, and its writers do not disturb a copy
+            page_bytes = origin.execute("PRAGMA page_size").fetchone()[0]
+
+            def told(_status: int, remaining: int, pages: int) -> None:
+                progress(what, (pages - remaining) * page_bytes, pages * page_bytes)
+
+            # A transaction of the source holds one state of it: its writers do not disturb a copy in steps, which
+            # would begin anew with each of their commits. The target is replaced in one transaction of its own.
+            origin.execute("BEGIN")
+            origin.execute("SELECT count(*) FROM sqlite_master").fetchone()
+            origin.backup(copy, pages=STEP_PAGES, progress=told)
     except sqlite3.Error as error:
         raise StoreError(f"{source} cannot be copied to {target}: {error}") from error
 
@@ -105,7 +129,23 @@ def _sqlite_file(database: Database) -> Path:
     return Path(database.url.database)
 
 
-def _replace_pg(database: Database, file: Path) -> None:
+def _dump_pg(database: Database, part: Path, progress: Progress) -> None:
+    _require("pg_dump")
+    address, password = _address(database)
+    command = ["pg_dump", "--dbname", address, "--format=custom", "--no-owner", "--file", str(part)]
+    with (
+        tempfile.TemporaryFile() as complaints,
+        subprocess.Popen(command, env=os.environ | password, stderr=complaints) as dump,
+    ):
+        while dump.poll() is None:
+            time.sleep(_LOOK_S)
+            progress(_BACKING_UP, part.stat().st_size if part.exists() else 0, None)
+        complaints.seek(0)
+        if dump.returncode != 0:
+            raise StoreError(f"pg_dump failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
+
+
+def _replace_pg(database: Database, file: Path, progress: Progress) -> None:
     """All tables away and those of the backup there; `pg_restore --clean` knows only the latter, and a table that the
     backup's version lacks would hold on to them."""
     for program in ("psql", "pg_restore"):
@@ -122,13 +162,29 @@ def _replace_pg(database: Database, file: Path) -> None:
         with suppress(BrokenPipeError), psql.stdin as script:  # where it has ended, it says why
             script.write(f"BEGIN; DROP TABLE IF EXISTS {ours};\n".encode())
             script.flush()
-            made = subprocess.run(["pg_restore", "--no-owner", "--file=-", file], stdout=script, stderr=complaints)
-            whole = made.returncode == 0
+            whole = _script_of(file, script, complaints, progress)
             script.write(b"COMMIT;\n" if whole else b"ROLLBACK;\n")
         psql.wait()
         complaints.seek(0)
         if psql.returncode != 0 or not whole:
             raise StoreError(f"the restore failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
+
+
+def _script_of(file: Path, script: IO[bytes], complaints: IO[bytes], progress: Progress) -> bool:
+    """Write a dump as SQL into a pipe; whether all of it was good."""
+    command = ["pg_restore", "--no-owner", "--file=-"]
+    size, done = file.stat().st_size, 0
+    with (
+        file.open("rb") as dump,
+        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=script, stderr=complaints) as made,
+    ):
+        assert made.stdin is not None
+        with suppress(BrokenPipeError), made.stdin as sink:  # where it has ended, it says why
+            while chunk := dump.read(_STEP_BYTES):
+                sink.write(chunk)
+                done += len(chunk)
+                progress(_RESTORING, done, size)
+    return made.returncode == 0
 
 
 def _address(database: Database) -> tuple[str, dict[str, str]]:

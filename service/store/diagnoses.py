@@ -199,21 +199,21 @@ def claim(connection: Connection, server: str, basis: Basis) -> AnyRow | None:
     Servers that claim at once do not get the same one. It is run with what the server that has it now diagnoses with,
     whatever that was when it was asked for.
     """
-    clock = _clock(connection)
-    abandoned = (diagnoses.c.alive_at < clock - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
+    moment = clock(connection)
+    abandoned = (diagnoses.c.alive_at < moment - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
     waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & abandoned)
     query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:
         return None
-    taken = {"state": "running", "claimed_by": server, "alive_at": clock, "progress": 0.0, "started_at": now()}
+    taken = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
     connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **asdict(basis)))
     return find(connection, row.id)
 
 
 def keep_alive(connection: Connection, number: int, server: str, progress: float) -> bool:
     """Say that it still runs here, and how far it is; False where it is no longer this server's."""
-    return _mine(connection, number, server, progress=progress, alive_at=_clock(connection))
+    return _mine(connection, number, server, progress=progress, alive_at=clock(connection))
 
 
 def finish(
@@ -268,7 +268,7 @@ def _mine(connection: Connection, number: int, server: str, **values: Any) -> bo
     return bool(connection.execute(update(diagnoses).where(this).values(**values)).rowcount)
 
 
-def _clock(connection: Connection) -> float:
+def clock(connection: Connection) -> float:
     """Seconds by a clock that all servers of the store share."""
     if connection.dialect.name == "sqlite":
         return time.time()

@@ -83,7 +83,7 @@ def _one_at_a_time(database: Database, folder: Path) -> Iterator[None]:
             yield
 
 
-def restore(store: Database, file: Path, before: Path) -> None:
+def restore(store: Database, file: Path, before: Path, progress: backup.Progress = backup.untold) -> None:
     """Replace the store by the backup `file`, brought up to date; what was there is in `before`.
 
     Where keys were needed they still are, whatever the backup says.
@@ -95,8 +95,8 @@ def restore(store: Database, file: Path, before: Path) -> None:
     with store.without_writers():  # what is acknowledged after the backup would be lost
         needed = store.read(key_requirement.is_needed)
         if version(store) is not None:
-            backup.make(store, before)
-        backup.replace_with(store, file)
+            backup.make(store, before, progress)
+        backup.replace_with(store, file, progress)
     migrate(store, before.parent.parent)
     if needed:
         store.write(key_requirement.require)

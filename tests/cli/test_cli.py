@@ -85,6 +85,11 @@ def test_csv_file_written_by_a_spreadsheet(tmp_path: Path) -> None:
     sheet.write_bytes(b"sep=;\r\nPress;preload_n;frf_pc_per_n\r\nerste;1,0;7,4\r\n# Pause\r\nzweite;3;11,5\r\n")
     german = columns("d33", *SKIN, "--input", str(sheet))
     assert (german["Press"], german["d33_pc_per_n"]) == (["erste", "zweite"], written)
+    sheet.write_bytes(",ID,Preload [mN],FRF_pC_per_N,\n0,17,1000,7.4,\n1,18,3000,11.5,\n".encode("utf-16"))
+    capitals = columns("d33", *SKIN, "--input", str(sheet))
+    assert (capitals["ID"], capitals["d33_pc_per_n"]) == (["17", "18"], written)
+    sheet.write_text("A_over_h,RT_over_h\n0.3,0.6\n")
+    assert columns("sigma", "--input", str(sheet))["a_over_h"] == ["0.3"]
 
 
 @pytest.mark.slow
@@ -129,9 +134,12 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
         ("preload_n,preload_n\n1,7\n", "must name each field once; its header has 'preload_n' twice"),
         (
             "preload_n,frf_pc_per_n\n1,7\n1\n",
-            "must have as many cells in each row as in the header: 1 in row 1, 2 in the header",
+            "must have as many cells in each row as in the header: 1 on line 3, 2 in the header",
         ),
-        ("preload_n,frf_pc_per_n\n1,7\n3,-\n", "frf_pc_per_n[1] = '-': must be a number"),
+        ("preload_n,frf_pc_per_n\n1,7\n3,-\n", "frf_pc_per_n[1] = '-': must be a number (line 3)"),
+        ("# mb\npreload_n,frf_pc_per_n\n\n1,x\n", "frf_pc_per_n[0] = 'x': must be a number (line 4)"),
+        ('preload_n,frf_pc_per_n\n"1,000",7\n', "(line 2); 1,000 can be 1000 or 1.000: write it without a comma"),
+        ("preload_n,Preload [mN],frf_pc_per_n\n1,1000,7\n", "'preload_n' twice: 'preload_n' and 'Preload [mN]'"),
         ("preload_n,thickness_mm,frf_pc_per_n\n1,1,7\n", "thickness_mm = '2.5': is also a column of -; give it once"),
         ('preload_n,frf_pc_per_n\n"1,7\n', "must be readable as CSV"),
     ],

@@ -8,8 +8,8 @@ from rig.wide_tails import WIDE
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.inference.over_spread import over_spread
-from underskin.diagnosis.inference.unseen import Normals, beside
+from underskin.diagnosis.inference.over_spread import Normals, over_spread
+from underskin.diagnosis.inference.unseen import beside
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.numbers import parameter, place_of
 from underskin.recordings.campaign import parse
@@ -79,12 +79,34 @@ def test_two_sensors_leave_d33_more_open_than_their_most_probable_spread(table: 
         assert found is not None
         place = place_of(found, "d33")
         index = found.best.hypothesis.mean_places.index(place)
-        mixture = over_spread(found.best, place)
-        assert mixture is not None
+        averages = over_spread(found.best.fitter, found.best.at, place)
+        assert averages is not None
+        (mixture,) = averages
         assert mixture.share.sum() == pytest.approx(1.0)
         ratios.append(spread_of(mixture) / np.sqrt(found.best.covariance[index, index]))
     assert ratios[0] > 1.3
     assert ratios[1] == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.slow
+def test_beside_what_does_not_show_two_sensors_leave_d33_as_open_as_without_it(table: SigmaTable) -> None:
+    """At each strength of a wrong thickness d33 is averaged over the sensors' spread, as it is without one."""
+    made = Made(**{**vars(CENTRED), "mechanisms": ("sensor_spread",), "parameters": (0.15,), "sensors": 2})
+    fitting = problem(made, table)
+    (spread,) = fitting.explain([Request(("sensor_spread",))])
+    assert spread is not None
+    averages = over_spread(spread.best.fitter, spread.best.at, place_of(spread, "d33"))
+    assert averages is not None
+    found = beside(fitting, spread, "thickness_error", "d33")
+    assert found is not None
+    places = len(found.share) // len(averages[0].share)
+    assert places > 3
+    for share, mean, deviation in zip(
+        *(np.split(part, places) for part in (found.share, found.mean, found.deviation)), strict=True
+    ):
+        at_one = spread_of(Normals(share, mean, deviation))
+        assert at_one == pytest.approx(spread_of(averages[0]), rel=0.25)
+        assert at_one > 1.2 * deviation[np.argmax(share)]
 
 
 @pytest.mark.slow

@@ -54,3 +54,13 @@ def test_presses_beside_the_sensors_tell_the_thickness_and_d33(factor: float, ta
     assert [entry["name"] for entry in found["mechanisms"]] == (["thickness_error"] if factor != 1.0 else [])
     assert found["d33"]["low"] < D33 < found["d33"]["high"]
     assert found["d33"]["quotable"]
+
+
+def test_physics_that_would_not_show_stands_beside_the_value_to_quote(table: SigmaTable) -> None:
+    """A glue line that slips changes d33 alone; presses 1 mm beside the sensor tell the thickness, but not that."""
+    found = report([[0.0, 0.0], [1.0, 0.0]], 1.0, table, (4.0,))
+    assert found["d33"]["quotable"]
+    (entry,) = [one for one in found["not_identifiable"] if one["mechanism"] == "interface_slip"]
+    percent = entry["reason"].partition("d33 would then be ")[2].partition(" too large")[0]
+    assert float(percent.removesuffix(" %")) > 100 * (found["d33"]["high"] / found["d33"]["value"] - 1)
+    assert f"provided that no interface slip ({percent}) hides" in found["statement"]

@@ -7,7 +7,9 @@ import pytest
 
 from service.pages.diagnosis.figure_columns import columns
 from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.html_report import of_report, page
+from underskin.diagnosis.reporting.several_figures import sensors_over_campaigns
 from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.recordings.campaign import Campaign
@@ -61,3 +63,30 @@ def test_each_skin_stands_on_the_band_of_its_population(fleet: dict[str, Any]) -
     shown = page(fleet)
     assert 'id="figure-population"' in shown
     assert "<i>weak" not in shown
+
+
+def test_of_many_sensors_the_median_the_range_and_those_apart_are_drawn_without_a_legend() -> None:
+    random = np.random.default_rng(5)
+    rows = []
+    for name, level in (("may", 15.0), ("june", 12.0)):
+        for number, d33 in enumerate(level * np.exp(0.02 * random.normal(size=60))):
+            value = 0.7 * level if (name, number) == ("june", 31) else float(d33)
+            rows.append({"campaign": name, "sensor": f"s{number}", "unit": "pC/N", "value": value})
+            rows[-1] |= {"low": 0.98 * value, "high": 1.02 * value}
+    figure = sensors_over_campaigns(rows)
+    median, apart = figure.data
+    assert figure.layout.showlegend is False
+    for number, name in enumerate(("may", "june")):
+        own = np.array([row["value"] for row in rows if row["campaign"] == name])
+        assert median.y[number] == pytest.approx(np.median(own))
+        low, high = (
+            median.y[number] + way for way in (-median.error_y.arrayminus[number], median.error_y.array[number])
+        )
+        assert ((own > low) & (own < high)).sum() == 54  # 90 %
+    assert (list(apart.text), list(apart.x), list(apart.y)) == (["s31"], [1], [0.7 * 12.0])
+
+
+def test_quantities_of_a_fleet_are_called_in_words(fleet: dict[str, Any]) -> None:
+    titles = [entry.text for entry in of_report(fleet)["population"].layout.annotations]
+    assert titles == ["d33 [pC/N]", "Young's modulus [MPa]", "Thickness [mm]"]
+    assert quantity_in_words("contact_resonance.tip_mass") == "tip mass of contact resonance"

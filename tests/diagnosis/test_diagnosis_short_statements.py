@@ -106,3 +106,12 @@ def test_several_sentences_become_one_and_names_stay_as_they_are() -> None:
         of_clauses(["d33 fell", "A cell drifts"], [], [""], ["E from FRFs"]) == "d33 fell; a cell drifts. E from FRFs."
     )
     assert len(sentences(of_clauses([said], [said]))) == 2
+
+
+def test_names_with_full_stops_stay_whole_within_a_sentence() -> None:
+    names = ["Palm 2. Upper", "Was it 3.5? No", "May"]
+    said = of_clauses([f"a layer in {names[0]} alone"], [f"d33 fell between {names[1]} and {names[2]}"], names=names)
+    assert len(sentences(said)) == 2
+    shown = said.replace("\N{NO-BREAK SPACE}", " ")
+    assert all(name in shown for name in names)
+    assert said.startswith("A layer in Palm 2.\N{NO-BREAK SPACE}Upper alone. ")

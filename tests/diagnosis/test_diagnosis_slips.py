@@ -161,6 +161,25 @@ def test_a_factor_that_all_recordings_share_and_one_of_no_meaning_are_no_slips(
     assert named(inspect(changed(good, lambda entry, n: times(entry, 1.65 if off[n] else 1.0)), table)) == []
 
 
+@pytest.mark.parametrize("factor", [0.5**0.5, 2**0.5])
+def test_rms_is_told_beside_a_scatter_that_no_rig_has(factor: float, table: SigmaTable) -> None:
+    """A campaign of the rig whose places scatter: levels of two kinds look like a gain that scatters by 16 %."""
+    made, _ = from_dict(recorded_campaign(record(drawn(900500, 11, "none"))))
+    off = np.random.default_rng(11).random(len(made.recordings)) < 1 / 3
+    assert named(inspect(made, table)) == []
+    inspected = inspect(changed(made, lambda entry, n: times(entry, factor if off[n] else 1.0)), table)
+    assert named(inspected) == [Reason.AMPLITUDE_FACTOR]
+
+
+def test_a_warm_up_is_told_where_nothing_else_moves_the_levels(table: SigmaTable) -> None:
+    """A campaign of the rig of one sensor, its preloads in rising order, that starts at 0.8 of its level."""
+    made, _ = from_dict(recorded_campaign(record(drawn(900500, 14, "none"))))
+    order = recording_order(frf_recordings(made))
+    cold = changed(made, lambda entry, n: times(entry, 1 - 0.2 * float(np.exp(-order[n] / 3.5))))
+    assert named(inspect(made, table)) == []
+    assert named(inspect(cold, table)) == [Reason.WARM_UP]
+
+
 def shuffled(made: Campaign) -> Campaign:
     """Recorded in another order than listed, by `recorded_at`; without load cycles, which may age a sensor."""
     order = np.random.default_rng(3).permutation(len(made.recordings))
@@ -261,6 +280,77 @@ def test_two_sensors_that_fall_silent_together_have_their_cables_exchanged(good:
     inspected = inspect(changed(good, unheard), table)
     assert named(inspected) == [Reason.CABLES_EXCHANGED]
     assert len(inspected.campaign.recordings) == 26 + 8
+
+
+def test_exchanged_labels_are_told_where_all_contacts_miss_their_places(table: SigmaTable) -> None:
+    """The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place."""
+    description = drawn(934567, 56, "single")
+    assert set(description["effects"]) == {"misalignment"}
+    made, _ = from_dict(recorded_campaign(record(description)))
+    assert named(inspect(made, table)) == []
+    inspected = inspect(changed(made, exchanged("s02", "s04")), table)
+    assert named(inspected) == [Reason.LABELS_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(made)
+    ]
+
+
+def test_the_labels_of_an_array_of_two_sensors_are_exchanged(table: SigmaTable) -> None:
+    """No recording then answers as given."""
+    two = campaign(Made(sensors=2, repeats=2, lines=20), table)
+    inspected = inspect(changed(two, exchanged("s0", "s1")), table)
+    assert named(inspected) == [Reason.LABELS_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(two)
+    ]
+
+
+def test_a_single_recording_after_an_exchange_tells_it_by_its_place(good: Campaign, table: SigmaTable) -> None:
+    last = max(number for number, entry in enumerate(frf_recordings(good)) if entry.sensor in ("s0", "s2"))
+    inspected = inspect(changed(good, exchanged("s0", "s2", last)), table)
+    assert named(inspected) == [Reason.CABLES_EXCHANGED]
+    told = next(entry for entry in inspected.findings if entry.reason == Reason.CABLES_EXCHANGED)
+    assert told.arguments["recordings"] == 1
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(good)
+    ]
+
+
+def test_a_step_of_one_sensor_alone_is_no_exchange(good: Campaign, table: SigmaTable) -> None:
+    """Though another sensor has just the level that it steps to."""
+    gains = {"s0": 0.8, "s1": 1.0, "s2": 0.95}
+
+    def stepped(entry: FrfRecording, n: int) -> FrfRecording:
+        gain = gains["s2"] if entry.sensor == "s0" and n >= 26 else gains[entry.sensor]
+        return replace(times(entry, gain), position_mm=None)
+
+    assert named(inspect(changed(good, stepped), table)) == []
+
+
+def test_sensors_that_all_fall_silent_are_not_exchanged(good: Campaign, table: SigmaTable) -> None:
+    """Two of three may be exchanged; of two, or where no other answers, the amplifier may have failed."""
+    random = np.random.default_rng(6)
+
+    def unheard(entry: FrfRecording, n: int) -> FrfRecording:
+        if n < 26:
+            return replace(entry, position_mm=None)
+        real, imaginary = 0.02 * random.normal(size=(2, MADE.lines))
+        return replace(entry, position_mm=None, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+
+    for left in ({"s0", "s1", "s2"}, {"s0", "s2"}):
+        silent = changed(good, unheard)
+        silent = replace(silent, recordings=tuple(entry for entry in frf_recordings(silent) if entry.sensor in left))
+        inspected = inspect(silent, table)
+        assert named(inspected) == []
+        assert FindingCode.NO_RESPONSE in {entry.code for entry in inspected.findings}
+
+
+def test_a_silent_recording_near_a_crossing_of_zero_is_physics(table: SigmaTable) -> None:
+    """The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero."""
+    description = drawn(956789, 88, "single")
+    assert set(description["effects"]) == {"thickness_error"}
+    made, _ = from_dict(recorded_campaign(record(description)))
+    assert FindingCode.NO_RESPONSE not in {entry.code for entry in inspect(made, table).findings}
 
 
 @pytest.mark.parametrize("hidden", ["none", "single"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag
 from scipy.special import logsumexp
-from scipy.stats import multivariate_normal, multivariate_t
+from scipy.stats import multivariate_normal, multivariate_t, norm
 
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.nested_sampling import Posterior, nested
@@ -176,6 +176,21 @@ def test_the_box_of_one_bound_is_exact_and_of_two_close() -> None:
     both = np.array([0.0, 0.0])
     random = np.random.default_rng(3).multivariate_normal(mean, covariance, 400_000)
     assert log_box(mean, covariance, both, high) == pytest.approx(np.log((random > 0).all(axis=1).mean()), abs=0.03)
+
+
+def test_a_bound_that_leads_a_mean_far_out_of_others_leaves_the_box_its_probability() -> None:
+    """Against quadrature. The last of three is ten deviations beyond its bound and takes the others with it; truncated
+    in their order, the log probability came out 128 lower."""
+    mean, deviation = np.array([-7.0, 16.0, 10.0]), np.array([1.0, 1.6, 1.0])
+    correlation = np.array([[1.0, -0.97, -0.99], [-0.97, 1.0, 0.98], [-0.99, 0.98, 1.0]])
+    covariance = correlation * np.outer(deviation, deviation)
+    low, high = np.array([0.0, -50.0, -50.0]), np.array([50.0, 5.0, 0.0])
+    last = np.linspace(-1.5, 0.0, 601)  # farther down the density is e⁻¹⁵ of that at the bound
+    first_two = mean[:2] + np.outer(last - mean[2], covariance[:2, 2])
+    rest = covariance[:2, :2] - np.outer(covariance[:2, 2], covariance[:2, 2])
+    inside = [multivariate_normal([-at[0], at[1]], rest * [[1, -1], [-1, 1]]).cdf([0.0, 5.0]) for at in first_two]
+    exact = float(np.log(np.trapezoid(inside * norm(mean[2]).pdf(last), last)))
+    assert log_box(mean, covariance, low, high) == pytest.approx(exact, abs=0.1)
 
 
 CASES: list[tuple[tuple[str, ...], tuple[float, ...]]] = [

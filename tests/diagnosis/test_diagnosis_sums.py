@@ -1,6 +1,7 @@
 """Compiled sums of a diagnosis against the plain formulas."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ from scipy.optimize import minimize, minimize_scalar
 from tests.support.diagnosis_campaigns import Made, campaign, design
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem
-from underskin.diagnosis.inference.frf_products import RowSums
+from underskin.diagnosis.inference.frf_products import FrfProducts, RowSums
+from underskin.diagnosis.inference.likelihood import log_likelihoods
 from underskin.diagnosis.inference.line_kernel import line_products, spread_sums
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
 from underskin.diagnosis.inference.pickup_kernel import lost, slopes_lost
+from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.noise.noise_priors import level_prior
 from underskin.diagnosis.noise.roughness_kernel import roughness_cost
 from underskin.diagnosis.selection.process_kernel import at_best_level
@@ -93,6 +96,38 @@ def test_steps_of_noise_levels_end_where_the_cost_is_least() -> None:
         assert settled.cost[0] < held.cost[0] < begun.cost[0]
         lost = fitter.settle(replace(begun, cost=np.array([np.inf])), 3)
         assert np.array_equal(lost.points.covariance, begun.points.covariance)
+
+
+@pytest.mark.parametrize("times", [3.0, 1e6, 1e15, 1e22])
+def test_the_likelihood_of_a_prediction_far_beyond_what_was_measured_is_that_of_exact_arithmetic(times: float) -> None:
+    """Not what rounding leaves of two squares: a law that gave 1e20 times the response once had a χ² of −8e28."""
+    made = Made(lines=5, sensors=1, preloads_n=(0.5, 2.0), spheres_mm=(4.0,))
+    problem = FittingProblem(lines(campaign(made, load_table())), load_table())
+    fitter = Fitter([problem.hypothesis((), placed=False, whole=True)])
+    at = fitter.begin([np.zeros((1, 0))])
+    assert isinstance(at.products, FrfProducts)
+    several = at.products, at.products.scaled(np.array([times]))
+    levels = fitter.levels(at.points.covariance[:, None])
+    near, far = (
+        log_likelihoods(fitter.lines, fitter.curvature, products, levels, at.points.bend)[0, 0] for products in several
+    )
+    expected = [exact_log_likelihood(products, fitter.levels(at.points.covariance).first) for products in several]
+    assert far - near == pytest.approx(expected[1] - expected[0], rel=1e-9)
+
+
+def exact_log_likelihood(products: FrfProducts, levels: NoiseLevels) -> float:
+    """Of one sensor's recordings by Woodbury's identity in rational numbers, up to what lines have about their means
+    and to their level."""
+    gain, noise, spread = (Fraction(float(one)) ** 2 for one in (levels.gain, levels.level, levels.spread))
+    chi2 = mm = mr = Fraction(0)
+    log_determinant = 0.0
+    for numbers in zip(products.level[0], products.uu[0], products.uy[0], products.yy, strict=True):
+        level, uu, uy, yy = (Fraction(float(one)) for one in numbers)
+        size, along = level**2 * uu / noise, level * (uy - level * uu) / noise
+        chi2 += (yy - 2 * level * uy + level**2 * uu) / noise - gain * along**2 / (1 + gain * size)
+        mm, mr = mm + size / (1 + gain * size), mr + along / (1 + gain * size)
+        log_determinant += np.log1p(float(gain * size))
+    return -0.5 * (float(chi2 - spread * mr**2 / (1 + spread * mm)) + log_determinant + np.log1p(float(spread * mm)))
 
 
 def test_what_pick_up_takes_is_the_difference_of_the_weights() -> None:

@@ -92,3 +92,13 @@ def test_more_frequencies_than_bins_each_fall_into_one(spacing: float) -> None:
     line, centres = frequency_bins(frequency)
     assert len(centres) <= 160
     assert np.abs(np.log(centres[line] / frequency)).max() <= np.log(400) / 160
+
+
+@pytest.mark.slow
+def test_a_law_that_leads_a_fit_to_absurd_responses_is_no_better_for_it(table: SigmaTable) -> None:
+    """A high pass whose corner rises with the preload, of which this diagnosis once failed."""
+    content, _ = from_dict(recorded(record(drawn(61496, 231, None))))
+    report = diagnosis_report(content, table)
+    assert report["verdict"] == "unexplained"
+    assert report["unnamed"]["acts_on"] == "frequency_response"
+    assert report["unnamed"]["axis"] == "preload_n"

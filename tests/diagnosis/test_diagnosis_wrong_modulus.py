@@ -65,6 +65,8 @@ def test_contacts_that_a_plausible_modulus_brings_within_the_tables_stay(made: C
     assert {entry.id for entry in kept.campaign.recordings} == every - soft.beyond | set(some)
     left_out = {entry.recording for entry in kept.findings if entry.code == "out_of_domain"}
     assert left_out == soft.beyond - set(some)
+    stiffer = {entry.statement for entry in kept.findings if entry.code == "out_of_domain"}
+    assert all("by one up to 4 times larger within" in statement for statement in stiffer)
 
 
 @pytest.mark.slow
@@ -92,7 +94,10 @@ def test_where_the_modulus_is_right_contacts_beyond_the_tables_are_left_out(tabl
     made = campaign(replace(WIDE, preloads_n=(0.25, 0.5, 1.0, 3.2)), table)
     report = diagnosis_report(made, table)
     assert report["verdict"] == "no_mismatch"
-    assert codes(report).count("out_of_domain") == 4
+    left_out = [entry["statement"] for entry in report["findings"] if entry["code"] == "out_of_domain"]
+    assert len(left_out) == 4
+    assert all("a modulus that is declared too small is not ruled out" in statement for statement in left_out)
+    assert "a modulus that is declared too small is not ruled out" in report["statement"]
     assert "contacts_kept" not in codes(report)
 
 

@@ -88,3 +88,28 @@ def test_the_axis_of_a_single_campaign_spans_days() -> None:
     assert (high - low).days == 2
     assert history("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z").layout.xaxis.range is None
     assert history().layout.xaxis.range is None
+
+
+def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_stand_apart() -> None:
+    random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
+    d33 = 14.0 + 0.4 * random.normal(size=(60, 2))
+    d33[17, 1] = 9.0
+    sensors = [SensorPoints(f"s{number:02}", times, own.tolist(), [0.2, 0.2], "") for number, own in enumerate(d33)]
+    figure = d33_history(sensors)
+    assert figure.layout.showlegend is False
+    upper, lower, median, apart = figure.data
+    np.testing.assert_allclose(median.y, np.median(d33, axis=0))
+    for number in range(2):
+        inside = (d33[:, number] > lower.y[number]) & (d33[:, number] < upper.y[number])
+        assert inside.sum() == 54  # 90 %
+    assert (list(apart.text), list(apart.x), list(apart.y)) == (["s17"], [times[1]], [9.0])
+    few = d33_history(sensors[:5])
+    assert [trace.name for trace in few.data] == [f"s0{number}" for number in range(5)]
+    assert few.layout.showlegend is True
+
+
+def test_frfs_of_many_recordings_have_no_legend() -> None:
+    one, frequency = np.ones(2), np.array([1.0, 10.0])
+    entries = [FrfLines(f"r{number}", frequency, 7 * one, 0 * one, one) for number in range(40)]
+    assert frf_recordings(entries, None).layout.showlegend is False
+    assert frf_recordings(entries[:5], None).layout.showlegend is True

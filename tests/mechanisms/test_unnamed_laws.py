@@ -14,7 +14,6 @@ from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
 from underskin.mechanisms.unnamed.expressions import course, expression
 from underskin.mechanisms.unnamed.forms import shapes
-from underskin.mechanisms.unnamed.frequency_laws import frequency_laws, phase_of_bump
 from underskin.mechanisms.unnamed.grammar import Grammar, combination
 from underskin.mechanisms.unnamed.laws import RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.level_tables import LevelTables
@@ -170,64 +169,6 @@ def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign:
     assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
 
 
-def hilbert_phase(log_magnitude: Floats, log_frequency: Floats) -> Floats:
-    """Bode's integral by brute force: φ = (1/π) ∫ dM/dx ln coth(|x − x0|/2) dx on a grid of equal strides."""
-    stride = log_frequency[1] - log_frequency[0]
-    slope = np.diff(log_magnitude) / stride
-    between = log_frequency[:-1] + stride / 2
-    kernel = -np.log(np.tanh(np.abs(between - log_frequency[:, None]) / 2))
-    return np.asarray(kernel @ slope * stride / np.pi)
-
-
-def test_laws_over_frequency_are_of_minimum_phase_or_turn_the_phase_alone() -> None:
-    wide = np.linspace(np.log(1e-5), np.log(1e8), 6001)
-    inner = slice(2500, 3700)  # some 2 to 5000 Hz
-    for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
-        if law.variant in ("echo", "magnitude"):  # neither falls off: their integrals have no end
-            continue
-        values = dict(zip([entry.name for entry in law.parameters_bound], coordinates(law, 0.5), strict=True))
-        seeds = {
-            name: differentiated(entry.from_fit(values[name]))
-            for entry in law.parameters_bound
-            for name in [entry.name]
-        }
-        factor = law.factor(np.exp(wide), seeds).value[0]
-        if law.variant in ("phase", "delay"):
-            assert np.abs(factor) == pytest.approx(1.0)
-            continue
-        if law.variant in ("corner", "high_pass"):
-            continue  # rise and fall without end
-        expected = hilbert_phase(np.log(np.abs(factor)), wide)
-        assert np.unwrap(np.angle(factor))[inner] == pytest.approx(expected[inner], abs=0.02), law.name
-
-
-def test_a_delay_is_late_and_a_high_pass_is_an_amplifiers_of_any_order() -> None:
-    frequency = np.geomspace(1.0, 1000.0, 30)
-    laws = {law.variant: law for law in frequency_laws(frequency)}
-    late = laws["delay"].factor(frequency, {"law_lag": differentiated(0.1)}).value[0]
-    assert np.unwrap(np.angle(late)) == pytest.approx(-0.1 * frequency / np.sqrt(1000.0))
-    amplifier = 1 / (1 - 3j / frequency)
-    for order in (1.0, 2.0, 0.5):
-        values = {"law_exponent": differentiated(order), "law_corner": differentiated(3.0)}
-        assert laws["high_pass"].factor(frequency, values).value[0] == pytest.approx(amplifier**order)
-
-
-def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
-    frequency = np.geomspace(2.0, 500.0, 9)
-    for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
-        values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
-        found = {"law": law.name, "parameters": values}
-        said = {"acts_on": "frequency_response", "axis": "frequency_hz", "form": law.spoken.form}
-        stated = {**said, "expression": "FRF", "range": {"frequency_hz": [1.0, 1000.0]}}
-        report = {"unnamed": stated, "provenance": {"unnamed": found}, "campaign": "c", "verdict": "unexplained"}
-        if law.spoken.form == "free":
-            continue
-        kept = parse(document(report, "kept").encode(), "kept.yaml")
-        short = {name.removeprefix("law_"): value for name, value in values.items()}
-        exact = law.factor(frequency, {name: differentiated(value) for name, value in values.items()}).value[0]
-        assert kept.laws[0]({**short, "frequency_hz": frequency}) == pytest.approx(exact, abs=2e-3), law.name
-
-
 def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
     for law in grammar.laws:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.spoken.form == "free":
@@ -246,19 +187,6 @@ def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> 
             told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)
             change = told if law.spoken.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
-
-
-def differentiated(value: float):  # type: ignore[no-untyped-def]
-    from underskin.autodiff import Differentiated
-
-    return Differentiated(np.array([[value]]), np.zeros((0, 1, 1)))
-
-
-def test_the_phase_of_a_bump_is_odd_and_that_of_its_slope() -> None:
-    u = np.linspace(-4.0, 4.0, 81)
-    phase = phase_of_bump(u, 1.0)
-    assert phase == pytest.approx(-phase[::-1], abs=1e-6)
-    assert phase[u < -0.5].min() > 0  # the magnitude rises there
 
 
 def test_the_order_is_that_of_times_of_cycles_or_of_the_list(campaign: Campaign) -> None:

@@ -17,6 +17,20 @@ from underskin.diagnosis.selection.search import search
 STOPPED = DrawnCase(900004, 54, "single", WIDE)  # of a step whose fit without scatter begins worse than others end
 MISLED = DrawnCase(900002, 29, "pair", WIDE)  # of a wrong thickness and gains of sensors, which alone look like scatter
 
+SHARP = DrawnCase(930001, 25, "pair", WIDE)  # a resonance of ζ = 0.005, between which and the priors' nothing leads
+STUCK = DrawnCase(43938, 107, "pair", WIDE)  # creep and a resonance, which find their places beside a third
+FAINT = DrawnCase(43938, 244, "single", WIDE)  # a charge from the mains that several widths of line suit
+MOVED = DrawnCase(940001, 175)  # a resonance that adhesion moves far from where it is found without that
+AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, which the evidence took 40 nats for
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [SHARP, STUCK, FAINT, MOVED, AT_BOUNDS], ids=lambda case: case.name)
+def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
+    entry = compared(case)
+    assert not is_miss(entry)
+    assert abs(entry["lost_own"]) < 2.0  # evidence at several bounds differs by one between equally good fits
+
 
 @pytest.mark.slow
 def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> None:

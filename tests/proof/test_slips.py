@@ -1,15 +1,111 @@
-"""Judging slips: each is committed where it shows, and counted."""
+"""The part of the proof on slips: each is committed where it shows, judged and counted."""
 
-from proof.slip_kinds import SLIPS
-from proof.slips import judged, shown
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proof.slip_kinds import SLIPS, Case, cables
+from proof.slip_rivals import left_of_conjugated, over_one_sign
+from proof.slips import of_one
+from proof.text_slips import slips
+from rig.draw import drawn, record
+from rig.recorded import RecordedLines, campaign
+from underskin.recordings.campaign import frf_recordings, from_dict
+from underskin.surrogate.sigma_table import load_table
 
 
-def test_slips_in_a_few_campaigns_are_committed_named_and_shown() -> None:
-    tally = judged(8, 3)
-    assert tally.clean == 6
-    assert tally.false == []
-    assert {slip for _, slip in tally.visible} <= set(SLIPS)
-    assert {"polarity at random", "charge peak-to-peak"} <= {slip for _, slip in tally.visible}
-    assert sum(tally.named.values()) + len(tally.missed) == sum(tally.visible.values())
-    assert tally.named["none", "polarity at random"] == tally.visible["none", "polarity at random"]
-    assert "| polarity at random | none |" in shown(tally)
+def recorded(effect: str, **values: Any) -> RecordedLines:
+    """A campaign of the rig that hides one effect of given strength."""
+    description = drawn(900811, 3, "none")
+    description["lines"] |= {"high_hz": 1000.0, "count": 40}
+    description["effects"] = {effect: values}
+    return record(description)
+
+
+@pytest.mark.slow
+def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
+    judged = [of_one(900810, number, load_table()) for number in (7, 8)]
+    assert [entry["false"] for entry in judged] == [[], []]
+    committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
+    assert {slip for slip, _ in committed} <= set(SLIPS)
+    assert all(one["over_rivals"] <= one["chi2"] + 1e-9 for _, one in committed)
+    plain = [one["named"] for slip, one in committed if slip == "charge peak-to-peak" and one["over_rivals"] > 100]
+    assert plain
+    assert all(plain)
+
+
+def test_a_conjugated_delay_is_one_of_the_other_sign() -> None:
+    made = recorded("timing_delay", delay_us=80.0)
+    assert (4 * made.exact.imag**2 / made.line_variance).sum() > 100
+    assert left_of_conjugated(made) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [("amplifier_high_pass", {"corner_hz": 1.5}), ("sensor_relaxation", {"law": "ladder", "exponent": 0.05})],
+)
+def test_a_conjugated_high_pass_or_relaxation_is_nothing_else(effect: str, values: dict[str, Any]) -> None:
+    assert left_of_conjugated(recorded(effect, **values)) > 20.0
+
+
+def test_a_third_that_is_conjugated_shows_by_two_signs_and_one_course_does_not() -> None:
+    made = recorded("timing_delay", delay_us=80.0)
+    turned = np.arange(len(made.exact)) % 3 == 0
+    assert over_one_sign(made, turned, 1 / 3) > 20.0
+    assert over_one_sign(made, np.zeros_like(turned), 1 / 3) <= 0.0
+
+
+def _entry(name: str, hidden: list[str], false: list[str], *committed: tuple[str, float, float, bool]) -> Any:
+    each = {
+        slip: {"chi2": chi2, "over_rivals": over, "named": named, "as": []} for slip, chi2, over, named in committed
+    }
+    return {"name": name, "hidden": hidden, "false": false, "slips": each}
+
+
+def test_the_page_counts_the_visible_and_the_identifiable() -> None:
+    judged = [
+        _entry("a", [], [], ("force rms", 50.0, 40.0, True), ("all conjugated", 90.0, 0.0, False)),
+        _entry("b", ["ageing"], ["warm_up.campaign"], ("force rms", 50.0, 30.0, False)),
+        _entry("c", [], [], ("force rms", 10.0, 10.0, False)),
+    ]
+    page = slips({"seed": 5, "judged": judged})
+    rows = {line.split("|")[1].strip(): line for line in page.splitlines() if line.startswith("| ")}
+    assert rows["force rms"].count("1 of 2") == 2
+    assert "0 of 1" in rows["all conjugated"]
+    assert "none there" in rows["all conjugated"]
+    assert "1 of 3" in page
+    assert "| b | ageing | warm_up.campaign |" in page
+    assert "| b | ageing | force rms | 50 | 30 | nothing |" in page
+    assert "| a | nothing |" not in page
+
+
+def test_an_exchange_of_cables_leaves_no_more_than_a_step_of_either_sensor_leaves() -> None:
+    """Against least squares, with a level of each sensor and a step of one of the two."""
+    description = drawn(8, 3, "none")
+    description["skin"]["array"] |= {"columns": 2, "rows": 2}
+    description["design"].pop("offsets_mm", None)
+    description["effects"] = {"sensor_spread": {"sd": 0.2}}
+    recorded = record(description)
+    made, _ = from_dict(campaign(recorded))
+    case = Case(made, recorded, np.full(len(recorded.exact), 0.03))
+    gain = dict(zip((sensor.id for sensor in made.skin.sensors), recorded.response.sensor_gains, strict=True))
+    seen = 0
+    for seed in range(8):
+        slip = cables(case, np.random.default_rng(seed))
+        assert slip is not None
+        given = np.array([entry.sensor for entry in frf_recordings(slip.campaign)])
+        level = np.log([gain[entry.sensor] for entry in case.entries]) / 0.03
+        turned = given != np.array([entry.sensor for entry in case.entries])
+        late = np.arange(len(given)) >= np.flatnonzero(turned).min()
+        sensors = (given[:, None] == np.unique(given)).astype(float)
+        steps = [late & (given == name) for name in np.unique(given[turned])]
+        left = [_least(np.column_stack([sensors, step]), level) for step in steps]
+        assert slip.over_rivals is not None
+        np.testing.assert_allclose([slip.chi2, slip.over_rivals], [_least(sensors, level), min(left)], atol=1e-6)
+        seen += slip.over_rivals > 20
+    assert seen > 0
+
+
+def _least(columns: np.ndarray, value: np.ndarray) -> float:
+    return float(((value - columns @ np.linalg.lstsq(columns, value, rcond=None)[0]) ** 2).sum())

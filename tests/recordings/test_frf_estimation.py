@@ -12,8 +12,9 @@ from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, know
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import Frf, broadband, estimate, lines_of, periodic, stepped_sine
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.frf.periodic import period_of
-from underskin.recordings.frf.spectral_average import Estimator
+from underskin.recordings.frf.resonance import resonance
 from underskin.recordings.frf.stepped_sine import find_steps
 from underskin.units import Floats
 
@@ -178,6 +179,28 @@ def test_at_least_as_accurate_as_pyfrf(estimator: Estimator, drift: float) -> No
     assert rms_error(ours) <= 1.005 * rms_error(theirs)  # what chance alone may do
     if drift:
         assert rms_error(ours) < 0.6 * rms_error(theirs)
+
+
+@pytest.mark.parametrize(("natural_hz", "damping"), [(211.0, 0.004), (211.0, 0.05), (60.0, 0.2)])
+def test_the_resonance_of_a_mass_on_a_spring_is_read_from_its_magnitude(natural_hz: float, damping: float) -> None:
+    """Whatever the polarity and a delay do to the phase."""
+    frequency = np.geomspace(1.0, 1000.0, 120)
+    ratio = frequency / natural_hz
+    values = -3e-11 * np.exp(-2e-3j * frequency) / (1 - ratio**2 + 2j * damping * ratio)
+    random = np.random.default_rng(5)
+    noise = 1e-13 * (random.normal(size=120) + 1j * random.normal(size=120))
+    found = resonance(Frf(frequency, values + noise, None))
+    assert found is not None
+    assert found.frequency == pytest.approx(natural_hz, rel=0.005)
+    assert found.damping == pytest.approx(damping, rel=0.1)
+
+
+def test_no_resonance_is_read_where_none_stands_out_within_the_band() -> None:
+    frequency = np.geomspace(1.0, 100.0, 60)
+    rising = 1 / (1 - (frequency / 110.0) ** 2 + 0.02j * frequency)
+    flat = np.random.default_rng(6).normal(1.0, 0.02, 60)
+    assert resonance(Frf(frequency, rising.astype(np.complex128), None)) is None
+    assert resonance(Frf(frequency, flat.astype(np.complex128), None)) is None
 
 
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS does not name the folder")

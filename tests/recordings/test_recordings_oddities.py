@@ -125,3 +125,35 @@ def test_a_unit_that_a_heading_says_and_its_value_contradicts_is_named_by_both()
     assert isinstance(said, Reading)
     assert isinstance(right, Reading)
     assert [found.campaign.skin.thickness_mm for found in (said, right)] == [2500.0, 2.5]
+
+
+def table(*last: str, ends: str = "\n", separator: str = ",") -> str:
+    """Four columns of numbers, as an instrument writes them."""
+    rows = [["0.001", "0.100", "-1.5e-03", number] for number in ("0.981", "0.972", "0.990", "0.952", *last)]
+    return "time [s],force [N],charge [pC],coherence\n".replace(",", separator) + "\n".join(
+        separator.join(row) for row in rows
+    ) + ends  # fmt: skip
+
+
+@pytest.mark.parametrize("cut", ["0.9", "0.", "0", "-0.9"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_last_number_that_may_be_cut_is_told(cut: str, encoding: str) -> None:
+    contents = read_contents(table(cut, ends="").encode(encoding), "cut.csv")
+    assert any(f"in {cut!r}, which has fewer digits" in warning for warning in contents.warnings)
+    german = table(cut, ends="", separator=";").replace(".", ",").encode(encoding)
+    assert any("it may be cut there" in warning for warning in read_contents(german, "cut.csv").warnings)
+
+
+@pytest.mark.parametrize(
+    "text", [table("0.9"), table("0.961", ends=""), table("0.9").replace("0.952", "1") + "0,0,0,1"]
+)
+def test_a_file_that_ends_with_a_line_or_a_whole_number_is_not_said_to_be_cut(text: str) -> None:
+    assert not any("cut" in warning for warning in read_contents(text.encode(), "whole.csv").warnings)
+
+
+def test_an_exponent_that_may_be_cut_is_told_in_the_template_too() -> None:
+    above = "schema,campaign/1\nname,x\nskin.poisson_ratio,0.5\n\nid,frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n\n"
+    rows = "".join(f"{'r1' if number == 1 else ''},{number}.5,7.1e+00,-1.5e-01\n" for number in range(1, 6))
+    cut = above + rows + ",6.5,7.1e+00,-1.5e-0"
+    assert any("'-1.5e-0'" in warning for warning in read_contents(cut.encode(), "cut.csv").warnings)
+    assert read_contents((above + rows).encode(), "whole.csv").warnings == ()

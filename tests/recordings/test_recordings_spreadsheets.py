@@ -36,12 +36,26 @@ def same_as_plain(text: str) -> Reading:
         "# exported on Monday\n" + changed("r1,", "# by hand, mb\nr1,"),
         changed("-0.5", "\N{MINUS SIGN}0.5"),
         changed("id,sensor", "ID,Sensor"),
+        changed("schema,", "Schema,").replace("name,", "NAME,").replace("sensor,s01,0", "Sensor,s01,0"),
+        changed("skin.thickness_mm,2.5", "Skin.Thickness [µm],2500").replace("skin.young", "SKIN.Young"),
         changed(HEADINGS, HEADINGS.replace("\n", ",\n")),
         ABOVE + "," + HEADINGS + "0," + ROWS.replace("\n,", "\n1,,"),
         ABOVE + "Unnamed: 0," + HEADINGS + "1," + ROWS.replace("\n,", "\n2,,"),
         changed("indenter_radius_mm", "Indenter radius [inch]").replace("r1,s01,4,", f"r1,s01,{4 / 25.4},"),
     ],
-    ids=["sep", "sep-crlf", "comments", "minus", "capitals", "blank heading", "index", "pandas", "inch"],
+    ids=[
+        "sep",
+        "sep-crlf",
+        "comments",
+        "minus",
+        "capitals",
+        "capitals above",
+        "capitals and units",
+        "blank heading",
+        "index",
+        "pandas",
+        "inch",
+    ],
 )
 def test_what_spreadsheets_add_changes_nothing(text: str) -> None:
     assert same_as_plain(text).warnings == []
@@ -97,6 +111,41 @@ def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, tur
     assert "needs frf_phase_rad beside it" in alone.reason
     beside = refusal(ABOVE + head.replace("\n", ",frf_re_pc_per_n\n") + f"r1,s01,4,1.0,0.09,10,{rows[0]},7\n")
     assert "stands beside real and imaginary parts" in beside.reason
+
+
+def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_asked_for() -> None:
+    head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,FRF_Phase")
+
+    def written(turn: float, first: complex, second: complex) -> str:
+        rows = [f"{abs(value)!r},{cmath.phase(value) * turn!r}" for value in (first, second)]
+        return ABOVE + head + f"r1,s01,4,1.0,0.09,10,{rows[0]}\n,,,,,20,{rows[1]}\n"
+
+    recording = only(read(written(180 / math.pi, 7.1 - 0.5j, 7.2 - 3j)))  # -4° and -23°
+    assert recording.frf_im_pc_per_n == pytest.approx([-0.5, -3.0])
+    (warning,) = read(written(180 / math.pi, 7.1 - 0.5j, 7.2 - 3j)).warnings
+    assert "'FRF_Phase' is read as degrees" in warning
+    for turn in (1.0, 180 / math.pi):  # at most 5° or 5 rad
+        refused = refusal(written(turn, 7.1 - 0.5j, 7.2 - 0.6j))
+        assert refused.place == "line 9, column 8"
+        assert "frf_phase_deg or frf_phase_rad" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "field", "place"),
+    [
+        (",7.2,", ",abc,", "frf_re_pc_per_n[1]", "line 11, column 7"),
+        (",1.0,0.09", ",heavy,0.09", "preload_n", "line 10, column 4"),
+    ],
+)
+def test_a_cell_that_is_no_number_is_told_with_its_line(old: str, new: str, field: str, place: str) -> None:
+    (problem,) = read(changed(old, new)).problems
+    assert (problem.recording, problem.field) == ("r1", field)
+    assert problem.allowed == f"must be a number ({place})"
+
+
+def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:
+    with pytest.raises(InvalidInput, match=r"skin.thickness_mm = 'thin': must be a number \(line 3, column 2\)"):
+        read(changed("skin.thickness_mm,2.5", "skin.thickness_mm,thin"))
 
 
 @pytest.mark.parametrize(

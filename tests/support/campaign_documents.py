@@ -34,6 +34,7 @@ TIME_SERIES: dict[str, Any] = {
     "sample_rate_hz": 1000.0,
     "force_n": [1.0, 1.1, 0.9, 1.0],
     "charge_pc": [0.0, 0.7, -0.7, 0.0],
+    "estimator": "Hv",
 }
 INDENTATION: dict[str, Any] = {
     "id": "r3",

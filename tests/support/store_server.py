@@ -30,9 +30,9 @@ class Place:
         here = {"UNDERSKIN_DATA": str(self.folder), "UNDERSKIN_DATABASE_URL": self.database_url}
         return os.environ | here | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
 
-    def command(self, *arguments: str) -> "subprocess.CompletedProcess[str]":
+    def command(self, *arguments: str, **settings: str) -> "subprocess.CompletedProcess[str]":
         """Run `underskin` to its end."""
-        return preloaded.run(*arguments, environment=self.environment())
+        return preloaded.run(*arguments, environment=self.environment() | settings)
 
 
 @dataclass

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import diagnose, mechanism, store, stress
+from underskin.cli import changes, diagnose, mechanism, store, stored, stress, watch
+from underskin.cli.rigs import EstimatorOption, RigOption
 from underskin.errors import UnderskinError
 
 if TYPE_CHECKING:
@@ -70,7 +71,6 @@ Files = Annotated[
 Together = Annotated[
     str | None, typer.Option(metavar="NAME", help="Join the FILEs, all of one skin, into one campaign called NAME.")
 ]
-Rig = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
 Band = Annotated[
     str | None, typer.Option(metavar="LOW,HIGH", help="Average FILE from LOW to HIGH [Hz], not over its flat zone.")
 ]
@@ -137,7 +137,8 @@ def d33(
     input_file: Input = None,
     csv: Csv = False,
     files: Files = None,
-    rig: Rig = None,
+    rig: RigOption = None,
+    estimator: EstimatorOption = None,
     band: Band = None,
     figures: Figures = None,
     together: Together = None,
@@ -154,10 +155,10 @@ def d33(
         _refuse(for_columns, "is for columns; files say it themselves")
         from underskin.cli.invert_files import invert_files
 
-        invert_files(files, rig, band, figures, together, csv)
+        invert_files(files, rig, estimator, band, figures, together, csv)
         return
-    only_files = (("--rig", rig), ("--band", band), ("--figures", figures), ("--together", together))
-    for_files = [name for name, used in only_files if used is not None]
+    only_files = ("rig", "estimator", "band", "figures", "together")
+    for_files = [f"--{name}" for name in only_files if given[name] is not None]
     _refuse(for_files, "goes with FILE, and none is given")
 
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
@@ -201,6 +202,18 @@ def _answer(
 app.command("stress", no_args_is_help=True)(stress.stress)
 app.command("import", no_args_is_help=True)(store.import_files)
 app.command("export", no_args_is_help=True)(store.export_skin)
+app.command()(stored.campaigns)
+app.command()(stored.skins)
+for _command in (
+    stored.history,
+    changes.withdraw,
+    changes.exclude,
+    changes.correct,
+    changes.join,
+    changes.adopt,
+    watch.watch,
+):
+    app.command(no_args_is_help=True)(_command)
 diagnose.add_commands(app)
 app.add_typer(mechanism.app, name="mechanism")
 

@@ -12,7 +12,8 @@ from rich.text import Text
 from underskin.errors import ErrorCode, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
-from underskin.prediction.columns import CsvError, from_csv, statuses, to_csv, without_labels
+from underskin.prediction.columns import statuses, to_csv
+from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
@@ -80,18 +81,16 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
 def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
         source = sys.stdin.fileno() if path == STANDARD_INPUT else path
-        with open(source, encoding="utf-8-sig", newline="", closefd=path != STANDARD_INPUT) as file:
-            columns, labels = without_labels(from_csv(file.read()), allowed)
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise unreadable("input", path, f"must be a readable CSV file ({reason})") from error
+        with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
+            found = from_csv(file.read(), allowed)
+    except OSError as error:
+        raise unreadable("input", path, f"must be a readable CSV file ({error.strerror})") from error
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
-    for name in columns:
-        if name not in allowed:
-            words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
-            raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
-    return {name: _numbers(name, cells) for name, cells in columns.items()}, labels
+    for name in found.unknown:
+        words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
+        raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
+    return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
 
 
 def write_csv(

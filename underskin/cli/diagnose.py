@@ -18,14 +18,14 @@ import typer
 
 from underskin.cli.diagnose_several import of_several
 from underskin.cli.reports import write_page, write_report
-from underskin.cli.rigs import reading_notes, rig_description_in
+from underskin.cli.rigs import EstimatorOption, RigOption, read_by, reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
 from underskin.parallel import one_blas_thread, processes
 
 if TYPE_CHECKING:
     from underskin.client.service_client import Client
-    from underskin.recordings.rig_description import RigDescription
+    from underskin.recordings.reading import Reading
     from underskin.surrogate.sigma_table import SigmaTable
 
 FilesArgument = Annotated[
@@ -54,7 +54,8 @@ def add_commands(app: typer.Typer) -> None:
 
 def diagnose(
     files: FilesArgument = None,
-    rig: Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")] = None,
+    rig: RigOption = None,
+    estimator: EstimatorOption = None,
     output_dir: Annotated[Path, typer.Option(help="Folder for the reports; made where it does not exist.")] = _REPORTS,
     html: Annotated[bool, typer.Option("--html", help="Also write each report as a page with figures.")] = False,
     workers: Workers = 0,
@@ -93,11 +94,12 @@ def diagnose(
     output_dir.mkdir(parents=True, exist_ok=True)
     if campaign and (together is not None or fleet is not None):
         raise typer.BadParameter("takes files; of stored campaigns ask the service", param_hint="--together, --fleet")
+    read = partial(read_by, rig=description, estimator=estimator)
     if together is not None or fleet is not None:
-        of_several(files, description, without or [], output_dir, html=html, together=together, fleet=fleet)
+        of_several(files, read, without or [], output_dir, html=html, together=together, fleet=fleet)
         return
     # Absolute, since a cluster's workers have a working folder of their own
-    one = partial(_one, rig=description, output_dir=output_dir.resolve(), html=html, without=without or [])
+    one = partial(_one, read=read, output_dir=output_dir.resolve(), html=html, without=without or [])
     failed = False
     console = Console(stderr=True)
     with Progress(console=console) as progress:
@@ -195,15 +197,16 @@ def _executor(workers: int, scheduler: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _one(file: Path, *, rig: "RigDescription | None", output_dir: Path, html: bool, without: Sequence[str]) -> _Outcome:
+def _one(
+    file: Path, *, read: "Callable[[Path], Reading]", output_dir: Path, html: bool, without: Sequence[str]
+) -> _Outcome:
     """Read, diagnose and write one campaign."""
     from underskin.diagnosis.pipeline import diagnose as work_out
     from underskin.diagnosis.pipeline import with_refused
     from underskin.diagnosis.reporting.report import report
-    from underskin.recordings import read_file
 
     try:
-        reading = read_file(file, file.name, rig)
+        reading = read(file)
         diagnosis = with_refused(work_out(reading.campaign, _table(), without=without), reading.problems)
     except UnderskinError as error:
         return _Outcome(str(file), f"{file}: {' '.join(str(error).split())}")

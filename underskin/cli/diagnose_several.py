@@ -1,7 +1,7 @@
 """`diagnose --together` and `--fleet`: files of campaigns of one skin, or of skins of one make, in one report."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,14 +11,14 @@ from underskin.cli.reports import write_page, write_report
 
 if TYPE_CHECKING:
     from underskin.recordings.campaign import Campaign
-    from underskin.recordings.rig_description import RigDescription
+    from underskin.recordings.reading import Reading
 
 _NAME = re.compile(r"\w[\w .-]*")
 
 
 def of_several(
     files: Sequence[Path],
-    rig: "RigDescription | None",
+    read: "Callable[[Path], Reading]",
     without: Sequence[str],
     output_dir: Path,
     *,
@@ -26,7 +26,7 @@ def of_several(
     together: str | None,
     fleet: str | None,
 ) -> None:
-    """Write NAME.json, and NAME.html with `html`."""
+    """Write NAME.json, and NAME.html with `html`; `read` reads a file."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -44,7 +44,7 @@ def of_several(
     target = output_dir / f"{name}.json"
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
-    campaigns = _read(files, rig)
+    campaigns = _read(files, read)
     known = sorted({campaign.skin.id for campaign in campaigns if campaign.skin.id is not None})
     if together is not None and len(known) > 1:
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
@@ -68,14 +68,13 @@ def of_several(
     console.print(document["statement"], markup=False, highlight=False, soft_wrap=True)
 
 
-def _read(files: Sequence[Path], rig: "RigDescription | None") -> list["Campaign"]:
+def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Campaign"]:
     from underskin.errors import UnderskinError
-    from underskin.recordings import read_file
 
     campaigns = []
     for file in files:
         try:
-            campaigns.append(read_file(file, file.name, rig).campaign)
+            campaigns.append(read(file).campaign)
         except UnderskinError as error:
             raise UnderskinError(f"{file}: {error}") from error
     return campaigns

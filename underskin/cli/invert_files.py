@@ -13,6 +13,7 @@ from underskin.cli.rigs import rig_description_in
 from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
 from underskin.inversion.invert import Inversion, invert
 from underskin.recordings import Reading, elastomer, join, read_file, validation
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -38,7 +39,13 @@ class _FileErrors:
 
 
 def invert_files(
-    files: Sequence[Path], rig: Path | None, band: str | None, figures: Path | None, together: str | None, as_csv: bool
+    files: Sequence[Path],
+    rig: Path | None,
+    estimator: Estimator | None,
+    band: str | None,
+    figures: Path | None,
+    together: str | None,
+    as_csv: bool,
 ) -> None:
     """Print d33 and moduli of each file, or of all `together`; exit status 2 where one is unreadable or gives neither.
 
@@ -59,7 +66,7 @@ def invert_files(
     errors = _FileErrors(console)
     with Progress(console=console, redirect_stdout=False, disable=not console.is_terminal) as progress:
         readings: Iterable[tuple[str, Reading]] = _readings(
-            progress.track(files, description="inverting"), description, errors
+            progress.track(files, description="inverting"), description, estimator, errors
         )
         if together is not None and (every := list(readings)):
             readings = [(together, join(together, every))]
@@ -73,11 +80,13 @@ def invert_files(
         raise typer.Exit(2)
 
 
-def _readings(files: Iterable[Path], rig: RigDescription | None, errors: _FileErrors) -> Iterator[tuple[str, Reading]]:
+def _readings(
+    files: Iterable[Path], rig: RigDescription | None, estimator: Estimator | None, errors: _FileErrors
+) -> Iterator[tuple[str, Reading]]:
     """Each file that can be read, by its name."""
     for file in files:
         with errors.about(str(file)):
-            reading = read_file(file, str(file), rig)
+            reading = read_file(file, str(file), rig).with_estimator(estimator)
             yield str(file), reading
 
 

@@ -1,13 +1,24 @@
-"""The rig description that a command was given, and what was read by it."""
+"""The rig description that a command was given, the estimator, and what was read by them."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
 
 from underskin.errors import InvalidInput, UnderskinError
 
 if TYPE_CHECKING:
+    from underskin.recordings.frf.estimators import Estimator
     from underskin.recordings.reading import Reading
     from underskin.recordings.rig_description import RigDescription
+
+RigOption = Annotated[Path | None, typer.Option(help="Rig description, for files that hold channels.")]
+EstimatorOption = Annotated[
+    Literal["H1", "H2", "Hv"] | None,
+    typer.Option(
+        help="FRFs of time series, whatever files or rig say; unbiased by noise in charge (H1), force (H2), both (Hv)."
+    ),
+]
 
 
 def rig_description_in(rig: Path) -> "RigDescription":
@@ -20,6 +31,13 @@ def rig_description_in(rig: Path) -> "RigDescription":
         raise UnderskinError(f"{rig}: {error}") from error
     except OSError as error:
         raise UnderskinError(f"{rig}: cannot be opened: {error.strerror}") from error
+
+
+def read_by(file: Path, rig: "RigDescription | None", estimator: "Estimator | None") -> "Reading":
+    """A file by the rig description and the estimator that were given; raises as `read_file`."""
+    from underskin.recordings import read_file
+
+    return read_file(file, file.name, rig).with_estimator(estimator)
 
 
 def reading_notes(reading: "Reading") -> list[str]:

@@ -14,6 +14,8 @@ from uuid import uuid4
 
 import orjson
 
+from underskin.client.content_key import label_of
+from underskin.client.counted_file import CountedFile
 from underskin.client.documents.campaign_d33 import D33
 from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
 from underskin.client.documents.diagnoses import Asked, ModelEntry, ModelVersion
@@ -23,8 +25,10 @@ from underskin.client.documents.skins import History, SkinDetail, SkinEntry
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
+from underskin.recordings.frf.estimators import Estimator
 
 ModelName = Literal["paper", "adopted"]
+Progress = Callable[[int], object]  # of bytes
 _TRIES = 3
 _path, _skin = partial(path_of, "campaigns"), partial(path_of, "skins")
 _Answer = TypeVar("_Answer")
@@ -37,6 +41,10 @@ class SentFile(CampaignResult):
 
     repeated: bool
     """Whether it had been stored before, under the same `idempotency_key`."""
+
+
+def _uncounted(_: int) -> None:
+    pass
 
 
 class Campaigns:
@@ -53,16 +61,20 @@ class Campaigns:
         corrects: str | None = None,
         reason: str | None = None,
         all_or_nothing: bool = False,
+        estimator: Estimator | None = None,
         idempotency_key: str | None = None,
     ) -> CampaignResult:
         """Send a campaign, or its document; the answer says of each recording whether it was accepted.
+
+        `estimator`: how FRFs are estimated from time series, whatever the campaign says.
 
         Without an answer the request is repeated up to three times under one `idempotency_key`, so the campaign is
         stored once. With a key of your own this holds also when your program is restarted.
         """
         document = to_dict(campaign) if isinstance(campaign, Campaign) else dict(campaign)
         content = orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
-        query = query_of(skin=skin, corrects=corrects, reason=reason, all_or_nothing=all_or_nothing)
+        said = {"corrects": corrects, "reason": reason, "estimator": estimator}
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
 
         def send() -> CampaignResult:
@@ -77,23 +89,34 @@ class Campaigns:
         *,
         skin: str | None = None,
         rig: str | Path | None = None,
+        corrects: str | None = None,
+        reason: str | None = None,
         all_or_nothing: bool = False,
         together: str | None = None,
+        estimator: Estimator | None = None,
         idempotency_key: str | None = None,
+        progress: Progress = _uncounted,
     ) -> list[SentFile]:
         """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
 
-        `together` joins the files, for instance one file for each press, into one campaign of that name.
+        `together` joins the files, for instance one file for each press, into one campaign of that name. `estimator` is
+        how FRFs are estimated from time series, whatever the files or the rig say. `progress` is called with the bytes
+        of each part that was read to be sent, less than 0 where a request begins anew.
         """
         if not files:
             raise too_few("files", [], "must name at least one file")
         headers = {"Idempotency-Key": idempotency_key or uuid4().hex}
-        query = query_of(skin=skin, all_or_nothing=all_or_nothing, together=together)
+        said = {"corrects": corrects, "reason": reason, "together": together, "estimator": estimator}
+        query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
 
         def send() -> list[SentFile]:
             with ExitStack() as opened:
-                sources = [("file", Path(file)) for file in files] + ([] if rig is None else [("rig", Path(rig))])
-                parts = [(name, (path.name, opened.enter_context(path.open("rb")))) for name, path in sources]
+                sources = [("file", Path(file), progress) for file in files]
+                sources += [] if rig is None else [("rig", Path(rig), _uncounted)]
+                parts = [
+                    (name, (label_of(path), opened.enter_context(CountedFile(path, read))))
+                    for name, path, read in sources
+                ]
                 answer, received = self._session.answered(
                     "POST", "/v1/campaigns", **query, headers=headers, files=parts
                 )
@@ -197,7 +220,7 @@ class Skins:
         answer = self._session.json("GET", _skin(skin_id, "model", "versions"))
         return [ModelEntry.of(entry) for entry in answer["models"]]
 
-    def export(self, skin_id: str, file: str | Path, progress: Callable[[int], object] = lambda _: None) -> None:
+    def export(self, skin_id: str, file: str | Path, progress: Progress = _uncounted) -> None:
         """Write everything stored of a skin into one HDF5 file; `progress` is called with the bytes of each chunk."""
         part = Path(file).with_name(Path(file).name + ".part")
         try:
@@ -209,10 +232,10 @@ class Skins:
         finally:
             part.unlink(missing_ok=True)
 
-    def load(self, file: str | Path) -> Imported:
-        """Import a file that `export` wrote."""
+    def load(self, file: str | Path, progress: Progress = _uncounted) -> Imported:
+        """Import a file that `export` wrote; `progress` is called with the bytes of each part that is sent."""
         headers = {"Content-Type": "application/octet-stream"}
-        with Path(file).open("rb") as source:
+        with CountedFile(Path(file), progress) as source:
             return Imported.of(self._session.json("POST", "/v1/skins/import", headers=headers, content=source))
 
 

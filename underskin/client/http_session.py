@@ -15,6 +15,7 @@ from underskin.errors import InvalidInput, ServiceError, Unreachable
 from underskin.units import Array
 
 _NPZ = "application/x-npz"
+_CONNECT_S = 10.0  # for a network that drops everything, long before a large file would take too long
 
 _ELSEWHERE = " (where it is elsewhere: base_url of Client, --url or UNDERSKIN_URL of the command line)"
 
@@ -34,7 +35,8 @@ class Session:
                 raise InvalidInput("api_key", "…", "must be of ASCII letters, as `underskin key create` prints it")
             headers["Authorization"] = f"Bearer {api_key}"
         try:
-            self.http = httpx.Client(base_url=base_url, headers=headers, timeout=timeout)
+            within = httpx.Timeout(timeout, connect=min(timeout, _CONNECT_S))
+            self.http = httpx.Client(base_url=base_url, headers=headers, timeout=within)
         except httpx.InvalidURL as error:
             raise InvalidInput("url", base_url, f"must be an address: {error}") from None
 

@@ -43,7 +43,7 @@ class Client:
         *,
         npz: bool = False,
     ) -> None:
-        """`api_key` where the service asks for one; `timeout` in seconds, for connecting and between bytes.
+        """`api_key` where the service asks for one; `timeout` in seconds, between bytes, and 10 s at most to connect.
 
         `npz`: columns travel as NumPy's .npz in place of JSON, which is faster for many rows.
         """

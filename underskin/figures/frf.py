@@ -17,6 +17,7 @@ PlotlyTrace = dict[str, Any]
 _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
 _HEIGHT = 640
+_MOST_IN_LEGEND = 12
 _BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
@@ -47,12 +48,13 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
 
 
 def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None) -> go.Figure:
-    """Each recording's lines."""
+    """Each recording's lines; of many their names are under the pointer alone."""
     traces: list[PlotlyTrace] = []
     for number, entry in enumerate(recordings):
         parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
         traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, line(number, 1.2))
-    return _finished(traces, zone_hz, "FRF of each recording")
+    figure = _finished(traces, zone_hz, "FRF of each recording")
+    return figure.update_layout(showlegend=len(recordings) <= _MOST_IN_LEGEND)
 
 
 def _lines(

@@ -1,4 +1,4 @@
-"""d33 of each sensor over time."""
+"""d33 of each sensor over time, or of many sensors together."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,10 +6,11 @@ from datetime import datetime, timedelta
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import ArrayLike
 
 from underskin.figures.style import COLOURS, MARKERS, label, line, styled
+from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
+_MOST_POINTS = 600  # of a history that shows each sensor
 _DAY = timedelta(days=1)
 
 
@@ -24,8 +25,17 @@ class SensorPoints:
     trend: str
 
 
+def is_summarised(sensors: int, points: int) -> bool:
+    """Whether so many sensors with so many points in all are drawn as their median and spread."""
+    return sensors > MOST_NAMED or (points > _MOST_POINTS and sensors > 1)
+
+
 def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
-    """A line for each sensor, with standard uncertainties."""
+    """A line for each sensor, with standard uncertainties; of many sensors their median, the range of 90 % of them as a
+    band, and by name those that stand apart."""
+    times = [time for entry in sensors for time in entry.times]
+    if is_summarised(len(sensors), len(times)):
+        return _finished(go.Figure(_most(sensors)), f"d33 of {len(sensors)} sensors over time", times, legend=False)
     figure = go.Figure()
     for number, entry in enumerate(sensors):
         figure.add_scatter(
@@ -39,32 +49,50 @@ def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
             hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
             f"± %{{error_y.array:.3g}} pC/N<br>{label(entry.trend)}<extra></extra>",
         )
-    return _finished(figure, "d33 of each sensor over time", [time for entry in sensors for time in entry.times])
+    return _finished(figure, "d33 of each sensor over time", times, legend=len(sensors) > 1)
 
 
-def array_history(
-    times: Sequence[str], low_pc_per_n: ArrayLike, median_pc_per_n: ArrayLike, high_pc_per_n: ArrayLike
-) -> go.Figure:
-    """Median over the sensors at each time, with the range from the lowest to the highest sensor as a band."""
-    figure = go.Figure()
+def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
+    """The band and the median of all sensors at each time, then the points of those that stand apart."""
+    at: dict[str, list[tuple[str, float, float]]] = {}
+    for entry in sensors:
+        for time, value, uncertainty in zip(
+            entry.times, entry.d33_pc_per_n, entry.d33_uncertainty_pc_per_n, strict=True
+        ):
+            at.setdefault(time, []).append((entry.sensor, value, uncertainty))
+    times = sorted(at)
+    found = [many_sensors(*(np.array([row[part] for row in at[time]]) for part in (1, 2))) for time in times]
+    apart = [(time, *at[time][place]) for time, one in zip(times, found, strict=True) for place in one.apart]
     band = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
-    figure.add_scatter(x=list(times), y=np.asarray(high_pc_per_n), showlegend=False, **band)
-    figure.add_scatter(
-        x=list(times), y=np.asarray(low_pc_per_n), name="lowest to highest sensor", fill="tonexty",
-        fillcolor="rgba(0,114,178,0.15)", **band,
-    )  # fmt: skip
-    figure.add_scatter(
-        x=list(times), y=np.asarray(median_pc_per_n), mode="lines+markers", name="median of the sensors",
-        line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
-        hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.5g} pC/N<extra></extra>",
-    )  # fmt: skip
-    return _finished(figure, "d33 of the array over time", times)
+    return [
+        go.Scatter(x=times, y=[one.high for one in found], name="90 % of the sensors", **band),
+        go.Scatter(
+            x=times, y=[one.low for one in found], name="90 % of the sensors", fill="tonexty",
+            fillcolor="rgba(0,114,178,0.15)", **band,
+        ),
+        go.Scatter(
+            x=times, y=[one.median for one in found], mode="lines+markers", name="median of the sensors",
+            line={"color": COLOURS[0], "width": 1.5}, marker={"size": 6},
+            hovertemplate="%{x|%d %b %Y %H:%M} UTC<br>median d33 %{y:.5g} pC/N<extra></extra>",
+        ),
+        go.Scatter(
+            x=[time for time, *_ in apart],
+            y=[value for _, _, value, _ in apart],
+            error_y={"type": "data", "array": [row[3] for row in apart], "thickness": 1, "width": 3},
+            mode="markers+text",
+            name="stands apart",
+            text=[label(sensor) for _, sensor, *_ in apart],
+            textposition="middle right",
+            marker={"color": COLOURS[1], "symbol": "square", "size": 8},
+            hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
+        ),
+    ]  # fmt: skip
 
 
-def _finished(figure: go.Figure, title: str, times: Sequence[str]) -> go.Figure:
+def _finished(figure: go.Figure, title: str, times: Sequence[str], *, legend: bool) -> go.Figure:
     figure.update_xaxes(title="recorded", type="date")
     moments = sorted(datetime.fromisoformat(time) for time in times)
     if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
         figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
     figure.update_yaxes(title="d33 [pC/N]")
-    return styled(figure, title)
+    return styled(figure.update_layout(showlegend=legend), title)

@@ -81,6 +81,7 @@ class Reason(StrEnum):
     SERIES_NOT_USABLE = "series_not_usable"
     CURVE_NOT_USABLE = "curve_not_usable"
     OUT_OF_TABLES_DECLARED = "out_of_domain.declared"
+    OUT_OF_TABLES_UNLESS_STIFFER = "out_of_domain.unless_stiffer"
     OUT_OF_TABLES_FITTED = "out_of_domain.fitted"
     CONTACTS_KEPT = "contacts_kept"
     BEYOND_TABLE = "out_of_domain.numbers"

@@ -77,6 +77,9 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CURVE_NOT_USABLE: "{refusal}: left out",
     Reason.OUT_OF_TABLES_DECLARED: "its contact (radius {radius_mm:.3g} mm on a layer of {thickness_mm:g} mm, at its "
     "place beside the sensor) lies beyond the tables: left out",
+    Reason.OUT_OF_TABLES_UNLESS_STIFFER: "by the declared {declared_mpa:g} MPa its contact lies beyond the tables, by "
+    "one up to {factor:g} times larger within; no answer that stands has such a modulus, so it was left out: a modulus "
+    "that is declared too small is not ruled out",
     Reason.OUT_OF_TABLES_FITTED: "with the values found for {answer} its contact lies beyond the tables: its "
     "prediction is continued from the table's edge",
     Reason.CONTACTS_KEPT: sentences.contacts_kept,

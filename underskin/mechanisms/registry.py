@@ -97,6 +97,11 @@ class Known(Mapping[str, Mechanism]):
             if kind in mechanism.kinds:
                 self._named[name] = mechanism.bind(conditions, table)
 
+    def replace(self, mechanism: Mechanism) -> None:
+        """Another form of one of the catalogue, where that is not left out."""
+        if mechanism.name in self._named:
+            self._named[mechanism.name] = mechanism
+
     def add(self, law: Mechanism) -> None:
         """One more, bound to the recordings of this diagnosis."""
         self._bound[law.name] = law

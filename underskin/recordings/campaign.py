@@ -6,7 +6,7 @@ keeps the good recordings and says of each of the others what is wrong; writing 
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,16 @@ from underskin.recordings.conditions import (
     IndentationConditions,
     SkinDescription,
 )
+from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.shown_values import shown
 from underskin.units import Complexes, Floats
 
 SCHEMA = "campaign/1"
+
+
+def read_estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # noqa: ARG001
+    """How an FRF is estimated from a time series."""
+    return checked_estimator(name, shown(value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +38,7 @@ class FrfRecording(FrfConditions):
     """Charge over force under these conditions.
 
     Either the FRF (`frequency_hz`, real and imaginary part, e^(+iωt); γ² in `coherence`) or the time series
-    (`sample_rate_hz`, `force_n`, `charge_pc`) that it is estimated from.
+    (`sample_rate_hz`, `force_n`, `charge_pc`) that it is estimated from, by `estimator` (H1 where it is None).
     """
 
     frf_re_pc_per_n: field.Series | None = None
@@ -41,6 +47,7 @@ class FrfRecording(FrfConditions):
     sample_rate_hz: field.Positive | None = None
     force_n: field.Series | None = None
     charge_pc: field.Series | None = None
+    estimator: Annotated[Estimator, read_estimator] | None = None
 
     @classmethod
     def of_lines(
@@ -229,6 +236,8 @@ def _not_one_of_two_forms(recording: FrfRecording) -> list[InvalidInput]:
     """An FRF or the time series it is estimated from: one of the two, whole."""
     series = [name for name in TIME_SERIES if getattr(recording, name) is not None]
     lines = [name for name in (*LINES, "coherence") if getattr(recording, name) is not None]
+    if recording.estimator is not None and not series:
+        return [errors.conflicting("estimator", recording.estimator, "must be absent where there is no time series")]
     if series and lines:
         return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
     needed = TIME_SERIES if series else LINES

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from underskin.errors import ErrorCode, InvalidInput, not_one_of, not_unique, out_of_range, too_few, wrong_type
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import validation as field
+from underskin.recordings.noted_columns import Further
 from underskin.recordings.shown_values import shown
 from underskin.units import Floats, checked, finite, non_negative, to_si
 
@@ -83,7 +84,7 @@ class FrfConditions:
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     frequency_hz: field.Frequencies | None = None
-    conditions: field.Further | None = None
+    conditions: Further | None = None
 
     def without_measurements(self, **changes: Any) -> "FrfConditions":
         """These conditions alone, with some of them changed."""
@@ -114,7 +115,7 @@ class IndentationConditions:
     dwell_s: field.NotNegative | None = None
     position_mm: field.Position | None = None
     stage_stiffness_n_per_mm: field.Positive | None = None
-    conditions: field.Further | None = None
+    conditions: Further | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +132,7 @@ class CompressionConditions:
     recorded_at: field.TimeOfDay | None = None
     load_cycles: field.Count | None = None
     dwell_s: field.NotNegative | None = None
-    conditions: field.Further | None = None
+    conditions: Further | None = None
 
 
 CurveConditions = IndentationConditions | CompressionConditions

@@ -4,14 +4,15 @@ import io
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import BinaryIO
 
 from underskin.errors import FileError
 from underskin.recordings import rig_mapping
-from underskin.recordings.campaign import Campaign, RecordingProblem, from_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording, RecordingProblem, from_dict
 from underskin.recordings.channels import Contents, Document
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.readers import formats
 from underskin.recordings.readers.sandbox import parse_apart
 from underskin.recordings.rig_description import RigDescription
@@ -28,6 +29,25 @@ class Reading:
     problems: list[RecordingProblem]
     warnings: list[str]
     taken: Mapping[str, str] = field(default_factory=dict)
+
+    def with_estimator(self, estimator: Estimator | None) -> "Reading":
+        """The same with the FRFs of all time series estimated so, whatever was said before; None changes nothing.
+
+        A warning counts the recordings that it does not apply to.
+        """
+        if estimator is None:
+            return self
+        recordings: list[Recording] = []
+        others = 0
+        for recording in self.campaign.recordings:
+            if isinstance(recording, FrfRecording) and recording.sample_rate_hz is not None:
+                recordings.append(replace(recording, estimator=estimator))
+            else:
+                recordings.append(recording)
+                others += 1
+        told = [f"{estimator} is for time series, which {others} of {len(recordings)} recordings are not"]
+        campaign = replace(self.campaign, recordings=tuple(recordings))
+        return replace(self, campaign=campaign, warnings=[*self.warnings, *(told if others else [])])
 
 
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:

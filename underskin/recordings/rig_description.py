@@ -10,7 +10,7 @@
 
 `skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
 file, or the block, says about itself. `channels` says for each campaign field which channel holds it, `curves` how
-several curves in one file are told apart.
+several curves in one file are told apart, `estimator` how FRFs are estimated from time series (H1, H2 or Hv).
 """
 
 import re
@@ -25,6 +25,7 @@ from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.channel_mapping import ChannelMapping, Property, SignalMapping
 from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.readers import json_file, text
 from underskin.recordings.shown_values import named, shown
 from underskin.recordings.validation import mapping
@@ -57,6 +58,7 @@ class RigDescription:
     units_checked: bool
     document: Mapping[str, Any]
     curves: str | CurveChannel | None = None
+    estimator: Estimator | None = None
 
 
 def parse(data: bytes, file: str) -> RigDescription:
@@ -81,14 +83,15 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises InvalidInput that names the field."""
-    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "curves", "units_checked")
+    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "curves", "estimator", "units_checked")
     document = field.of_schema("rig description", document, SCHEMA, fields_known)
     kind = document.get("kind", "frf")
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
     field.name("name", document.get("name", SCHEMA), False)
-    known = {entry.name for entry in fields(KINDS[kind])} - {"kind"}
+    known = {entry.name for entry in fields(KINDS[kind])} - {"kind", "estimator"}
     recording = mapping("recording", document.get("recording", {}))
+    channels = _channels(kind, document.get("channels"))
     return RigDescription(
         kind=kind,
         skin=_known("skin", mapping("skin", document.get("skin")), {entry.name for entry in fields(SkinDescription)}),
@@ -96,10 +99,11 @@ def from_dict(document: Any) -> RigDescription:
             name: field.build(Property, f"recording.{name}", value, False) if isinstance(value, Mapping) else value
             for name, value in _known("recording", recording, known).items()
         },
-        channels=_channels(kind, document.get("channels")),
+        channels=channels,
         units_checked=field.flag("units_checked", document.get("units_checked", False), False),
         document=document,
         curves=_curves(document.get("curves")),
+        estimator=_estimator(document.get("estimator"), channels),
     )
 
 
@@ -118,6 +122,14 @@ def _curves(document: Any) -> str | CurveChannel | None:
     if (curves.channel is None) == (curves.segments is None):
         raise conflicting("curves", shown(list(document)), "must name either a channel or segments")
     return curves
+
+
+def _estimator(value: Any, channels: Mapping[str, ChannelMapping]) -> Estimator | None:
+    if value is None:
+        return None
+    if "charge_pc" not in channels:
+        raise conflicting("estimator", shown(value), Requirement("is for time series: ", Mention("charge_pc")))
+    return checked_estimator("estimator", shown(value))
 
 
 def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:

@@ -44,7 +44,9 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
         common = {name: common_value(name, value, stated, file) for name, value in rig.recording.items()}
         began = {} if block.recorded_at is None else {"recorded_at": block.recorded_at}
         mapped = MappedBlock(rig, block, stated, file)
-        recordings.append({"id": label, "kind": rig.kind, **began, **mapped.spring(), **common, **mapped.fields()})
+        estimated = {} if rig.estimator is None else {"estimator": rig.estimator}
+        own = {"id": label, "kind": rig.kind, **began, **estimated}
+        recordings.append({**own, **mapped.spring(), **common, **mapped.fields()})
         warnings += mapped.warnings
         taken |= {name: how for name, how in mapped.taken.items() if name not in taken}
     document = {"schema": SCHEMA, "name": stem, "skin": rig.skin, "recordings": recordings}

@@ -1,11 +1,23 @@
 """Values and names as an error may show them."""
 
 import math
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 LONGEST_NAME = 200  # characters
+
+
+class CellText(str):
+    """A cell of a text that is not what its field needs, and its `place`, such as "line 3, column 2"."""
+
+    place: str
+
+    def __new__(cls, cell: str, place: str) -> Self:
+        """Of a cell at a place."""
+        made = super().__new__(cls, cell)
+        made.place = place
+        return made
 
 
 def shown(value: Any) -> Any:

@@ -5,7 +5,6 @@ field in its annotation, by one of the types at the end.
 """
 
 import math
-import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
@@ -18,7 +17,7 @@ import numpy as np
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings.shown_values import LONGEST_NAME, named, shown
+from underskin.recordings.shown_values import LONGEST_NAME, CellText, named, shown
 from underskin.units import Floats, checked
 
 BuiltModel = TypeVar("BuiltModel")
@@ -27,17 +26,6 @@ Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 LARGEST_COUNT = 2**53
 FREQUENCIES_HZ = (1e-6, 1e9)
 _MOST_UNKNOWN = 20  # unknown fields of one object that are listed; a document may hold millions
-CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-MOST_CONDITIONS = 100
-BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
-    (
-        *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
-        *("dwell_s", "position_mm", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence", "conditions"),
-        *("sample_rate_hz", "force_n", "charge_pc", "displacement_mm", "time_s", "stage_stiffness_n_per_mm"),
-        *("sample_height_mm", "sample_diameter_mm", "order", "time_of_day", "previous_preload_n", "x_mm", "y_mm"),
-        *("phase", "day"),
-    )
-)
 COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
@@ -250,25 +238,6 @@ def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     return column
 
 
-def further(field: str, value: Any, units_checked: bool) -> dict[str, float | str]:
-    """What else a lab noted, by names of its own: numbers or short words; null where it was not noted."""
-    document = mapping(field, value)
-    noted: dict[str, float | str] = {}
-    if len(document) > MOST_CONDITIONS:
-        raise errors.out_of_range(field, len(document), f"must be at most {MOST_CONDITIONS} columns")
-    for key, entry in document.items():
-        place = f"{field}.{named(key)}"
-        if not isinstance(key, str) or not CONDITION.fullmatch(key):
-            raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
-        if key in BUILT_IN_AXES:
-            raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")
-        if isinstance(entry, str):
-            noted[key] = name(place, entry, units_checked)
-        elif entry is not None:
-            noted[key] = number(place, entry)
-    return noted
-
-
 def _column(field: str, value: Any) -> Floats:
     if isinstance(value, np.ndarray):
         if value.ndim != 1 or value.dtype.kind not in "iuf":
@@ -292,7 +261,8 @@ def _refuse_where(field: str, column: Floats, bad: Any, allowed: str, code: Erro
 
 
 def _wrong_type(field: str, value: Any, allowed: str, index: int | None = None) -> InvalidInput:
-    return errors.wrong_type(field, shown(value), allowed, index=index)
+    place = f" ({value.place})" if isinstance(value, CellText) else ""
+    return errors.wrong_type(field, shown(value), f"{allowed}{place}", index=index)
 
 
 Name = Annotated[str, name]
@@ -310,4 +280,3 @@ Rows = Annotated[Floats, rows]
 Frequencies = Annotated[Floats, frequencies]
 Times = Annotated[Floats, not_falling]
 Coherence = Annotated[Floats, coherence]
-Further = Annotated[dict[str, float | str], further]

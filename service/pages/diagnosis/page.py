@@ -37,7 +37,8 @@ _ABOUT = {
     "predicted. A double click shows all of the air, another one the contact.",
     "before_after": "Each point a recording, or a part of its lines; the grey band is what noise alone allows.",
     "explanations": "What the recordings say of each explanation, the stated one on top.",
-    "sensors": "Each sensor's d33 in each campaign with its 95 % interval, the mechanisms taken into account.",
+    "sensors": "d33 of the sensors in each campaign, the mechanisms taken into account: each with its 95 % interval, "
+    "of many sensors the median, the range of 90 % and those that stand apart.",
     "population": "Each skin's value with its 95 % interval on the grey band in which 95 % of such skins lie.",
     "parameters": "What is known of each parameter: grey before the recordings, blue after them.",
 }

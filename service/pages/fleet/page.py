@@ -1,23 +1,27 @@
 """Fleets: skins of one make are chosen, named and diagnosed together; what was diagnosed before."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import WRITE, RunnerInUse, Store, Table, sender
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.forms import Form, see
+from service.pages.shared.forms import Form, in_form_words, see
 from service.pages.shared.html import page
-from service.problems import validated
+from service.problems import parsed
 from service.schemas.diagnoses import FEWEST_SKINS, AskForFleet
-from service.store import diagnoses, skins
+from service.store import Conflict, Database, diagnoses, skins
 from service.usecases import diagnoses as usecase
+from underskin.errors import UnderskinError, too_few
 
 router = APIRouter(prefix="/fleets")
 
 _ON_A_PAGE = 200  # skins, as many as a form may choose
 _LATEST = 20  # diagnoses
-_CHOSEN = "skin-"  # names of the boxes begin so
+_BOX = "skin-"  # names of the boxes begin so
+_LABELS = {"skins": "Skins", "name": "Name"}
 
 
 @router.get("")
@@ -28,19 +32,61 @@ def fleets(
     after: Annotated[str | None, Query(max_length=200)] = None,
 ) -> Response:
     """The skins to choose from, by id."""
+    return _choice(request, store, find, after)
+
+
+@router.post("/diagnosis", dependencies=WRITE)
+def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
+    """Puts the diagnosis of the chosen skins into the queue; one that there is already is shown. What is wrong stands
+    in the form, with all that was chosen."""
+    try:
+        row = store.write(usecase.ask_of_fleet, table, sender(request), _asked(sent))
+    except (UnderskinError, Conflict) as error:
+        return _choice(request, store, sent.get("find", ""), sent.get("after") or None, sent, error)
+    runner.stir()
+    return see(f"/diagnoses/{row.id}")
+
+
+def _chosen(sent: Mapping[str, str]) -> list[str]:
+    return [value for name, value in sent.items() if name.startswith(_BOX)]
+
+
+def _asked(sent: Mapping[str, str]) -> AskForFleet:
+    """The request that the form stands for; raises InvalidInput."""
+    chosen = _chosen(sent)
+    if len(chosen) < FEWEST_SKINS:
+        raise too_few("skins", f"{len(chosen)} chosen", f"must be {FEWEST_SKINS} at least: tick those of one make")
+    return parsed(AskForFleet, {"skins": chosen, "name": sent.get("name", "").strip()})
+
+
+def _choice(
+    request: Request,
+    store: Database,
+    find: str,
+    after: str | None,
+    sent: Mapping[str, str] = MappingProxyType({}),
+    error: UnderskinError | Conflict | None = None,
+) -> Response:
+    """The page with the skins to choose from, as they were chosen in the form that was `sent`."""
     with store.reading() as connection:
         rows = skins.listed(connection, find or None, after, _ON_A_PAGE + 1)
         before = diagnoses.listed(connection, diagnoses.DiagnosisFilters(kind="fleet"), None, _LATEST)
         verdict_of = verdicts.of_rows(connection, before)
     example = {"skins": [row.id for row in rows[:FEWEST_SKINS]], "name": "the fleet"}
+    status = 200 if error is None else 409 if isinstance(error, Conflict) else 422
     return page(
         request,
         "fleets.html",
+        status=status,
         rows=rows[:_ON_A_PAGE],
         following=rows[_ON_A_PAGE - 1].id if len(rows) > _ON_A_PAGE else None,
         find=find,
+        after=after or "",
         fewest=FEWEST_SKINS,
-        chosen=_CHOSEN,
+        box=_BOX,
+        chosen=set(_chosen(sent)),
+        name=sent.get("name", ""),
+        error=in_form_words(error, _LABELS) if isinstance(error, UnderskinError) else error and str(error),
         diagnoses=list(verdict_of.values()),
         same=same_request.post(
             request,
@@ -49,13 +95,3 @@ def fleets(
             f"client.fleets.diagnose({example['skins']!r}, {example['name']!r})",
         ),
     )
-
-
-@router.post("/diagnosis", dependencies=WRITE)
-def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts the diagnosis of the chosen skins into the queue; one that there is already is shown."""
-    chosen = [value for name, value in sent.items() if name.startswith(_CHOSEN)]
-    asked = validated(AskForFleet, {"skins": chosen, "name": sent.get("name", "").strip()})
-    row = store.write(usecase.ask_of_fleet, table, sender(request), asked)
-    runner.stir()
-    return see(f"/diagnoses/{row.id}")

@@ -18,7 +18,6 @@ _QUANTITIES = {
     "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", False),
     "trend": ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "trend", "pC/N a year", True),
 }
-_MOST_POINTS = 600  # of a history that shows each sensor
 _RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
 
 
@@ -50,21 +49,11 @@ def _range(known: Sequence[Mapping[str, Any]]) -> str:
 
 
 def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
-    """d33 over time: of one sensor, of all, or of very many the median and the range."""
-    from underskin.figures.history import SensorPoints, array_history, d33_history
+    """d33 over time: of one sensor, of all, or of many the median and the range."""
+    from underskin.figures.history import SensorPoints, d33_history, is_summarised
 
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
     chosen = [entry for entry in history.sensors if sensor in (None, entry.sensor)]
-    if sum(len(entry.points) for entry in chosen) > _MOST_POINTS and sensor is None:
-        by_time: dict[str, list[float]] = {}
-        for entry in chosen:
-            for point in entry.points:
-                by_time.setdefault(point.time, []).append(point.d33_pc_per_n)
-        times = sorted(by_time)
-        levels = [[pick(by_time[time]) for time in times] for pick in (min, median, max)]
-        median_of = f"Median d33 over the sensors in each campaign, {_RESTS[by]}"
-        about = f"{median_of}, and the range from the lowest to the highest."
-        return drawn("history", array_history(times, *levels), about, numbers)
     points = [
         SensorPoints(
             entry.sensor,
@@ -76,6 +65,11 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
         for entry in chosen
     ]
     about = f"d33 of each sensor in every campaign, {_RESTS[by]}, ± its uncertainty."
+    if is_summarised(len(chosen), sum(len(entry.points) for entry in chosen)):
+        about = (
+            f"Median d33 over the sensors in each campaign, {_RESTS[by]}, the range of 90 % of them, and by name those "
+            "that stand apart."
+        )
     return drawn("history", d33_history(points), about, numbers)
 
 

@@ -28,6 +28,7 @@ from service.store import (
     inversions,
     models,
     overview,
+    skin_changes,
     skins,
 )
 from service.usecases import d33_cache
@@ -73,6 +74,7 @@ def skin(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
+        mark = skin_changes.mark(connection, root, table.sha256)
         together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
         may_be_together = diagnosed_together.count_usable(connection, root) > 1
         model_row = models.last(connection, root)
@@ -120,6 +122,7 @@ def skin(
         show=show,
         sensor=sensor,
         waiting=waiting,
+        mark=mark,
         same=same_request.get(
             request,
             f"{path}/history" + ("?model=adopted" if by == "adopted" else ""),
@@ -158,6 +161,13 @@ def join(skin_id: SkinId, sent: Form, store: Store) -> Response:
     asked = validated(Join, {"skin_id": sent.get("other", "").strip(), "reason": sent.get("reason", "")})
     usecase.join(store, skin_id, asked.skin_id, asked.reason)
     return see(f"/skins/{quote(skin_id, safe='')}")
+
+
+@router.get("/mark")
+def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
+    """Another one whenever anything has changed that the page shows."""
+    with store.reading() as connection:
+        return {"mark": skin_changes.mark(connection, skins.require_root(connection, skin_id), table.sha256)}
 
 
 @router.get("/map.csv")

@@ -1,6 +1,6 @@
 """The start: skins at a glance."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
 from starlette.background import BackgroundTask
@@ -11,6 +11,7 @@ from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
 from service.store import overview
+from service.usecases.scheduled_backups import ScheduledBackups, kept
 
 router = APIRouter()
 
@@ -49,7 +50,17 @@ def start(
         find=find,
         following=shown[-1].cursor if len(glances) > _ON_A_PAGE else None,
         first=before is None,
+        backups=_backups(request),
         same=same_request.get(request, "/v1/skins", "list(client.skins.all())"),
     )
     answer.background = BackgroundTask(prepare)
     return answer
+
+
+def _backups(request: Request) -> dict[str, Any] | None:
+    """The newest scheduled backup, where the server makes any."""
+    backups: ScheduledBackups | None = request.app.state.backups
+    if backups is None:
+        return None
+    newest = next(iter(kept(backups.folder)), None)
+    return {"last": None if newest is None else newest.made_at.isoformat(), "overdue": backups.overdue}

@@ -68,10 +68,6 @@ const seen = new IntersectionObserver(
   },
   { rootMargin: "400px" },
 );
-for (const plot of document.querySelectorAll(".plot")) {
-  plot.style.minHeight = `${plot.dataset.height}px`;
-  seen.observe(plot);
-}
 // On paper a figure is as wide as the sheet, whatever the window's width is.
 const SHEET = 680;
 addEventListener("beforeprint", () => {
@@ -84,17 +80,25 @@ addEventListener("afterprint", () => {
   for (const plot of document.querySelectorAll(".plot")) Plotly.relayout(plot, { autosize: true, width: null });
 });
 
-for (const list of document.querySelectorAll("[data-choice]")) {
-  list.addEventListener("change", () => redraw(list.closest("figure").querySelector(".plot")));
+function prepare(root) {
+  for (const plot of root.querySelectorAll(".plot")) {
+    plot.style.minHeight = `${plot.dataset.height}px`;
+    seen.observe(plot);
+  }
+  for (const list of root.querySelectorAll("[data-choice]")) {
+    list.addEventListener("change", () => redraw(list.closest("figure").querySelector(".plot")));
+  }
+  for (const button of root.querySelectorAll("[data-save]")) button.addEventListener("click", () => save(button));
 }
 
-for (const button of document.querySelectorAll("[data-save]")) {
-  button.addEventListener("click", async () => {
-    const plot = button.closest("figure").querySelector(".plot");
-    const { data, layout } = document_of(plot);
-    const size = { width: Math.max(plot.clientWidth, 640), height: Number(plot.dataset.height) + 30 };
-    await Plotly.downloadImage({ data, layout: { ...layout, ...size } }, {
-      format: button.dataset.save, filename: button.dataset.name, scale: button.dataset.save === "png" ? 2 : 1, ...size,
-    });
+async function save(button) {
+  const plot = button.closest("figure").querySelector(".plot");
+  const { data, layout } = document_of(plot);
+  const size = { width: Math.max(plot.clientWidth, 640), height: Number(plot.dataset.height) + 30 };
+  await Plotly.downloadImage({ data, layout: { ...layout, ...size } }, {
+    format: button.dataset.save, filename: button.dataset.name, scale: button.dataset.save === "png" ? 2 : 1, ...size,
   });
 }
+
+prepare(document);
+addEventListener("renewed", (event) => prepare(event.target));

@@ -2,13 +2,15 @@
 // Small helps on every page; each works without as well.
 
 // Times in the viewer's zone, the exact one under the pointer.
-for (const time of document.querySelectorAll("time[datetime]")) {
-  const when = new Date(time.dateTime);
-  if (Number.isNaN(when.getTime())) continue;
-  const date = { year: "numeric", month: "short", day: "numeric" };
-  const clock = time.dataset.form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
-  time.title = time.dateTime;
-  time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
+function show_times(root) {
+  for (const time of root.querySelectorAll("time[datetime]")) {
+    const when = new Date(time.dateTime);
+    if (Number.isNaN(when.getTime())) continue;
+    const date = { year: "numeric", month: "short", day: "numeric" };
+    const clock = time.dataset.form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
+    time.title = time.dateTime;
+    time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
+  }
 }
 
 // A choice with the pointer takes effect at once; who walks through the choices with keys presses the button. What is
@@ -27,15 +29,23 @@ if (chosen) {
   sessionStorage.removeItem("chosen");
   document.getElementById(chosen)?.focus({ preventScroll: true });
 }
-for (const choice of document.querySelectorAll("[data-submit]")) {
-  let byKeys = false;
-  choice.addEventListener("keydown", () => (byKeys = true));
-  choice.addEventListener("pointerdown", () => (byKeys = false));
-  choice.addEventListener("change", () => byKeys || submit(choice));
-  choice.form.addEventListener("submit", (event) => {
-    event.preventDefault();
-    submit(choice);
-  });
+function submit_choices(root) {
+  for (const choice of root.querySelectorAll("[data-submit]")) {
+    let byKeys = false;
+    choice.addEventListener("keydown", () => (byKeys = true));
+    choice.addEventListener("pointerdown", () => (byKeys = false));
+    choice.addEventListener("change", () => byKeys || submit(choice));
+    choice.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      submit(choice);
+    });
+  }
+}
+
+// Also of a part that a script has renewed.
+for (const help of [show_times, submit_choices]) {
+  help(document);
+  addEventListener("renewed", (event) => help(event.target));
 }
 
 for (const button of document.querySelectorAll("[data-copy]")) {

@@ -52,7 +52,7 @@ def test_every_option_of_the_query_is_a_field_of_the_form_too(server: Server) ->
             {"skn": "palm-3"},
             "",
             "skn",
-            "did you mean skin? Known: skin, corrects, reason, all_or_nothing, together, file",
+            "did you mean skin? Known: skin, corrects, reason, all_or_nothing, together, estimator, file",
         ),
         ({"campaign": "x"}, "?skin=palm-3", "campaign", "is not a form field of this request"),
         ({"skin": ["a", "b"]}, "", "skin", "must be given once"),

@@ -76,7 +76,7 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
     page = context.new_page()
     address = str(idle.http.base_url).rstrip("/")
     page.goto(f"{address}/")
-    page.get_by_role("link", name="diagnosed together").click()
+    page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     page.get_by_label("Find a skin").fill("fleet-")
     page.get_by_role("button", name="Find").click()
     boxes = page.get_by_role("checkbox")
@@ -85,12 +85,11 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
         page.get_by_label(f"fleet-{number}").check()
     page.get_by_label("Name").fill(HOSTILE)
     page.get_by_role("button", name="Diagnose these skins together").click()
-    page.get_by_role("alert").get_by_text("must have at least 3 entries").wait_for()
-    page.go_back()
+    page.get_by_role("alert").get_by_text("Skins: 2 chosen – must be 3 at least").wait_for()
+    assert page.get_by_label("Name").input_value() == HOSTILE
+    assert [page.get_by_label(f"fleet-{number}").is_checked() for number in range(3)] == [True, True, False]
+    assert page.get_by_label("Find a skin").input_value() == "fleet-"
     page.get_by_label("fleet-2").check()
-    for number in range(2):
-        page.get_by_label(f"fleet-{number}").check()
-    page.get_by_label("Name").fill(HOSTILE)
     page.get_by_role("button", name="Diagnose these skins together").click()
     page.wait_for_url("**/diagnoses/*")
     finished(idle)
@@ -99,7 +98,7 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
     for number in range(3):
         assert page.get_by_role("link", name=f"fleet-{number}").get_attribute("href") == f"/skins/fleet-{number}"
     assert idle.http.get(f"{page.url}/report.html", headers=BROWSING).status_code == 200
-    page.get_by_role("link", name="Fleets").click()
+    page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     assert page.get_by_role("heading", name="Diagnosed before").count() == 1
     context.close()
 
@@ -110,3 +109,22 @@ def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
     reader.require_accessible()
     reader.go("/fleets?find=nothing-is-called-so")
     assert "No skin is called so" in reader.page.get_by_role("main").inner_text()
+
+
+def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form(idle: Server) -> None:
+    sent_to(idle, "bare-0", "a")
+    (only,) = sent_to(idle, "bare-1", "b")
+    sent_to(idle, "bare-2", "c")
+    with Client(str(idle.http.base_url)) as client, httpx.Client(base_url=idle.http.base_url, headers=BROWSING) as form:
+        client.campaigns.withdraw(only, "wrong sphere")
+        fields = {"form_token": token_of(form.get("/fleets").text), "find": "bare-", "name": "<b>batch"}
+        chosen = {f"skin-{number + 1}": f"bare-{number}" for number in range(3)}
+        answer = form.post("/fleets/diagnosis", data={**fields, **chosen})
+        assert answer.status_code == 409
+        assert "leave it out of the fleet" in answer.text
+        assert answer.text.count(" checked") == 3
+        assert 'value="&lt;b&gt;batch"' in answer.text
+        nameless = form.post("/fleets/diagnosis", data={**fields, **chosen, "name": " "})
+        assert (nameless.status_code, "Name: " in nameless.text) == (422, True)
+        unknown = form.post("/fleets/diagnosis", data={**fields, **chosen, "skin-1": "nobody"})
+        assert (unknown.status_code, "Skins: nobody – must be the id of a skin" in unknown.text) == (422, True)

@@ -21,7 +21,7 @@ VALID = campaign_validator()
 CONDITIONS = {"temperature_c": 23.5, "operator": "mb", "humidity": None}
 RECORDINGS = {
     "frf": {**FRF, "kind": "frf", "conditions": CONDITIONS},
-    "time series": {**TIME_SERIES, "conditions": CONDITIONS},
+    "time series": {**TIME_SERIES, "estimator": "Hv", "conditions": CONDITIONS},
     "indentation": {**INDENTATION, "sensor": "s01", "stage_stiffness_n_per_mm": 12.0, "conditions": CONDITIONS},
     "compression": {**COMPRESSION, "time_s": [0.0, 1.0], "dwell_s": 3.0, "load_cycles": 2},
 }
@@ -64,7 +64,17 @@ def test_a_recording_with_every_field_is_valid(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", RECORDINGS)
 def test_reader_and_schema_agree_on_every_field_of_a_recording(kind: str) -> None:
-    known = {*RECORDINGS[kind], "kind", "position_mm", "coherence", "time_s", "recorded_at", "charge_pc", "nonsense"}
+    known = {
+        *RECORDINGS[kind],
+        "kind",
+        "position_mm",
+        "coherence",
+        "time_s",
+        "recorded_at",
+        "charge_pc",
+        "estimator",
+        "nonsense",
+    }
     agree(document(RECORDINGS[kind]), ("recordings", 0), known)
 
 

@@ -102,8 +102,8 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
 
     writer = threading.Thread(target=write)
 
-    def make_and_be_written(database: Database, target: Path) -> None:
-        make(database, target)
+    def make_and_be_written(database: Database, target: Path, progress: backup.Progress) -> None:
+        make(database, target, progress)
         writer.start()
         writer.join(2)  # time for a write that does not wait
 

@@ -17,3 +17,10 @@ def in_words(names: Sequence[str]) -> str:
     """An answer's names as a sentence has them."""
     special = {NOTHING_MISSING: "nothing missing", NONE_OF_THESE: "something without a name"}
     return " and ".join(special.get(name, name.replace("_", " ")) for name in names)
+
+
+def quantity_in_words(parameter: str) -> str:
+    """A quantity of a skin, or `mechanism.parameter`, as a sentence has it: "tip mass of contact resonance"."""
+    mechanism, _, name = parameter.rpartition(".")
+    called = {"youngs_modulus": "Young's modulus"}.get(name, name.replace("_", " "))
+    return f"{called} of {in_words([mechanism])}" if mechanism else called

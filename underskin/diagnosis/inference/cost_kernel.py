@@ -10,6 +10,7 @@ from underskin.compiled import compiled
 from underskin.units import Floats, Mask
 
 _TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_NONE = 1e-300  # u*u where u is 0
 
 
 @compiled()
@@ -27,7 +28,11 @@ def log_likelihood(
     mm: Floats,
     mr: Floats,
 ) -> float:
-    """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten."""
+    """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
+
+    With V = s'² a² + p² |t|² a recording's χ² is |y|² + ((Re u*r)²/(1 + V u*u) − (Re u*y)²)/u*u, the square completed
+    along u: |r|² less what V takes out would be rounding alone where a model predicts far more than was measured.
+    """
     gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
     mm[:], mr[:] = 0.0, 0.0
     chi2 = log_determinant = 0.0
@@ -40,16 +45,16 @@ def log_likelihood(
         a = level[recording] * factor
         known = a * (1 - own)
         u, u_y = uu[recording], uy[recording]
-        u_r = (u_y - known * u) * inverse
-        r_r = (yy[recording] - known * (2 * u_y - known * u)) * inverse
-        u *= inverse
+        u_r, u_y = (u_y - known * u) * inverse, u_y * inverse
+        u = max(u * inverse, _NONE)
         a2 = a * a
         variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
         if len(place):
             variance += p2 * place[recording] * factor * factor
         left = 1 + variance * u
-        reduced = 1 / left
-        chi2 += r_r - variance * reduced * u_r * u_r
+        part = 1 / (left * u)
+        reduced = part * u
+        chi2 += yy[recording] * inverse + (u_r * u_r - left * u_y * u_y) * part
         mm[of] += a2 * u * reduced
         mr[of] += a * u_r * reduced
         determinant *= left

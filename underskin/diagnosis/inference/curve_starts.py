@@ -6,7 +6,7 @@ import numpy as np
 
 from underskin.diagnosis.inference.hypothesis import Hypothesis
 from underskin.diagnosis.inference.least_squares import LeastSquares
-from underskin.diagnosis.inference.objective import Evaluator
+from underskin.diagnosis.inference.noise_steps import SettlingEvaluator
 from underskin.diagnosis.inference.points import Evaluated, Points
 from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, START_GAIN
 from underskin.mechanisms.models.curves import CurveModel
@@ -20,7 +20,7 @@ _DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspac
 _SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
 
 
-def softer(fitter: Evaluator, at: Evaluated) -> Evaluated:
+def softer(fitter: SettlingEvaluator, at: Evaluated) -> Evaluated:
     """Of curves whose modulus is not declared: also with smaller moduli, since what sticks looks stiff."""
     places = [place for place, entry in enumerate(fitter.hypotheses[0].model.parameters) if entry.proportional]
     if not places:
@@ -31,7 +31,7 @@ def softer(fitter: Evaluator, at: Evaluated) -> Evaluated:
     return fitter.evaluate(replace(points, fit=fit), slopes=False)
 
 
-def with_contact_points(fitter: Evaluator, at: Evaluated) -> Evaluated:
+def with_contact_points(fitter: SettlingEvaluator, at: Evaluated) -> Evaluated:
     """Of indentations: each one's contact point where it fits best, in ever finer steps of the depth.
 
     Curves are independent of each other but for what they share, so that one set of depths serves all of them.
@@ -78,7 +78,7 @@ def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floa
     return np.minimum(low, fit), np.maximum(high, fit)
 
 
-def by_least_squares(fitter: Evaluator, start: Points) -> Evaluated:
+def by_least_squares(fitter: SettlingEvaluator, start: Points) -> Evaluated:
     """The best of the least-squares fits of one hypothesis of curves from these starts, with the noise it leaves.
 
     A small smooth error and a close fit, or a large one and a loose fit: each may be a maximum of its own.
@@ -95,7 +95,7 @@ def by_least_squares(fitter: Evaluator, start: Points) -> Evaluated:
     return at[at.best()]
 
 
-def _smooth_range(fitter: Evaluator) -> tuple[float, float]:
+def _smooth_range(fitter: SettlingEvaluator) -> tuple[float, float]:
     """Where the logarithm of the smooth error of curves may begin."""
     smooth = fitter.hypotheses[0].smooth
     return smooth.low, max(smooth.high, float(np.log(3e-2)))

@@ -80,10 +80,12 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Request:
-    """A set of mechanisms to explain, from the explanation of a set with one mechanism less, where one is given."""
+    """A set of mechanisms to explain, from the explanation of a set with one mechanism less, where one is given, and of
+    that mechanism `alone`."""
 
     names: tuple[str, ...]
     parent: Explanation | None = None
+    alone: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
     larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
     kept: bool = False  # fitted to its end however far behind it begins
@@ -279,7 +281,9 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
             larger = requests[number].larger
             if larger is not None:
                 known, begin = {name: larger.own(name) for name in requests[number].names}, larger.point
-            beginnings.append(Beginning(known, parent.point if parent and begin is None else begin))
+            added = requests[number].alone
+            alone = {} if added is None else {name: added.own(name) for name in added.names}
+            beginnings.append(Beginning(known, parent.point if parent and begin is None else begin, alone))
         starts |= dict(
             zip(members, best_starts(Fitter([hypotheses[number] for number in members]), beginnings), strict=True)
         )

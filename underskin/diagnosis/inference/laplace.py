@@ -213,13 +213,20 @@ def _polish(fitter: Fitter, at: Evaluated, moving: Indices) -> tuple[Indices, Ev
 
 
 def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
-    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance)."""
+    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance).
+
+    The bound that the mean is farthest beyond comes first: what goes with it beyond others comes back within them.
+    """
     mean, covariance = mean.copy(), covariance.copy()
-    deviation = np.sqrt(np.diag(covariance))
-    near = np.minimum(mean - low, high - mean) < _NEAR * deviation
-    total = 0.0
-    for place in np.flatnonzero(near):
-        sd = float(np.sqrt(covariance[place, place]))
+    total, left = 0.0, np.ones(len(mean), dtype=bool)
+    while left.any():
+        deviation = np.sqrt(np.diag(covariance))
+        beyond = np.where(left, np.maximum(low - mean, mean - high) / deviation, -np.inf)
+        place = int(np.argmax(beyond))
+        if beyond[place] < -_NEAR:
+            break
+        left[place] = False
+        sd = float(deviation[place])
         a, b = (low[place] - mean[place]) / sd, (high[place] - mean[place]) / sd
         if a > 0:  # the far tail is computed on the side where it is small
             a, b, sign = -b, -a, -1.0

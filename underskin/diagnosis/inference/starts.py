@@ -16,6 +16,7 @@ from underskin.units import Floats, Indices, Mask
 
 _QUANTILES = {1: (0.03, 0.15, 0.3, 0.5, 0.7, 0.85, 0.97), 2: (0.1, 0.3, 0.5, 0.7, 0.9), 3: (0.2, 0.5, 0.8)}
 _KEPT_STARTS = 3
+_SETTLING, _SETTLING_ALONE = 1, 10  # steps of the noise levels from each start, and of a mechanism that acts on them
 _KEPT_OF_PARENT = 1  # of curves, from an explanation with one mechanism less
 _PLACED_STARTS = 4  # of curves, whose contact points are looked for
 
@@ -25,24 +26,30 @@ class Beginning:
     """Where the fit of a hypothesis may begin.
 
     `parent`: fit coordinates of its mechanisms that were fitted without the others; None where none were. `begin`:
-    where the nuisances begin; None for their priors' centres.
+    where the nuisances begin; None for their priors' centres. `alone`: those of the others where these were fitted
+    alone, another guess.
     """
 
     parent: Mapping[str, Sequence[float]] | None
     begin: FitPoint | None
+    alone: Mapping[str, Sequence[float]]
 
 
 def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]:
     """Of each hypothesis the best of the local minima of a grid over the new mechanisms' prior quantiles, and of what
     recordings suggest."""
     grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
-    tried = fitter.settle(fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings]), 1)
+    begun = fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings])
+    settles = fitter.own.size and all(entry.parent is None for entry in beginnings)
+    tried = fitter.settle(begun, _SETTLING_ALONE if settles else _SETTLING)
     edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
     starts = []
     for number, (grid, beginning) in enumerate(zip(grids, beginnings, strict=True)):
         own = tried[edges[number] : edges[number + 1]]
         cost = own.cost[: grid.size].reshape(grid.shape)
-        lowest = own[np.append(np.flatnonzero(_are_lowest(cost)), np.arange(grid.size, len(own)))]
+        # Noise levels that have settled have left the grid.
+        on_grid = np.arange(grid.size) if settles else np.flatnonzero(_are_lowest(cost))
+        lowest = own[np.append(on_grid, np.arange(grid.size, len(own)))]
         if fitter.lines.curves:
             guessed = len(own) - grid.size
             starts.append(_of_curves(fitter, lowest, guessed, grid.new, beginning))
@@ -77,6 +84,9 @@ class _Grid:
         self.shape = [len(axis) for axis in axes] or [1]
         self.size = len(points)
         points += map(tuple, _guesses(self.new, hypothesis))
+        alone = [value for name in self.new for value in beginning.alone.get(name, ())]
+        if self.new and len(alone) == len(free):
+            points.append(tuple(alone))
         self.own = np.zeros((len(points), hypothesis.own_parameters))
         for name, values in known.items():
             if name not in self.new:

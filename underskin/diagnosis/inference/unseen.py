@@ -2,10 +2,8 @@
 
 A glue line that slips by the same share under every sphere only changes d33: it does not show, and a fit without it is
 as good. At places spread evenly over such a mechanism's prior all else is fitted again, the noise levels as well; each
-counts by the evidence that it leaves.
+counts by the evidence that it leaves. Where the sensors' spread is free, the parameter is averaged over it at each.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import qmc
@@ -14,6 +12,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.laplace import around_levels, around_mean
 from underskin.diagnosis.inference.optimizer import Evaluated, Fitter
+from underskin.diagnosis.inference.over_spread import Normals, over_spread, together
 from underskin.diagnosis.inference.points import Points
 from underskin.errors import InvalidInput
 from underskin.mechanisms.base import Unsupported
@@ -22,26 +21,6 @@ from underskin.units import Floats
 _PLACES = {0: 1, 1: 12, 2: 24}  # for so many parameters
 _MOST_PLACES = 48
 _COUNTS = 6.0  # nats behind the fit without the mechanism within which a place counts
-
-
-@dataclass(frozen=True)
-class Normals:
-    """A mixture of normal distributions of one fit coordinate; `share` (normals,) need not sum to 1."""
-
-    share: Floats
-    mean: Floats
-    deviation: Floats
-
-    def times(self, factor: float) -> "Normals":
-        """With every share so many times as large."""
-        return Normals(factor * self.share, self.mean, self.deviation)
-
-
-def together(several: list[Normals]) -> Normals:
-    """All normals of several mixtures."""
-    return Normals(
-        *(np.concatenate([getattr(one, name) for one in several]) for name in ("share", "mean", "deviation"))
-    )
 
 
 def beside(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> Normals | None:
@@ -76,10 +55,14 @@ def beside(problem: FittingProblem, explanation: Explanation, name: str, paramet
     values, covariances = around_mean(held, at)
     whole = values + around_levels(held, at)
     without = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
+    shares = np.exp(whole - without) / len(fit)
     place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
+    spread = over_spread(held, at, place)
+    if spread is not None:
+        return together([normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)])
     index = int(np.searchsorted(np.flatnonzero(held.free[0]), place))
     deviation = np.sqrt([covariance[index, index] for covariance in covariances])
-    return Normals(np.exp(whole - without) / len(fit), at.points.fit[:, place], deviation)
+    return Normals(shares, at.points.fit[:, place], deviation)
 
 
 def _evenly(parameters: int) -> Floats:

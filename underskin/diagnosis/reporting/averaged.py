@@ -7,9 +7,9 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.over_spread import over_spread
+from underskin.diagnosis.inference.over_spread import Normals, over_spread, together
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.inference.unseen import Normals, beside, together
+from underskin.diagnosis.inference.unseen import beside
 from underskin.diagnosis.reporting.law_level import law_levels
 from underskin.diagnosis.reporting.numbers import mixture_quantile, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -113,13 +113,12 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     show; the shares sum to 1."""
     place = place_of(explanation, "d33")
     best = explanation.best
-    own = over_spread(best, place)
-    if own is None:
+    spread = over_spread(best.fitter, best.at, place)
+    if spread is None:
         index = best.hypothesis.mean_places.index(place)
         deviation = np.sqrt(best.covariance[index, index])
-        own = Normals(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))
-    levels = law_levels(problem, explanation)
-    several = [Normals(own.share / len(levels), own.mean + level, own.deviation) for level in levels.tolist()]
+        spread = [Normals(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))]
+    several = list(spread)
     if probability > _WORTH_MORE:
         known = {frozenset(one.explanation.names) for one in search.answers if one.explanation is not None}
         others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
@@ -127,7 +126,9 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         more = [beside(problem, explanation, name, "d33") for name in others if name not in explanation.names]
         several += [found.times(odds * _as_unseen(found)) for found in more if found is not None]
     mixture = together(several)
-    return mixture.times(1 / float(mixture.share.sum()))
+    mixture = mixture.times(1 / float(mixture.share.sum()))
+    levels = law_levels(problem, explanation)
+    return together([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
 
 
 def _as_unseen(found: Normals) -> float:

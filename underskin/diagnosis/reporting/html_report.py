@@ -33,7 +33,7 @@ plot.before(label);
 
 _FILTERS = (
     *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
-    *(wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
+    *(wording.quantity, wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
     *(first_and_rest, in_percent, lacking_part),
 )
 

@@ -30,7 +30,7 @@ from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
-from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, stated_d33
+from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, StatedD33, stated_d33
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
@@ -110,13 +110,26 @@ def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
     ]
 
 
+@dataclass(frozen=True)
+class Reported:
+    """A report, plain JSON values, and its d33 with what keeps it from being quoted."""
+
+    document: dict[str, Any]
+    d33: StatedD33
+
+
 def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
-    """The document; plain JSON values."""
+    """The document."""
+    return reported(diagnosis).document
+
+
+def reported(diagnosis: DiagnosisResult) -> Reported:
+    """The document and its d33."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
     if diagnosis.search is None or diagnosis.problem is None:
         findings = [finding.in_report() for finding in diagnosis.findings]
-        return {
+        nothing = {
             **document,
             "probability": 1.0,
             "statement": insufficient_statement(diagnosis.lacking, slips(findings)),
@@ -133,6 +146,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "next_experiment": None,
             "provenance": dict(diagnosis.provenance),
         }
+        return Reported(nothing, StatedD33(None, why_not=["its recordings say too little"]))
     search, problem = diagnosis.search, diagnosis.problem
     leader = search.answers[0]
     shown = search.shown_or_nothing(leader)
@@ -147,13 +161,13 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
     contradictory = [] if diagnosis.joined is None else kinds.contradictions(diagnosis.joined)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
-    consistent = diagnosis.joined is None or not kinds.contradictions(diagnosis.joined)
-    d33 = stated_d33(search, problem, fit, diagnosis.shifts, stands=stands and consistent)
+    d33 = stated_d33(search, problem, fit, diagnosis.shifts, stands=stands, contradictory=bool(contradictory))
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = averaged.presence(search, averaged.present(search, problem))
     # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
     unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
+    unseen |= {entry.mechanism for entry in d33.hidden}
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
     around = Around(
@@ -177,7 +191,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
         )
         shape = statements.shape_clause(diagnosis.shape)
         statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
-    return {
+    whole = {
         **document,
         "probability": round(leader.probability, 3),
         "statement": statement,
@@ -204,6 +218,7 @@ def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
+    return Reported(whole, d33)
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:

@@ -8,15 +8,24 @@ import re
 from collections.abc import Sequence
 
 _END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # of a sentence within a clause
+_END_OR_STOP = re.compile(r"([.?!]) +")
 _STOP = re.compile(r"\. +")
 _NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': stays as it is
 _SYMBOLS = ("d33",)  # that no sentence writes with a capital
 
 
-def of_clauses(*sentences: Sequence[str]) -> str:
+def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
     """One sentence of each of `sentences` that has a clause that is not empty; within them no full stop stands before
-    a space, so that they can be told apart again by these."""
-    filled = ([clause(text) for text in clauses if text] for clauses in sentences)
+    a space, so that they can be told apart again by these. `names` of campaigns and skins stay whole: "Palm 2. Upper"
+    is no end of a sentence."""
+    kept = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+
+    def told(text: str) -> str:
+        for name, whole in kept.items():
+            text = text.replace(name, whole)
+        return clause(text)
+
+    filled = ([told(text) for text in clauses if text] for clauses in sentences)
     return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
 
 

@@ -2,7 +2,7 @@
 has beside the band of the population; from the report alone.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -10,7 +10,10 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
+from underskin.diagnosis.reporting.sentences import capital
+from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
 _BLUE, _ORANGE = "#0072B2", "#D55E00"
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
@@ -31,15 +34,29 @@ def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
 
 
 def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]]) -> go.Figure:
-    """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; `rows` are those of
-    `d33.per_sensor`."""
+    """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; of many their median, the range
+    of most and, by name, those that stand apart. `rows` are those of `d33.per_sensor`."""
     campaigns = list(dict.fromkeys(row["campaign"] for row in rows))
     sensors = list(dict.fromkeys(row["sensor"] for row in rows))
+    few = len(sensors) <= MOST_NAMED
+    figure = go.Figure(list(_each(rows, campaigns, sensors) if few else _most(rows, campaigns)))
+    labels = [escape(name) for name in campaigns]
+    figure.update_xaxes(title="campaign", tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
+    figure.update_yaxes(title=f"d33 [{rows[0]['unit']}]" + (", 95 %" if few else ""))
+    title = "d33 of each sensor over the campaigns"
+    if not few:
+        title = (
+            f"d33 of {len(sensors)} sensors over the campaigns: median, the range of 90 %, and those that stand apart"
+        )
+    figure.update_layout(title=title, height=470, showlegend=few and len(sensors) > 1)
+    return _styled(figure)
+
+
+def _each(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: Sequence[str]) -> Iterator[go.Scatter]:
     beside = _BESIDE * (np.arange(len(sensors)) - (len(sensors) - 1) / 2) / len(sensors)
-    figure = go.Figure()
     for number, sensor in enumerate(sensors):
         own = [row for row in rows if row["sensor"] == sensor]
-        figure.add_scatter(
+        yield go.Scatter(
             x=[campaigns.index(row["campaign"]) + beside[number] for row in own],
             y=[row["value"] for row in own],
             error_y=_reaching(own),
@@ -50,17 +67,50 @@ def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]]) -> go.Figure:
             text=[escape(row["campaign"]) for row in own],
             hovertemplate="%{text}: %{y:.4g} pC/N<extra>%{fullData.name}</extra>",
         )
-    labels = [escape(name) for name in campaigns]
-    figure.update_xaxes(title="campaign", tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
-    figure.update_yaxes(title=f"d33 [{rows[0]['unit']}], 95 %")
-    figure.update_layout(title="d33 of each sensor over the campaigns", height=470)
-    return _styled(figure)
+
+
+def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterator[go.Scatter]:
+    """The median of each campaign's sensors with the range of 90 % of them, then those that stand apart."""
+    of_campaign = [[row for row in rows if row["campaign"] == name] for name in campaigns]
+    found = [
+        many_sensors(
+            np.array([row["value"] for row in own]),
+            np.array([(row["high"] - row["low"]) / (2 * SDS_OF_95) for row in own]),
+        )
+        for own in of_campaign
+    ]
+    ends = [{"value": one.median, "low": one.low, "high": one.high} for one in found]
+    yield go.Scatter(
+        x=list(range(len(campaigns))),
+        y=[one.median for one in found],
+        error_y=_reaching(ends),
+        mode="lines+markers",
+        name="median",
+        line={"color": _BLUE, "width": 1},
+        marker={"symbol": "circle", "size": 9},
+        hovertemplate="median %{y:.4g} pC/N<extra></extra>",
+    )
+    apart = [(number, of_campaign[number][place]) for number, one in enumerate(found) for place in one.apart]
+    yield go.Scatter(
+        x=[number for number, _ in apart],
+        y=[row["value"] for _, row in apart],
+        error_y=_reaching([row for _, row in apart]),
+        mode="markers+text",
+        name="stands apart",
+        marker={"color": _ORANGE, "symbol": "square", "size": 8},
+        text=[escape(row["sensor"]) for _, row in apart],
+        textposition="middle right",
+        hovertemplate="%{text}: %{y:.4g} pC/N<extra></extra>",
+    )
 
 
 def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
     """Each quantity of each skin with its 95 % interval on the band of the population (95 %), those that depart in
     another colour; `populations` is the report's `population`."""
-    titles = [f"{entry['parameter'].replace('_', ' ').replace('.', ': ')} [{entry['unit']}]" for entry in populations]
+    titles = [
+        capital(quantity_in_words(entry["parameter"])) + ("" if entry["unit"] == "-" else f" [{entry['unit']}]")
+        for entry in populations
+    ]
     skins = max(len(entry["skins"]) for entry in populations)
     figure = make_subplots(len(populations), 1, subplot_titles=titles)
     for place, entry in enumerate(populations, start=1):

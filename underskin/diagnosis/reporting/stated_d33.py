@@ -20,17 +20,21 @@ from underskin.findings.formatting import in_digits
 from underskin.prediction import plausibility
 
 _LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
+_MOST_NAMED = 2  # mechanisms that would not show, beside a value to quote
+_ANSWERS = "several answers remain"
 BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
 
 
 @dataclass(frozen=True)
 class StatedD33:
     """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
-    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted."""
+    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted. `why_not`: what
+    else does, in words."""
 
     document: Mapping[str, Any] | None
     findings: Sequence[Finding] = ()
     hidden: Sequence[HiddenShift] = ()
+    why_not: Sequence[str] = ()
 
     @property
     def declared(self) -> list[HiddenShift]:
@@ -42,20 +46,43 @@ class StatedD33:
         """The value to quote, or why none is; empty where there is no d33."""
         if self.document is None:
             return ""
-        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
         if self.document["quotable"]:
-            return f"d33 to quote: {value} {self.document['unit']} (95 %: {low} to {high})"
-        ends = f"from {low} to {high} {self.document['unit']}"
-        if not self.declared:
-            return f"d33 is not to be quoted: it lies {ends} over the answers that remain"
-        each = " and ".join(f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.declared)
-        return f"d33 is not to be quoted: it lies {ends}, but what would not show here would change it, {each}"
+            return f"d33 to quote: {self.quoted()}"
+        return f"d33 is not to be quoted: {self.interval()}"
+
+    def quoted(self) -> str:
+        """The value with its interval, and which physics that would not show would change it most beyond that."""
+        assert self.document is not None
+        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
+        largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
+        named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
+        hides = f", provided that no {named} hides" if named else ""
+        return f"{value} {self.document['unit']} (95 %: {low} to {high}){hides}"
+
+    def interval(self) -> str:
+        """Where it lies, and why it is not to be quoted."""
+        assert self.document is not None
+        lies = f"it lies from {self.document['low']:.3g} to {self.document['high']:.3g} {self.document['unit']}"
+        if self.declared:
+            each = " and ".join(f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.declared)
+            return f"{lies}, but what would not show here would change it, {each}"
+        over = " over the answers that remain" if _ANSWERS in self.why_not else ""
+        others = " and ".join(words for words in self.why_not if words != _ANSWERS)
+        return f"{lies}{over}" + (f", {'and' if over else 'but'} {others}" if others else "")
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it is not to be quoted; none where it is."""
+        if self.document is None:
+            return list(self.why_not) or ["no answer explains its recordings"]
+        hidden = in_words([one.mechanism for one in self.declared])
+        return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
         """The report's entries, with what each would do to d33 beyond its interval."""
         hidden = {entry.mechanism: entry for entry in self.hidden}
         known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
-        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.declared]
+        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.hidden]
         return [
             {
                 "mechanism": entry.mechanism,
@@ -67,12 +94,19 @@ class StatedD33:
 
 
 def stated_d33(
-    search: Search, problem: FittingProblem, fit: Mapping[str, Any], shifts: Sequence[HiddenShift], *, stands: bool
+    search: Search,
+    problem: FittingProblem,
+    fit: Mapping[str, Any],
+    shifts: Sequence[HiddenShift],
+    *,
+    stands: bool,
+    contradictory: bool,
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
-    `quotable`: one answer `stands`, d33 is plausible, the answer fits the recordings to their noise, which is a fifth
-    of the response at most, and no wrong declared number that would not show here would move d33 beyond its interval.
+    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, d33 is plausible, the answer fits the
+    recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
+    show here would move d33 beyond its interval.
     """
     d33 = None if problem.lines.curves else averaged.d33(search, problem)
     if d33 is None:
@@ -80,13 +114,21 @@ def stated_d33(
     half_width = float(np.log(d33["high"] / d33["low"])) / 2
     hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
     implausible = plausibility.implausibility(d33["value"])
-    floor = fit["noise_floor_percent"]
-    reached = fit["after"]["rmse_percent"] <= REACHES_NOISE * floor and floor <= _LARGEST_FLOOR
-    quotable = stands and reached and implausible is None
+    floor, error = fit["noise_floor_percent"], fit["after"]["rmse_percent"]
+    against = {
+        _ANSWERS: not stands,
+        "kinds of recordings contradict each other": contradictory,
+        "no PVDF has such a value": implausible is not None,
+        f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
+            error <= REACHES_NOISE * floor
+        ),
+        f"noise alone is {in_digits(floor, 2)} % of the response": not floor <= _LARGEST_FLOOR,
+    }
+    why_not = [words for words, holds in against.items() if holds]
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
     findings = [finding] if implausible else []
     # Beside other reasons not to quote it, a hidden one would not be what decides.
-    stated = StatedD33({**d33, "quotable": quotable}, findings, hidden if quotable else ())
+    stated = StatedD33({**d33, "quotable": not why_not}, findings, () if why_not else hidden, why_not)
     return StatedD33({**d33, "quotable": False}, findings, hidden) if stated.declared else stated
 
 

@@ -7,7 +7,9 @@ from functools import cache
 from typing import Any
 
 from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figures import AXES
+from underskin.diagnosis.reporting.sentences import capital
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unnamed.vocabulary import followed
@@ -76,6 +78,11 @@ def interval(entry: Mapping[str, Any]) -> str:
 def unit(label: str) -> str:
     """Empty for a pure number."""
     return "" if label == "-" else label
+
+
+def quantity(parameter: str) -> str:
+    """A quantity of skins, in words."""
+    return capital(quantity_in_words(parameter))
 
 
 def columns(entries: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,25 +1,30 @@
 """Two sensors' cables exchanged from some recording on, told by their gains where every contact is on its own sensor.
 
-Sensors of different gains answer with each other's level since: before and after, four groups of levels, of which
-crosswise ones agree. All pairs and recordings are tried, and the plainest is held against the model of levels.
+Sensors of different gains answer with each other's level since. In the model of levels the columns a, b of X, which say
+which recordings are of either sensor, are then others, a', b': with U = (a, b, a', b'), D = t² diag(−1, −1, 1, 1),
+M = Uᵀ C⁻¹ U and v = Uᵀ C⁻¹ y the evidence gains −½ ln |1 + D M| + ½ vᵀ (1 + D M)⁻¹ D v at given s, t and p. All pairs
+and recordings are tried so; of the plainest few all is fitted. An exchange costs ln of how many were tried, and is held
+against a step of either sensor alone, of any size.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import log
 
 import numpy as np
 
-from underskin.diagnosis.screening.levels import Levels
+from underskin.diagnosis.screening.levels import LevelFit, Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Indices
 
-_LEAST = 6  # recordings of both sensors
-_WORTH = 15.0  # of χ², before it is held against the model of levels
-_GAIN = 6.0  # of ln evidence beyond ln of how many were tried
+_SPREADS = (0.06, 0.25)  # t of sensors whose exchange would show
+_FITTED = 3  # of those tried
+_STEP = 0.4  # prior standard deviation of a sensor's step
+_GAIN = log(100)  # of ln evidence beyond ln of how many were tried
+_OVER_STEP = log(4)  # of ln evidence beyond a step of one sensor
 
 
 @dataclass(frozen=True)
@@ -33,23 +38,17 @@ class Exchange:
 
 def exchanged_cables(levels: Levels) -> Exchange | None:
     """The plainest exchange, None where none is plain."""
-    numbers, counts = np.unique(levels.sensor, return_counts=True)
-    pairs = list(combinations(numbers[counts > 1].tolist(), 2))
-    if not pairs:
-        return None
+    numbers = np.unique(levels.sensor).tolist()
     base = levels.fit(levels.value)
-    flat = levels.without_smooth(base)
-    variance = float(np.median(base.residual(levels.value) ** 2)) / 0.455
-    tried = [(*_crosswise(flat, levels, pair), pair) for pair in pairs]
-    drop, since, pair = max(tried, key=lambda entry: entry[0])
-    if drop < _WORTH * variance:
+    tried = sorted((one for spread in _SPREADS for one in _tried(levels, base, spread)), key=lambda one: -one.gain)
+    cost = log(max(len(tried) / len(_SPREADS), 1))
+    fitted = [replace(one, gain=_fit(levels, one).evidence - base.evidence - cost) for one in tried[:_FITTED]]
+    best = max(fitted, key=lambda one: one.gain, default=None)
+    if best is None or best.gain < _GAIN:
         return None
-    first, second = pair
-    sensor = levels.sensor.copy()
-    sensor[since] = np.where(levels.sensor[since] == first, second, first)
-    cost = log(len(pairs) * len(levels.value))
-    gain = levels.fit(levels.value, sensor=sensor).evidence - base.evidence - cost
-    return Exchange(pair, since, gain) if gain > _GAIN else None
+    cost_of_step = log(max(len(levels.value) - len(numbers), 1))
+    steps = [levels.fit(levels.value, column).evidence - base.evidence for column in _steps(levels, best)]
+    return best if best.gain > max(steps) - cost_of_step + _OVER_STEP else None
 
 
 def with_right_sensors(
@@ -79,25 +78,33 @@ def _moved(entry: FrfRecording, here: tuple[float, float], there: tuple[float, f
     return x, y
 
 
-def _crosswise(flat: Floats, levels: Levels, pair: tuple[int, int]) -> tuple[float, Indices]:
-    """By how much Σ(level − mean)² falls where two sensors are taken for each other since the best recording, and the
-    levels since."""
-    own = np.flatnonzero(np.isin(levels.sensor, pair))
-    own = own[np.argsort(levels.order[own])]
-    if len(own) < _LEAST:
-        return 0.0, own[:0]
-    first = levels.sensor[own] == pair[0]
-    straight = _square(flat[own][first]) + _square(flat[own][~first])
-    best, since = 0.0, own[:0]
-    for k in range(1, len(own)):
-        late = np.arange(len(own)) >= k
-        if len({*first[late]}) < 2 or len({*first[~late]}) < 2:
-            continue
-        drop = straight - _square(flat[own][first ^ late]) - _square(flat[own][~(first ^ late)])
-        if drop > best:
-            best, since = drop, own[late]
-    return best, since
+def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
+    """Every pair and recording, with the gain at the base's s and p."""
+    own = np.equal.outer(levels.sensor, levels.sensor)
+    precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * own)
+    weighed = precision @ levels.value
+    sign = spread**2 * np.array([-1.0, -1.0, 1.0, 1.0])[:, None]
+    for pair in combinations(np.unique(levels.sensor).tolist(), 2):
+        both = np.flatnonzero(np.isin(levels.sensor, pair))
+        both = both[np.argsort(levels.order[both])]
+        first = levels.sensor[both] == pair[0]
+        late = np.arange(len(both)) >= np.arange(1, len(both))[:, None]
+        given = np.broadcast_to(first, late.shape)
+        u = np.stack([given, ~given, given ^ late, ~(given ^ late)], axis=-1).astype(float)
+        inner = np.eye(4) + sign * (u.transpose(0, 2, 1) @ precision[np.ix_(both, both)] @ u)
+        v = (u.transpose(0, 2, 1) @ weighed[both])[..., None]
+        gain = 0.5 * ((v * np.linalg.solve(inner, sign * v)).sum(axis=(1, 2)) - np.linalg.slogdet(inner)[1])
+        yield from (Exchange(pair, both[k + 1 :], float(gain[k])) for k in range(len(gain)))
 
 
-def _square(values: Floats) -> float:
-    return float(((values - values.mean()) ** 2).sum()) if len(values) else 0.0
+def _fit(levels: Levels, found: Exchange) -> LevelFit:
+    first, second = found.sensors
+    sensor = levels.sensor.copy()
+    sensor[found.since] = np.where(levels.sensor[found.since] == first, second, first)
+    return levels.fit(levels.value, sensor=sensor)
+
+
+def _steps(levels: Levels, found: Exchange) -> list[Floats]:
+    """A step of either sensor since the exchange (recordings, 1)."""
+    late = np.isin(np.arange(len(levels.value)), found.since)
+    return [_STEP * (late & (levels.sensor == number)).astype(float)[:, None] for number in found.sensors]

@@ -1,43 +1,46 @@
 """Two sensors that answer where the other one was pressed: labels exchanged, or cables since some recording.
 
-With d shape_i the response expected of recording i and d shape'_i that of the other sensor to the same contact,
-    m_i = |level_i − d shape_i| / u_i,  m'_i = |level_i − d shape'_i| / u_i,
-    u_i = d max(shape_i, shape'_i, 0.3 max shape),
-the sensors are exchanged from recording k on, in the order of time, where m is small before k, and m' but not m since.
+A sensor that answers where no response is expected of it makes a pair with the one that is nearest to where it was
+pressed. Of each pair, `exchange_evidence` weighs an exchange against none; it costs ln of how many pairs there are. A
+recording that answers with far less than is expected may be of a weak or dead sensor, and does not count. Two sensors
+that fall silent together while others answer have their cables exchanged as well: each was recorded while the other one
+was pressed.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from math import dist, log
 
 import numpy as np
 
+from underskin.diagnosis.screening.displaced_response import displaced_response
+from underskin.diagnosis.screening.exchange_evidence import ExchangeEvidence
 from underskin.diagnosis.screening.levels import flat_level
 from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Floats, Mask
 
-_LEAST_SHAPE = 0.3  # of the largest: a smaller one is measured by it
-_CONTRADICTS, _AGREES, _AGREED = 0.6, 0.2, 0.3  # m since and m' since, and m before, in the mean
-_AGREES_ALONE = 0.1  # m' of a single recording
+_LEAST_SHAPE = 0.3  # of the largest: smaller ones are measured by it
+_ANSWERS = 0.6  # of a level, or of `_LEAST_SHAPE`, that is not expected: then exchanges are sought
+_WEAK = 0.3  # of the level to be expected
+_GAIN = log(100)  # of ln evidence beyond ln of how many pairs there are
 _FEWEST = 4  # recordings, for one of them to contradict the others
 _FAR_OFF = 30.0  # times the usual response
-_MOST_SENSORS = 8  # that contradict their places, among which pairs are sought
 
 
 @dataclass(frozen=True)
 class _Exchange:
-    """Two sensors, the recordings of them since the exchange, and those of them before."""
+    """Two sensors, the recordings of them since the exchange and before, and by how much ln evidence gains on its
+    cost."""
 
     sensors: tuple[str, str]
-    since: Indices
-    before: Indices
-    answered: bool  # by a sensor where the other one was pressed; else both are silent since
+    since: list[int]
+    before: list[int]
+    gain: float
 
 
 def without_exchanges(
@@ -47,98 +50,100 @@ def without_exchanges(
     if len(campaign.skin.sensors) < 2 or len(entries) < _FEWEST:
         return list(entries), []
     level = np.array([flat_level(entry) for entry in entries])
-    shape = _shape(campaign, entries, table)
-    if not shape.max() > 0:
-        return list(entries), []
+    own, near = [entry.sensor for entry in entries], [_nearest(campaign, entry) for entry in entries]
+    shape, pressed = (
+        displaced_response(campaign.skin, entries, names, np.zeros((1, 2)), table).value[0] for names in (own, near)
+    )
     silent, _ = no_response(entries)
-    d33 = _usual(level, np.where(silent, 0.0, shape))
-    if d33 is None:
+    largest = float(max(shape.max(), pressed.max()))
+    usual = _usual(level, np.where(silent, 0.0, np.maximum(shape, pressed)))
+    if usual is None:
         return list(entries), []
-    unit = np.maximum(np.maximum(level / d33, shape), _LEAST_SHAPE * shape.max())
-    contradicting = np.abs(level / d33 - shape) > _CONTRADICTS * unit
-    if not contradicting.any():
-        return list(entries), []
-    odd = [entry for entry, wrong in zip(entries, contradicting, strict=True) if wrong]
-    suspects = _suspects(entries, contradicting)
-    right, findings, settled = list(entries), list[Finding](), set[str]()
-    nearest = [(name, _pressed(campaign, odd, name)) for name in suspects]
-    for first, second in (*combinations(suspects, 2), *nearest):
-        pair = (min(first, second), max(first, second))
-        if first == second or settled & set(pair):
-            continue
-        found = _exchange(campaign, entries, table, pair, level / d33, shape)
-        if found is None:
-            continue
-        for number in found.since.tolist():
-            right[number] = _at_place(campaign, entries[number], *pair)
-        findings.append(_finding(found, entries))
-        settled |= set(pair)
-        if not found.answered:
-            left_out = set(found.since.tolist())
-            return [entry for number, entry in enumerate(right) if number not in left_out], findings
-    return right, findings
+    unasked = level - usual * shape > _ANSWERS * np.maximum(level, _LEAST_SHAPE * usual * largest)
+    right, findings = list(entries), list[Finding]()
+    if unasked.any():
+        tells = np.flatnonzero(~silent & (level > _WEAK * usual * shape))
+        known = [entries[number] for number in tells.tolist()]
+        evidence = ExchangeEvidence(campaign.skin, known, level[tells] / (usual * largest), largest, table)
+        for found in _exchanges(campaign, known, unasked[tells], evidence):
+            findings.append(_finding(found, known, put_right=True))
+            for number in found.since:
+                right[tells[number]] = _at_place(campaign, known[number], *found.sensors)
+    unheard = _falling_silent(entries, silent)
+    if unheard is None:
+        return right, findings
+    left = [entry for number, entry in enumerate(right) if number not in unheard.since]
+    return left, [*findings, _finding(unheard, entries, put_right=False)]
 
 
-def _exchange(
-    campaign: Campaign,
-    entries: Sequence[FrfRecording],
-    table: SigmaTable,
-    pair: tuple[str, str],
-    level: Floats,
-    shape: Floats,
-) -> _Exchange | None:
-    """Whether two sensors are exchanged, and since when; `level` over d (recordings,)."""
+def _exchanges(
+    campaign: Campaign, entries: Sequence[FrfRecording], unasked: Mask, evidence: ExchangeEvidence
+) -> list[_Exchange]:
+    """The plainest exchanges, each sensor in one of them at most."""
     order = recording_order(entries)
-    own = np.array(sorted(np.flatnonzero([entry.sensor in pair for entry in entries]), key=lambda n: order[n]))
-    other = _shape(campaign, [_at_place(campaign, entries[number], *pair) for number in own], table)
-    unit = np.maximum(np.maximum(shape[own], other), _LEAST_SHAPE * shape.max())
-    as_given, exchanged = np.abs(level[own] - shape[own]) / unit, np.abs(level[own] - other) / unit
-    before = np.concatenate([[0.0], np.cumsum(np.minimum(as_given, 1) ** 2)])
-    since = np.concatenate([[0.0], np.cumsum(np.minimum(exchanged, 1) ** 2)])
-    k = int(np.argmin(before + since[-1] - since))
-    late = np.arange(len(own)) >= k
-    tells = late & (np.maximum(shape[own], other) > _LEAST_SHAPE * shape.max())
-    agrees = _AGREES if tells.sum() > 1 else _AGREES_ALONE
-    if not tells.any() or as_given[tells].mean() < _CONTRADICTS or exchanged[tells].mean() > agrees:
-        return None
-    if k and as_given[:k].mean() > _AGREED:
-        return None
-    answered = bool((level[own][late] > _LEAST_SHAPE * shape.max()).any())
-    both = [{entries[number].sensor for number in part} == set(pair) for part in (own[:k], own[k:])]
-    if not answered and not all(both):
-        return None
-    return _Exchange(pair, own[late], own[:k], answered)
+    pairs = _pairs(campaign, [entry for entry, odd in zip(entries, unasked, strict=True) if odd])
+    found = []
+    for pair in pairs:
+        own = sorted((n for n, entry in enumerate(entries) if entry.sensor in pair), key=lambda n: order[n])
+        others = [pair[1] if entries[number].sensor == pair[0] else pair[0] for number in own]
+        start = evidence.exchange(np.array(own), others)
+        gain = start.gain - log(len(pairs))
+        if gain > _GAIN:
+            found.append(_Exchange(pair, own[start.first :], own[: start.first], gain))
+    chosen, settled = list[_Exchange](), set[str]()
+    for one in sorted(found, key=lambda one: -one.gain):
+        if not settled & set(one.sensors):
+            chosen.append(one)
+            settled |= set(one.sensors)
+    return chosen
 
 
-def _finding(found: _Exchange, entries: Sequence[FrfRecording]) -> Finding:
-    first, second = found.sensors
-    if not len(found.before):
-        return Finding(Reason.LABELS_EXCHANGED, "", "sensor", {"first": first, "second": second})
-    since = entries[int(found.since[0])].id
-    arguments = {"first": first, "second": second, "since": since, "recordings": len(found.since)}
-    return Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**arguments, "put_right": found.answered})
+def _pairs(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[str, str]]:
+    """The sensors of these recordings, each with the sensor that is nearest to where it was pressed."""
+    pairs = {(entry.sensor, _nearest(campaign, entry)) for entry in unasked}
+    return sorted({(min(pair), max(pair)) for pair in pairs if pair[0] != pair[1]})
 
 
-def _suspects(entries: Sequence[FrfRecording], contradicting: Mask) -> list[str]:
-    """The sensors with most recordings that contradict what is expected."""
-    sensors = [entry.sensor for entry, wrong in zip(entries, contradicting, strict=True) if wrong]
-    return sorted(sorted(set(sensors)), key=sensors.count, reverse=True)[:_MOST_SENSORS]
-
-
-def _pressed(campaign: Campaign, entries: Sequence[FrfRecording], name: str) -> str:
-    """The sensor that is nearest to where most of these recordings of the one of that name were pressed."""
+def _nearest(campaign: Campaign, entry: FrfRecording) -> str:
+    """The sensor that is nearest to where a recording was pressed."""
     places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    pressed = [
-        min(places, key=lambda other: float(np.hypot(*np.subtract(places[other], entry.position_mm or places[name]))))
-        for entry in entries
-        if entry.sensor == name
-    ]
-    return max(sorted(set(pressed)), key=pressed.count)
+    pressed = entry.position_mm or places[entry.sensor]
+    return min(places, key=lambda name: dist(places[name], pressed))
+
+
+def _falling_silent(entries: Sequence[FrfRecording], silent: Mask) -> _Exchange | None:
+    """The two sensors that answer until some recording and never since, where others do; None where not two do so."""
+    order = np.argsort(recording_order(entries), kind="stable").tolist()
+    falling = dict[str, list[int]]()
+    for name in {entry.sensor for entry in entries}:
+        own = [number for number in order if entries[number].sensor == name]
+        answers = [bool(~silent[number]) for number in own]
+        if answers[0] and not answers[-1] and answers == sorted(answers, reverse=True):
+            falling[name] = own
+    if len(falling) != 2:
+        return None
+    first, second = sorted(falling)
+    own = [number for number in order if entries[number].sensor in falling]
+    before = [number for number in own if not silent[number]]
+    since = own[len(before) :]
+    others = [number for number in order[order.index(since[0]) :] if number not in own]
+    if silent[since].all() and others and not silent[others].any():
+        return _Exchange((first, second), since, before, np.inf)
+    return None
+
+
+def _finding(found: _Exchange, entries: Sequence[FrfRecording], *, put_right: bool) -> Finding:
+    first, second = found.sensors
+    if not found.before:
+        return Finding(Reason.LABELS_EXCHANGED, "", "sensor", {"first": first, "second": second})
+    since = entries[found.since[0]].id
+    arguments = {"first": first, "second": second, "since": since, "recordings": len(found.since)}
+    return Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**arguments, "put_right": put_right})
 
 
 def _usual(level: Floats, shape: Floats) -> float | None:
-    """d: the level over the shape in recordings that are neither silent nor far from their sensor; None where one of
-    them is off by far, which is a slip of units."""
+    """The level over the shape in recordings that are neither silent nor far from any sensor; None where one of them
+    is off by far, which is a slip of units."""
     telling = shape > _LEAST_SHAPE * shape.max(initial=0.0)
     if not telling.any():
         return None
@@ -146,14 +151,6 @@ def _usual(level: Floats, shape: Floats) -> float | None:
     if ratio.max() > _FAR_OFF * np.median(ratio):
         return None
     return float(np.median(ratio[ratio > _LEAST_SHAPE * np.quantile(ratio, 0.9)]))
-
-
-def _shape(campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable) -> Floats:
-    """Magnitude of the base model's prediction (recordings,)."""
-    model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
-    value = model.predict(np.array([parameter.start for parameter in model.parameters])).value
-    own = value[np.searchsorted(model.recording, np.arange(len(entries)))]
-    return np.nan_to_num(np.abs(own.real))
 
 
 def _at_place(campaign: Campaign, entry: FrfRecording, first: str, second: str) -> FrfRecording:

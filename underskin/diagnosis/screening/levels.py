@@ -4,29 +4,34 @@ With y_i = ln |level_i / shape_i| of recording i, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
 where X holds a gain, one gain a sensor (of standard deviation t), and smooth functions of what physics may follow
 (sphere, preload, place, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter of
-positions. The evidence is the largest ln N(y; 0, C), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size of the
-smooth functions: a slip is believed where taking it out of y raises it by far more than its own description costs.
+positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size
+of the smooth functions, p(s) the prior of a recording's gain: a slip is believed where taking it out of y raises the
+evidence by far more than its own description costs.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from math import log
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from underskin.diagnosis.noise.noise_priors import GAIN_FALL, Plateau
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.unnamed.axes import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
 
 _FLAT_HZ = 130.0  # the response is about flat below
 _LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
 _SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
+_SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 _SPREAD = (0.01, 0.06, 0.25)  # t
-_BENDS = (0.1, 0.4, 1.0)  # of all smooth functions together
+_BENDS = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
 _PLACE_MM = (0.0, 0.1, 0.3)  # p
 _USUAL_SPREAD, _USUAL_PLACE_MM = 0.06, 0.1
 _OVERALL, _SMOOTH, _BEND = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
@@ -52,19 +57,15 @@ class Levels:
         """
         spreads = _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
         added = 0.0 if further is None else further @ further.T
-        best, chosen, size = -np.inf, np.eye(len(value)), 1.0
+        best, chosen, best_spread = -np.inf, np.eye(len(value)), spreads[0]
         for spread, place, bend in product(spreads, self._places, _BENDS):
             fixed = self._expected(spread, bend, sensor) + np.diag((self.slope * place) ** 2) + added
             for scatter in _SCATTER:
                 covariance = fixed + np.diag(np.full(len(value), scatter**2))
-                density = _log_density(value, covariance)
+                density = _log_density(value, covariance) + float(_SCATTER_PRIOR.log_density(log(scatter)))
                 if density > best:
-                    best, chosen, size = density, covariance, bend
-        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), size)
-
-    def without_smooth(self, fit: "LevelFit") -> Floats:
-        """y less the smooth functions as fitted (recordings,)."""
-        return np.asarray(self.value - fit.bend**2 * self.smooth @ (self.smooth.T @ (fit.precision @ self.value)))
+                    best, chosen, best_spread = density, covariance, spread
+        return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
 
     def precision(self, scatter: float, bend: float) -> Floats:
         """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
@@ -83,11 +84,12 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """ln N(y; 0, C) but for its constant at the best standard deviations, C⁻¹, and the size of the smooth functions."""
+    """ln N(y; 0, C) + ln p(s) but for the normal density's constant at the best standard deviations, C⁻¹, and the
+    sensors' spread t."""
 
     evidence: float
     precision: Floats
-    bend: float
+    spread: float
 
     def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
         """That of a column in y by generalised least squares, and its standard deviation."""

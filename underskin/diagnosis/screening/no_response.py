@@ -21,6 +21,7 @@ _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
 _WEAK = 0.1  # of the level to be expected: what a sensor without response in most recordings shows in the others
 _EXPECTED = 16.0  # of the response that the others let expect: only then is a recording without one left out
+_PLAIN = 0.1  # of the largest response that is expected: a smaller one is near a crossing of zero, and may be none
 
 Mask = NDArray[np.bool_]
 
@@ -62,6 +63,7 @@ def dead(
             arguments = {"recordings": int(own.sum()), "sensor": name}
             findings.append(Finding(Reason.SILENT_SENSOR, first.id, "frf_re_pc_per_n", arguments))
             continue
+        missing &= ~own | (expected > _PLAIN * expected.max())
         findings += [
             Finding(Reason.SILENT_RECORDING, entries[number].id, "frf_re_pc_per_n")
             for number in np.flatnonzero(missing & own).tolist()

@@ -1,27 +1,40 @@
 """FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
-Of some: the courses φ_i of phase over frequency are ±1 times one course φ. The signs q_i that align them are those that
-maximise T(q) = |Σ q_i w_i φ_i|²/Σ w_i, in units of noise, and are believed where T(q) − T(1) exceeds what choosing k
-of n signs costs. Of all: the mean course is far from every causal one (`phase_course`), and conjugated it is not.
+Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
+best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
+phases must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain
+the conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from math import comb, log
 
 import numpy as np
+from scipy.special import log_ndtr
+from scipy.stats import norm
 
-from underskin.diagnosis.screening.phase_course import PhaseCourses, misfit, phase_courses
+from underskin.diagnosis.screening.phase_course import PhaseCourses, phase_courses
+from underskin.diagnosis.screening.phase_laws import Course, misfit, unlisted_misfit
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.units import Complexes, Floats
+from underskin.units import Floats
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
-_LEAST_PHASE = 5e-3  # rad, root mean square: a channel's own phase may be as large, and no convention shows
-_GAIN, _COST = 20.0, 5.5  # of T, and per ln of the number of choices
-_PLAIN, _BETTER = 25.0, 0.5  # χ² by which the conjugated course is nearer to a causal one, and its share of the other
+_RELAXATIONS, _COEFFICIENT = 4, 0.1  # of a smooth course, and the prior standard deviation of its terms [rad]
+_PLAIN_SIGNS = 5.0  # of ln likelihood: about one campaign in a hundred has conjugated recordings
+_OVER_CHANNELS = 3.0  # of ln likelihood: that of channels is ten times as frequent
+_CHANNEL = tuple(np.array([0.0, 0.5, 1, 2, 4, 8, 16]) * 1e-3)  # rad, a channel's own phase
+_USUAL_CHANNEL = 3e-3
+_VARIED = (0.0, 0.2, 0.5, 1.0)  # of the mean course: what contacts differ by
+_STRAY, _STRAY_SIZE = 0.05, 3.0  # share of recordings of any phase, and how large, of the mean course
+_PLAIN = 14.0  # χ² by which the listed mechanisms explain the one orientation better
+_RARER = 10.0  # χ² by which an unlisted part must explain it better, since it is rarer
+_STILL = 1.5e-3  # rad
+_QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, which go as (force · radius)^(1/6)
 
 
 def in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
@@ -30,7 +43,7 @@ def in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecordin
     if not courses.telling.any():
         return list(entries), []
     signs = _aligned(courses)
-    orientation = _orientation(courses, signs)
+    orientation = _orientation(entries, courses, signs)
     if orientation == 0:  # both may be: most recordings decide
         orientation = 1 if (signs < 0).sum() <= (signs > 0).sum() else -1
     turned = orientation * signs < 0
@@ -53,43 +66,110 @@ def _aligned(courses: PhaseCourses) -> Floats:
     if telling.sum() < _LEAST:
         return same
     phase, weight = _phases(courses)
+    smooth = _SmoothCourse(courses.frequency, weight)
     signs = _leading_signs(phase, weight) * same
     for _ in range(10):
-        better = np.where(_along(phase, weight, _mean(phase, weight, signs)) < 0, -1.0, 1.0) * same
+        better = np.where(_along(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
         if (better == signs).all():
             break
         signs = better
     fewer = int(min((signs < 0).sum(), (signs > 0).sum()))
-    gain = _explained(phase, weight, signs) - _explained(phase, weight, same)
-    if fewer == 0 or gain < _GAIN + _COST * log(comb(int(telling.sum()), fewer)):
+    choices = log(comb(int(telling.sum()), fewer)) + log(telling.sum())
+    gain = smooth.evidence(phase, signs) - max(smooth.evidence(phase, same), 0.0)
+    if fewer == 0 or gain < choices + _PLAIN_SIGNS:
         return same
-    if _explained(phase, weight, signs) < _LEAST_PHASE**2 * (weight * np.abs(signs)[:, None]).sum():
-        return same
-    return signs
+    return signs if _of_two_signs(phase, weight, signs) > _OVER_CHANNELS else same
 
 
-def _orientation(courses: PhaseCourses, signs: Floats) -> int:
-    """1 where the aligned course is causal and its conjugate is not, −1 where the conjugate is, 0 where both may be."""
-    value, deviation = _mean_course(courses, signs)
-    given = misfit(courses.frequency, value, deviation)
-    turned = misfit(courses.frequency, value.conj(), deviation)
-    if given - turned > _PLAIN and turned < _BETTER * given:
-        return -1
-    return 1 if turned - given > _PLAIN and given < _BETTER * turned else 0
+class _SmoothCourse:
+    """One phase over frequency, times the sign of each recording: a sum of what delay, loss, relaxation and high pass
+    do, of normal coefficients."""
+
+    def __init__(self, frequency: Floats, weight: Floats) -> None:
+        ratio = frequency[:, None] / np.geomspace(frequency[0], frequency[-1], _RELAXATIONS)
+        shapes = [frequency[:, None] / frequency[-1], np.ones((len(frequency), 1)), frequency[0] / frequency[:, None]]
+        self.shapes = _COEFFICIENT * np.concatenate([*shapes, ratio / (1 + ratio**2)], axis=1)
+        self.weight = weight
+        self.information = self.shapes.T @ (weight.sum(axis=0)[:, None] * self.shapes) + np.eye(self.shapes.shape[1])
+
+    def of(self, phase: Floats, signs: Floats) -> Floats:
+        """The course (bands,) of phases (recordings, bands) and signs (recordings,)."""
+        return np.asarray(self.shapes @ np.linalg.solve(self.information, self._pull(phase, signs)))
+
+    def evidence(self, phase: Floats, signs: Floats) -> float:
+        """Its logarithm, over that of no phase."""
+        pull = self._pull(phase, signs)
+        explained = float(pull @ np.linalg.solve(self.information, pull))
+        return 0.5 * (explained - float(np.linalg.slogdet(self.information)[1]))
+
+    def _pull(self, phase: Floats, signs: Floats) -> Floats:
+        return np.asarray(self.shapes.T @ (signs @ (self.weight * phase)))
 
 
-def _mean_course(courses: PhaseCourses, signs: Floats) -> tuple[Complexes, Floats]:
-    """The mean of the aligned courses, and its deviation: the recordings' own noise, or their scatter if larger."""
+def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
+    """ln likelihood of courses ±1 times the mean one, over that of one course and a channel's own phase in each
+    recording, a few of them stray."""
+    course = _mean(phase, weight, signs)
+    information = (weight * course**2).sum(axis=1)
+    told = (signs != 0) & (information > 0)
+    amplitude, variance = _along(phase, weight, course)[told] / information[told], 1 / information[told]
+    size = np.sqrt((weight * course**2).sum() / weight.sum())
+    share = min((signs[told] < 0).mean(), (signs[told] > 0).mean())
+    usual = 1.0 if (signs < 0).sum() < (signs > 0).sum() else -1.0
+    stray = np.log(_STRAY) + norm.logpdf(amplitude, 0.0, _STRAY_SIZE)
+    apart, alike = [], []
+    for own, varied in product(_CHANNEL, _VARIED):
+        spread = np.sqrt(variance + (own / size) ** 2)
+        one, other = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
+        mean = float(np.average(amplitude, weights=spread**-2))
+        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else one
+        either = np.logaddexp(np.log1p(-share) + one, np.log(share) + other)
+        prior = -0.5 * (own / _USUAL_CHANNEL) ** 2
+        apart.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
+        alike.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
+    return max(apart) - max(alike)
+
+
+def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
+    """Of amplitudes near 1 that contacts vary by `varied`, or if that is 1 by an exponential law, and of noise
+    `spread`."""
+    if varied < 1:
+        return np.asarray(norm.logpdf(amplitude, 1.0, np.hypot(spread, varied)))
+    size = float(np.abs(amplitude).mean())
+    ratio = spread / size
+    return np.asarray(ratio**2 / 2 - amplitude / size - np.log(size) + log_ndtr(amplitude / spread - ratio))
+
+
+def _orientation(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> int:
+    """1 where the listed mechanisms explain the aligned course and not its conjugate, −1 where they explain that and
+    no unlisted part explains the course itself, 0 where both may be."""
+    course = _mean_course(entries, courses, signs)
+    phase = course.value.imag / np.hypot(course.deviation.imag, _STILL)
+    if phase @ phase < len(phase) + _PLAIN:
+        return 0
+    given, turned = misfit(course), misfit(course.conjugated)
+    if turned - given > _PLAIN:
+        return 1
+    return -1 if given - turned > _PLAIN and turned - unlisted_misfit(course) < _RARER else 0
+
+
+def _mean_course(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> Course:
+    """The mean of the aligned courses; its deviation is the recordings' own noise, or their scatter if larger."""
     aligned = np.where(signs[:, None] < 0, courses.value.conj(), courses.value)
-    known = np.isfinite(aligned) & np.isfinite(courses.deviation)
+    known = np.isfinite(aligned) & np.isfinite(courses.deviation) & courses.followed
     weight = np.where(known, courses.deviation, np.inf) ** -2.0
     aligned = np.where(known, aligned, 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = (weight * aligned).sum(axis=0) / total
         own = total**-0.5
-        scatter = np.sqrt((weight * (aligned - mean).imag ** 2).sum(axis=0) / total / known.sum(axis=0))
-    return mean, np.maximum(own, scatter)
+        mean = (weight * aligned).sum(axis=0) / total
+        parts = [np.sqrt((weight * part**2).sum(axis=0) / total / known.sum(axis=0)) for part in (
+            (aligned - mean).real, (aligned - mean).imag)]  # fmt: skip
+    real, imaginary = (np.maximum(own, part) for part in parts)
+    used = total > 0
+    natural = np.array([(entry.preload_n * entry.indenter_radius_mm) ** (1 / 6) for entry in entries])
+    spread = np.quantile(natural / np.median(natural), _QUANTILES)
+    return Course(courses.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
 
 
 def _phases(courses: PhaseCourses) -> tuple[Floats, Floats]:
@@ -111,12 +191,6 @@ def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
 
 def _along(phase: Floats, weight: Floats, course: Floats) -> Floats:
     return np.asarray((weight * phase * course).sum(axis=1))
-
-
-def _explained(phase: Floats, weight: Floats, signs: Floats) -> float:
-    """T(q)."""
-    total = (weight * np.abs(signs)[:, None]).sum(axis=0)
-    return float((total * _mean(phase, weight, signs) ** 2).sum())
 
 
 def _conjugated(entry: FrfRecording) -> FrfRecording:

@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import Frf, lines_of
@@ -20,10 +19,10 @@ _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
 _MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
 _STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
+_UNSURE = 6.0  # of a line's noise
 _WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
 _SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
 _ENOUGH = 12  # second differences in a band, or in it and the two beside it on either side
-_MODEL = 2e-3  # what elements on a grid leave of a real course, of the logarithm
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class PhaseCourses:
     frequency: Floats  # (bands,)
     value: Complexes
     deviation: Floats
-    followed: Mask  # below a zero of the response, where the way round of the phase is lost
+    followed: Mask  # below where the way round of the phase is lost: at a zero of the response or a sharp resonance
 
     @property
     def telling(self) -> Mask:
@@ -62,8 +61,8 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
         if not 0 < noise < _WIDEST:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
-        rough += [(part, own_second / noise) for own_second in second for part in (band[:-2], band[1:-1], band[2:])]
-        followed[number] = np.arange(_BANDS) < _lost(logarithm, band)
+        rough += [(part, second / noise) for part in (band[:-2], band[1:-1], band[2:])]
+        followed[number] = np.arange(_BANDS) < _lost(logarithm, band, noise)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
             real, imaginary = (
@@ -85,36 +84,28 @@ def _usable(measured: Frf) -> tuple[Floats, Complexes]:
     return measured.frequency[kept][order], measured.values[kept][order]
 
 
-def _lost(logarithm: Complexes, band: Indices) -> int:
-    """The band from which on the way round of the phase is not known: where it steps beside a zero of the response."""
+def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
+    """The band from which on the way round of the phase is not known: where it steps beside a zero of the response, or
+    by half a turn but for the noise of a line."""
     near_zero = np.minimum(logarithm.real[1:], logarithm.real[:-1]) < np.median(logarithm.real) + np.log(_FAINT)
-    steps = np.flatnonzero(near_zero & (np.abs(np.diff(logarithm.imag)) > _STEP))
+    step = np.abs(np.diff(logarithm.imag))
+    steps = np.flatnonzero((near_zero & (step > _STEP)) | (step > np.pi - _UNSURE * noise))
     return int(band[steps[0]]) if len(steps) else _BANDS
 
 
 def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
-    """How noisy each band is beside the whole (bands,), from second differences `rough` of all recordings."""
+    """How noisy each band is beside the whole (bands,), from second differences `rough` of both parts (2, lines) of all
+    recordings: those of the smoother part, since a resonance bends the other."""
     profile = np.ones(_BANDS)
     if not rough:
         return profile
-    band, second = (np.concatenate(part) for part in zip(*rough, strict=True))
+    band = np.concatenate([own for own, _ in rough])
+    second = np.concatenate([own for _, own in rough], axis=1)
     for number in range(_BANDS):
-        own = second[np.abs(band - number) <= (0 if (band == number).sum() >= _ENOUGH else 2)]
-        profile[number] = np.median(own) if len(own) >= _ENOUGH else 1.0
+        chosen = np.abs(band - number) <= (0 if (band == number).sum() >= _ENOUGH else 2)
+        if chosen.sum() >= _ENOUGH:
+            profile[number] = np.median(second[:, chosen], axis=1).min()
     return np.asarray(np.clip(profile, 0.3, 10.0))
-
-
-def misfit(frequency: Floats, value: Complexes, deviation: Floats) -> float:
-    """χ² of the nearest causal course about one course (bands,), over both parts."""
-    known = np.isfinite(value) & np.isfinite(deviation)
-    frequency, value = frequency[known], value[known]
-    weight = 1.0 / np.hypot(deviation[known], _MODEL)
-    elements = _elements(frequency)
-    columns = np.concatenate([elements.real, elements.imag]) * np.tile(weight, 2)[:, None]
-    target = np.concatenate([value.real, value.imag]) * np.tile(weight, 2)
-    size = np.linalg.norm(columns, axis=0)
-    _, left = nnls(columns / np.where(size > 0, size, 1.0), target, maxiter=50 * columns.shape[1])
-    return float(left**2)
 
 
 def _logarithm(lines: Complexes) -> Complexes:
@@ -122,25 +113,3 @@ def _logarithm(lines: Complexes) -> Complexes:
     phase = np.unwrap(np.angle(lines))
     start = np.pi * np.round(np.median(phase[: max(3, len(phase) // 8)]) / np.pi)
     return np.asarray(np.log(np.abs(lines)) + 1j * (phase - start))
-
-
-def _elements(frequency: Floats) -> Complexes:
-    """The logarithms of causal elements (bands, elements), and a constant real gain of either sign."""
-    i_f = 1j * frequency[:, None]
-    low, high = frequency[0], frequency[-1]
-    corners = np.geomspace(low / 100, high, 16)
-    relaxations = np.geomspace(low / 3, 3 * high, 12)
-    resonances, damping = (grid.ravel() for grid in np.meshgrid(np.geomspace(low * 3, 30 * high, 24), (0.02, 0.1, 0.4)))
-    ratio = frequency[:, None] / resonances
-    return np.concatenate(
-        [
-            np.log(i_f / corners / (1 + i_f / corners)),
-            1 / (1 + i_f / relaxations),
-            -np.log(i_f),
-            -i_f / high,
-            -np.log(1 - ratio**2 + 2j * damping * ratio),
-            np.ones((len(frequency), 1)),
-            -np.ones((len(frequency), 1)),
-        ],
-        axis=1,
-    )

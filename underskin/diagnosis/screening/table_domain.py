@@ -39,6 +39,7 @@ def within_tables(
     beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(whole, table)
     if not inside.any() and beyond.mean() <= _ENOUGH:
         beyond[:] = False
+    if_stiffer = beyond.copy()
     if kept is not None:
         beyond &= [entry.id in kept for entry in entries]
     skin = campaign.skin
@@ -53,8 +54,11 @@ def within_tables(
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
         return inside, beyond, [none_inside, *_possible_unit_errors(whole, table)]
+    stiffer = {"declared_mpa": skin.youngs_modulus_mpa, "factor": LARGEST_FACTOR}
     left_out = [
-        Finding(
+        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, entries[number].id, "preload_n", stiffer)
+        if if_stiffer[number]
+        else Finding(
             Reason.OUT_OF_TABLES_DECLARED,
             entries[number].id,
             "preload_n",

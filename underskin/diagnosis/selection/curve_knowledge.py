@@ -15,6 +15,7 @@ from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.selection.priors import least_evidence, log_prior
+from underskin.diagnosis.selection.unknown_thickness import LayerOfUnknownThickness
 from underskin.mechanisms.base import Kind, Unsupported
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import Known
@@ -24,7 +25,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
 
 _BATCH = 0.02  # by how much the modulus of one elastomer differs from piece to piece (sd of its logarithm)
-_EXTRAPOLATED = 0.7  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_EXTRAPOLATED = 0.15  # of what a law takes off a modulus at no strain: laws of one fit differ by that
+_RATIO = 0.9  # correlation of quantities that are known as a ratio alone
 _HIDES = 0.5  # prior of what does not show: platens are oiled as often as they are not
 MODULUS_ERROR, MODULUS = "modulus_error", ("", "youngs_modulus")
 
@@ -57,6 +59,13 @@ class OfCurves:
     def modulus_deviation(self) -> float:
         """Standard deviation of the logarithm of the skin's modulus."""
         return float(np.hypot(np.sqrt(self.covariance[0, 0]), self.tolerance))
+
+    def is_ratio(self, row: int) -> bool:
+        """Whether a quantity is known as a ratio to another one of its mechanism alone."""
+        mechanism = self.quantities[row][0]
+        deviation = np.sqrt(np.diag(self.covariance))
+        alike = np.abs(self.covariance[row]) > _RATIO * deviation[row] * deviation
+        return any(alike[other] and one[0] == mechanism for other, one in enumerate(self.quantities) if other != row)
 
     @property
     def log_weight(self) -> float:
@@ -150,10 +159,12 @@ def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]
 
 
 def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
-    """The curves of one kind of a campaign, its modulus free; mechanisms `without` which all is to be explained."""
+    """The curves of one kind of a campaign, its modulus free and, of a layer, its thickness; mechanisms `without` which
+    all is to be explained."""
     mechanisms = Known({MODULUS_ERROR, *without})
     free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
     mechanisms.bind(free, table, kind)
+    mechanisms.replace(LayerOfUnknownThickness())
     return FittingProblem(replace(curve_lines(free, kind), mechanisms=mechanisms), table)
 
 

@@ -2,11 +2,11 @@
 
 A fit that begins at one mechanism's best parameters may end where another one's cannot be told: two that bend a curve
 alike share the bend between them in many ways. So where the best set leaves more than noise, pairs are fitted again
-from starts over the parameters of both, and sets also from those with one mechanism more.
+from starts over the parameters of both.
 """
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,13 +14,10 @@ import numpy as np
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.objective import LEVEL, SMOOTH
 from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.selection.smaller_sets import Explanations, was_stuck
 
-_LEADING = 8.0  # nats behind the best within which sets are fitted again with one mechanism less
-_STUCK = 1.0  # nats that a fit begun elsewhere must gain
 _LEFT = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
 _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
-
-Explanations = dict[frozenset[str], Explanation]  # by the names of their mechanisms
 
 
 def all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
@@ -46,8 +43,7 @@ def afresh(problem: FittingProblem, explanations: Explanations, pairs: Sequence[
     ]
     better: Explanations = {}
     for request, found in zip(requests, problem.explain(requests, best.best.cost), strict=True):
-        before = explanations.get(frozenset(request.names))
-        if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
+        if found is not None and was_stuck(explanations.get(frozenset(request.names)), found):
             better[frozenset(request.names)] = found
     return better
 
@@ -62,23 +58,3 @@ def left_smooth(explanation: Explanation) -> float:
     covariance[:, SMOOTH] = explanation.best.hypothesis.covariance[SMOOTH].low
     without = fitter.evaluate(replace(points, covariance=covariance), slopes=False)
     return float(without.cost.min() - at.cost[0])
-
-
-def from_larger(
-    problem: FittingProblem, explanations: Explanations, weight: Callable[[Explanation], float]
-) -> Explanations:
-    """The sets with one mechanism less than the best ones, or than those among them that fit better for it,
-    fitted from there: what was stuck elsewhere would ask for a companion."""
-    better: Explanations = {}
-    least = max(map(weight, explanations.values())) - _LEADING
-    waiting = [entry for entry in explanations.values() if weight(entry) > least]
-    while waiting:
-        larger = waiting.pop()
-        smaller = [tuple(one for one in larger.names if one != name) for name in larger.names if len(larger.names) > 1]
-        fitted = problem.explain([Request(names, larger=larger) for names in smaller])
-        for names, found in zip(smaller, fitted, strict=True):
-            before = (explanations | better).get(frozenset(names))
-            if found is not None and (before is None or found.best.cost < before.best.cost - _STUCK):
-                better[frozenset(names)] = found
-                waiting.append(found)
-    return better

@@ -73,8 +73,8 @@ class Others:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
             return Joined(*fitted(None, ()))
-        beside = Beside(self._kinds)
         alone, apart = fitted(None, ())
+        beside = Beside(self._kinds, apart.explanations)
         best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
         problem, together = fitted(beside, beside.asked_for(alone.lines, best))
         log_apart = _log_apart(apart, beside) + np.log(_APART)

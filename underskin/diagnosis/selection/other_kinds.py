@@ -5,15 +5,17 @@ what the curves leave of the parameters that both have. Laplace's approximation 
 (curve_knowledge.py), divided by the prior, is the likelihood (knowledge.py) that the FRFs are fitted under.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.inference.knowledge import Knowledge
-from underskin.diagnosis.selection.curve_knowledge import MODULUS, MODULUS_ERROR, OfCurves, OtherKind
+from underskin.diagnosis.selection.curve_knowledge import MODULUS, MODULUS_ERROR, OfCurves, OtherKind, Quantity
 from underskin.diagnosis.selection.priors import LARGEST, log_prior
+from underskin.diagnosis.selection.unknown_thickness import THICKNESS, THICKNESS_ERROR, UNKNOWN_THICKNESS
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.parameter import Parameter
@@ -31,9 +33,10 @@ Moments = tuple[float, float, bool, float]
 class Beside:
     """What the curves of all other kinds tell of models of one kind."""
 
-    def __init__(self, kinds: Sequence[OtherKind]) -> None:
-        """Of at least one kind."""
+    def __init__(self, kinds: Sequence[OtherKind], alone: Sequence[Explanation]) -> None:
+        """Of at least one kind; `alone` are the sets that were fitted to the recordings without these."""
         self.kinds = tuple(kinds)
+        self._alone = sorted(alone, key=lambda entry: -entry.log_evidence)
         self._of_both: dict[Kind, tuple[str, ...]] = {}
 
     def __call__(self, model: Model, lines: Lines) -> Knowledge:
@@ -52,12 +55,12 @@ class Beside:
         return kind.told(names, self._of_both[kind.kind])
 
     def asked_for(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
-        """Sets by which recordings of both kinds may be explained: what the curves find the most probable, by itself or
-        with an error of the modulus, and with the sets that explain the other recordings `alone`."""
+        """Sets by which recordings of both kinds may be explained: what the curves find the most probable and nothing,
+        each by itself or with an error of the modulus, and with the sets that explain the other recordings `alone`."""
         self._bind(lines)
         nothing: frozenset[str] = frozenset()
         errors = frozenset(name for name in (MODULUS_ERROR,) if _acts_on(name, lines))
-        found = dict.fromkeys(names for kind in self.kinds for names in self._most_probable(kind))
+        found = dict.fromkeys([*(names for kind in self.kinds for names in self._most_probable(kind)), nothing])
         each = [names | own | further for names in found for own in (nothing, *alone) for further in (nothing, errors)]
         return [names for names in dict.fromkeys(each) if len(names) <= LARGEST]
 
@@ -96,8 +99,19 @@ class Beside:
 
     def _of_kind(self, kind: OtherKind, model: Model, lines: Lines) -> Knowledge:
         told = self.told(kind, model.names)
-        matrix, offset, priors = _in_model(told, model, lines)
+        matrix, offset, priors = _in_model(told, model, lines, self._begun(model.names, lines))
         return _likelihood(told, matrix, offset, priors)
+
+    def _begun(self, names: Sequence[str], lines: Lines) -> dict[Quantity, float]:
+        """Fit coordinates of mechanisms' parameters where the recordings alone have them: under this set, or else under
+        the best one that holds the mechanism."""
+        begun: dict[Quantity, float] = {}
+        for entry in sorted(self._alone, key=lambda entry: frozenset(entry.names) != frozenset(names)):
+            for mechanism, places in own_places(entry.names, lines).items():
+                for place in range(places.start, places.stop):
+                    key = (mechanism, entry.model.parameters[place].name)
+                    begun.setdefault(key, float(entry.point.fit[place]))
+        return begun
 
 
 def _acts_on(name: str, lines: Lines) -> bool:
@@ -106,9 +120,11 @@ def _acts_on(name: str, lines: Lines) -> bool:
     return known and mechanism is not None and mechanism.unsupported(lines.campaign, lines.kind) is None
 
 
-def _in_model(told: OfCurves, model: Model, lines: Lines) -> tuple[Floats, Floats, list[Moments]]:
+def _in_model(
+    told: OfCurves, model: Model, lines: Lines, begun: Mapping[Quantity, float]
+) -> tuple[Floats, Floats, list[Moments]]:
     """The quantities as matrix · x + offset of the model's fit coordinates, and what is known of each without any
-    recording; a row of zeros where the model has no such quantity."""
+    recording; a row of zeros where the model has no such quantity. `begun`: about where the fit will be."""
     quantities = told.quantities
     places = own_places(model.names, lines)
     names = [entry.name for entry in model.parameters]
@@ -123,14 +139,33 @@ def _in_model(told: OfCurves, model: Model, lines: Lines) -> tuple[Floats, Float
             offset[row] = np.log(to_si("youngs_modulus_mpa", 1.0 if declared is None else declared))
             priors.append((float(told.mean[row]), _MODULUS_SD**2, False, 0.0))
             continue
+        if (mechanism, key) == THICKNESS:
+            matrix[row, names.index("thickness")] = 1.0
+            if THICKNESS_ERROR in places:
+                matrix[row, places[THICKNESS_ERROR].start] = 1.0
+            priors.append(_moments(UNKNOWN_THICKNESS, float(told.mean[row])))
+            continue
         own = places.get(mechanism, slice(0, 0))
         found = [index for index in range(own.start, own.stop) if names[index] == key]
         if found:
-            matrix[row, found[0]] = 1.0
-            priors.append(_moments(model.parameters[found[0]], float(told.mean[row])))
+            entry = model.parameters[found[0]]
+            matrix[row, found[0]], offset[row] = _tangent(told, row, entry, begun.get((mechanism, key), 0.0))
+            priors.append(_moments(entry, float(told.mean[row])))
         else:
             priors.append((0.0, 0.0, False, 0.0))
     return matrix, offset, priors
+
+
+def _tangent(told: OfCurves, row: int, entry: Parameter, begun: float) -> tuple[float, float]:
+    """Slope and offset of a quantity over its fit coordinate.
+
+    A fraction that is known as a ratio to a time alone, as of curves that are short beside it, is known along a line
+    that is straight in its logarithm: m ln(x/m) + m in place of x, about `begun`.
+    """
+    mean = float(told.mean[row])
+    if entry.scale == "log" or not told.is_ratio(row) or min(mean, begun) <= 0:
+        return 1.0, 0.0
+    return mean / begun, mean * float(np.log(begun / mean))
 
 
 def _moments(entry: Parameter, mean: float) -> Moments:

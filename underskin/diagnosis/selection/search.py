@@ -1,11 +1,12 @@
 """Which sets of mechanisms are fitted; how probable each is, answers.py works out.
 
 Priors over sets are fixed (priors.py). Singles are all fitted; pairs and triples grow greedily from the best, but of
-curves all pairs are.
+curves all pairs are. The best are then fitted again without each of their mechanisms (smaller_sets.py); from what fits
+better for it, sets grow once more.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,14 +14,15 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.selection import curve_sets
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.curve_sets import Explanations
 from underskin.diagnosis.selection.priors import LARGEST
+from underskin.diagnosis.selection.smaller_sets import Explanations, from_larger
 from underskin.diagnosis.selection.unnamed_rivals import discrepancy
-from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.base import Stage, Unsupported
 
 _PARENTS, _LARGEST = 3, 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
+_OF_CONTACTS = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT)  # that change contacts' stiffness
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -31,96 +33,139 @@ def search(
 
     What is `known` of them is taken over.
     """
-    explanations: Explanations = {frozenset(entry.names): entry for entry in known}
-    tried = {frozenset[str]()}
-    unsupported: dict[str, str] = {}
+    explained = {frozenset(entry.names): entry for entry in known}
+    sets = _Sets(problem, explained, _unsupported(problem), asked_for)
     catalogue = problem.lines.mechanisms.named
-    for name in catalogue:
+    nothing, singles = Request(()), [Request((name,)) for name in sets.names]
+    if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
+        sets.explain([nothing])
+        singles = [replace(request, begin=sets.explanations[frozenset()].point) for request in singles]
+    sets.explain([nothing, *singles])
+    beside = [Request(tuple(name for name in catalogue if name in one), kept=True) for one in asked_for if len(one) > 1]
+    sets.explain(beside)
+    largest = LARGEST if asked_for else _LARGEST
+    sets.grow(largest)
+    if sets.refit_smaller() and not problem.lines.curves:  # of which all pairs were fitted
+        sets.grow(largest)
+    sets.integrate(_BEST)
+    result = sets.search
+    best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
+    processes = tuple((entry, discrepancy(problem, entry)) for entry in (sets.explanations[frozenset()], *best))
+    return replace(result, discrepancies=processes)
+
+
+def _unsupported(problem: FittingProblem) -> dict[str, str]:
+    """The mechanisms that the recordings do not support, and what these lack."""
+    unsupported: dict[str, str] = {}
+    for name in problem.lines.mechanisms.named:
         try:
             problem.hypothesis((name,), placed=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
-    names = [name for name in catalogue if name not in unsupported]
-    singles = [Request(()), *(Request((name,)) for name in names)]
-    tried |= {frozenset(request.names) for request in singles}
-    if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
-        _explain(problem, explanations, singles[:1])
-        singles = [Request(request.names, begin=explanations[frozenset()].point) for request in singles[1:]]
-    _explain(problem, explanations, singles)
-    beside = [Request(tuple(name for name in catalogue if name in one), kept=True) for one in asked_for if len(one) > 1]
-    tried |= {frozenset(request.names) for request in beside}
-    _explain(problem, explanations, beside)
-    integrated: Explanations = {}
-    for size in range(2, (LARGEST if asked_for else _LARGEST) + 1):
-        integrated |= _integrated(explanations, frozenset(integrated), unsupported, 1)
-        explanations |= integrated
-        if problem.lines.curves and size == 2:
-            requests = curve_sets.all_pairs(names, explanations)
-        else:
-            requests = [
-                Request(tuple(entry for entry in catalogue if entry in {*parent.names, name}), parent)
-                for parent in _parents(Search(tuple(explanations.values()), (), unsupported), size)
-                for name in names
-                if name not in parent.names
-            ]
-        tried |= {frozenset(request.names) for request in requests}
-        _explain(problem, explanations, requests)
-        if problem.lines.curves and size == 2:
-            explanations |= curve_sets.afresh(problem, explanations, requests)
-    if problem.lines.curves:
-        weight = Search(tuple(explanations.values()), (), unsupported).log_weight
-        refitted = curve_sets.from_larger(problem, explanations, weight)
-        explanations |= refitted
-        integrated = {names: entry for names, entry in integrated.items() if names not in refitted}
-    explanations |= _integrated(explanations, frozenset(integrated), unsupported, _BEST)
-    result = Search(tuple(explanations.values()), (), unsupported, tried=len(tried))
-    best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
-    processes = tuple((entry, discrepancy(problem, entry)) for entry in (explanations[frozenset()], *best))
-    return replace(result, discrepancies=processes)
+    return unsupported
 
 
-def _explain(problem: FittingProblem, explanations: Explanations, requests: Sequence[Request]) -> None:
-    """Add the explanations of sets that have none yet, from the first parent in whose company the last one shows."""
-    while requests:
-        now, later = {}, []
-        for request in requests:
-            key = frozenset(request.names)
-            if key in explanations:
-                continue
-            if key in now:
-                later.append(request)
+@dataclass
+class _Sets:
+    """The sets that were fitted so far, those that were `tried`, and those whose evidence is `integrated` over their
+    loose parameters; other kinds of recordings `asked_for` some."""
+
+    problem: FittingProblem
+    explanations: Explanations
+    unsupported: dict[str, str]
+    asked_for: Sequence[frozenset[str]] = ()
+    tried: set[frozenset[str]] = field(default_factory=set)
+    integrated: set[frozenset[str]] = field(default_factory=set)
+
+    @property
+    def names(self) -> list[str]:
+        """The mechanisms that the recordings support."""
+        return [name for name in self.problem.lines.mechanisms.named if name not in self.unsupported]
+
+    @property
+    def search(self) -> Search:
+        """All of them as rivals."""
+        return Search(tuple(self.explanations.values()), (), self.unsupported, tried=len(self.tried))
+
+    def explain(self, requests: Sequence[Request]) -> None:
+        """Add the explanations of sets that have none yet, from the first parent in whose company the last one
+        shows."""
+        self.tried |= {frozenset(request.names) for request in requests}
+        while requests:
+            now: dict[frozenset[str], Request] = {}
+            later = []
+            for request in requests:
+                key = frozenset(request.names)
+                if key in self.explanations:
+                    continue
+                if key in now:
+                    later.append(request)
+                else:
+                    now[key] = request
+            best = min((entry.best.cost for entry in self.explanations.values()), default=np.inf)
+            for key, explanation in zip(now, self.problem.explain(list(now.values()), best), strict=True):
+                if explanation is not None:
+                    self.explanations[key] = explanation
+            requests = later
+
+    def integrate(self, best: int) -> None:
+        """Integrate the evidence that may count, and that of the `best` anyhow."""
+        weight = self.search.log_weight
+        ranked = sorted(self.explanations, key=lambda names: weight(self.explanations[names]), reverse=True)
+        least = weight(self.explanations[ranked[0]]) - _WITHIN
+        chosen = [
+            names
+            for place, names in enumerate(ranked)
+            if names not in self.integrated and (place < best or weight(self.explanations[names]) > least)
+        ]
+        whole = integrate([self.explanations[names] for names in chosen])
+        self.explanations |= dict(zip(chosen, whole, strict=True))
+        self.integrated |= set(chosen)
+
+    def grow(self, largest: int) -> None:
+        """Add sets of two mechanisms and more that grow from the best, one mechanism at a time."""
+        curves = self.problem.lines.curves
+        for size in range(2, largest + 1):
+            self.integrate(1)
+            if curves and size == 2:
+                requests = curve_sets.all_pairs(self.names, self.explanations)
+                self.explain(requests)
+                self.explanations |= curve_sets.afresh(self.problem, self.explanations, requests)
             else:
-                now[key] = request
-        best = min((entry.best.cost for entry in explanations.values()), default=np.inf)
-        for key, explanation in zip(now, problem.explain(list(now.values()), best), strict=True):
-            if explanation is not None:
-                explanations[key] = explanation
-        requests = later
+                self.explain(self._larger(size))
+
+    def _larger(self, size: int) -> list[Request]:
+        """The best sets with one mechanism less, each with one more; of two that move one and the same resonance, where
+        that leads nowhere, from starts over both: the mass that was found on other contacts is not theirs."""
+        known, catalogue = self.problem.lines.mechanisms, self.problem.lines.mechanisms.named
+        requests, over_both = [], []
+        for parent in _parents(self.search, size, self.asked_for):
+            rings = any(known[name].needs_stiffness for name in parent.names)
+            for name in self.names:
+                if name in parent.names:
+                    continue
+                names = tuple(entry for entry in catalogue if entry in {*parent.names, name})
+                requests.append(Request(names, parent, self.explanations.get(frozenset([name]))))
+                if size == 2 and rings and known[name].stage in _OF_CONTACTS:
+                    over_both.append(Request(names))
+        return [*requests, *over_both]
+
+    def refit_smaller(self) -> bool:
+        """Fit the best sets again without each of their mechanisms; whether any fits better for it."""
+        refitted = from_larger(self.problem, self.explanations, self.search.log_weight)
+        self.explanations |= refitted
+        self.integrated -= set(refitted)
+        return bool(refitted)
 
 
-def _integrated(
-    explanations: Explanations, done: frozenset[frozenset[str]], unsupported: dict[str, str], best: int
-) -> Explanations:
-    """The explanations whose evidence may count, and the `best` anyhow, integrated over their loose parameters.
-
-    Those `done` are left out.
-    """
-    weight = Search(tuple(explanations.values()), (), unsupported).log_weight
-    ranked = sorted(explanations, key=lambda names: weight(explanations[names]), reverse=True)
-    least = weight(explanations[ranked[0]]) - _WITHIN
-    chosen = [
-        names
-        for place, names in enumerate(ranked)
-        if names not in done and (place < best or weight(explanations[names]) > least)
-    ]
-    return dict(zip(chosen, integrate([explanations[names] for names in chosen]), strict=True))
-
-
-def _parents(result: Search, size: int) -> list[Explanation]:
-    """The explanations, one mechanism smaller, from which sets of this size grow."""
+def _parents(result: Search, size: int, asked_for: Sequence[frozenset[str]]) -> list[Explanation]:
+    """The explanations, one mechanism smaller, from which sets of this size grow: the best of all, and of those that
+    were asked for, some of which are larger."""
     ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
     best = result.log_weight(ranked[0])
     if size > 2:
-        return ranked[:1] if len(ranked[0].names) == size - 1 else []
+        own = next(entry for entry in ranked if len(entry.names) < size)
+        asked = next((one for one in ranked if len(one.names) == size - 1 and frozenset(one.names) in asked_for), own)
+        return [one for one in ([own] if asked is own else [own, asked]) if len(one.names) == size - 1]
     smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
     return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]

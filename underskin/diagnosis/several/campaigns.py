@@ -11,7 +11,7 @@ from typing import Any
 
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.reporting.report import DiagnosisResult, reported
 from underskin.diagnosis.several.dates import Dated, date_of, in_order
 from underskin.diagnosis.several.posteriors import Shared, values
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
@@ -65,10 +65,10 @@ def diagnose_together(
         progress((number + 1) / (len(ordered) + 1))
     alone = [_standing_alone(result) for result in results]
     results = _with_changed_sensors(ordered, results, alone, table, without)
-    reports = [report(result) for result in results]
+    reports = [reported(result) for result in results]
     usable = [number for number, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = next(entry for number, entry in enumerate(reports) if number not in usable)
+        lacking = next(entry.document for number, entry in enumerate(reports) if number not in usable)
         return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
     dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
     return together_report(name, ordered, results, reports, usable, dated, alone, table)
@@ -83,7 +83,7 @@ def _with_changed_sensors(
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
     apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone)
+    single = changes(apart, alone, [0.0] * len(apart))
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)
@@ -100,7 +100,7 @@ def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> Se
     """The sensors under the answer of the campaign alone, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
     strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
-    return sensors_of(campaign, strengths, 0.0, table)
+    return sensors_of(campaign, strengths, table)
 
 
 def _of_one(explanation: Explanation, name: str) -> dict[str, float]:

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.reporting.numbers import rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report
+from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, reported
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.several import quoted
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.population import REGULAR, STATED, Populations
@@ -49,7 +50,8 @@ def fleet_report(
     what is said where their order is not one of time."""
     usable = {skin: results[skin] for skin in fleet.candidates}
     lacking = [skin for skin in results if skin not in usable]
-    reports = {skin: report(result) for skin, result in usable.items()}
+    reports = {skin: reported(result) for skin, result in usable.items()}
+    own_d33 = {skin: own.d33 for skin, own in reports.items()}
     populations = [*_populations(fleet), *(_of_strength(strength) for strength in fleet.strengths)]
     mechanisms = _mechanisms(fleet)
     departs = any(entry["departures"] for entry in populations)
@@ -62,6 +64,8 @@ def fleet_report(
     agreed, settled = _departures_stated(fleet)
     probability = 1 - described if unexplained else of_sets * agreed
     d33 = next(entry for entry in populations if entry["parameter"] == D33)
+    stated = {skin: {one["name"] for one in own.document["mechanisms"]} for skin, own in reports.items()}
+    of_d33 = quoted.of_skins(d33["mean"], d33["unit"], own_d33, _lacking(mechanisms, stated))
     return {
         "schema": SCHEMA,
         "campaign": name,
@@ -69,18 +73,24 @@ def fleet_report(
         "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
         "probability": round(probability, 3),
         "statement": _statement(
-            probability, mechanisms, unexplained, _asides(lacking, orders), populations, _expected(fleet)
+            probability,
+            mechanisms,
+            unexplained,
+            [*_asides(lacking, orders), of_d33],
+            populations,
+            _expected(fleet),
+            [*results, *campaigns],
         ),
         "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
         "mechanisms": mechanisms,
         "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
         "unnamed": None,
         "alternatives": [],
-        "not_identifiable": [],
+        "not_identifiable": quoted.not_identifiable(own_d33),
         "findings": [
             {**finding, "statement": f"{skin}: {finding['statement']}"}
             for skin, own in reports.items()
-            for finding in own["findings"]
+            for finding in own.document["findings"]
         ],
         "fit": None,
         "power": [],
@@ -90,7 +100,7 @@ def fleet_report(
         "provenance": {
             **next(iter(usable.values())).provenance,
             "each": [
-                {"skin": skin, "verdict": own["verdict"], "probability": own["probability"]}
+                {"skin": skin, **{key: own.document[key] for key in ("verdict", "probability")}}
                 for skin, own in reports.items()
             ],
         },
@@ -195,6 +205,14 @@ def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
     ]
 
 
+def _lacking(mechanisms: Sequence[Mapping[str, Any]], stated: Mapping[str, set[str]]) -> dict[str, list[str]]:
+    """Of each skin the mechanisms that it has by the fleet's report and not by its own."""
+    return {
+        skin: [one["name"] for one in mechanisms if skin in one["scope"]["skins"] and one["name"] not in own]
+        for skin, own in stated.items()
+    }
+
+
 def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
     """By the probability of what is stated of the least certain skin."""
     if unexplained:
@@ -218,6 +236,7 @@ def _statement(
     asides: Sequence[str],
     populations: Sequence[Mapping[str, Any]],
     expected: Mapping[tuple[str, str], float],
+    names: Sequence[str],
 ) -> str:
     each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
     missing = "; ".join(each) or in_words((NOTHING_MISSING,))
@@ -230,9 +249,13 @@ def _statement(
             middle = expected.get((entry["parameter"], one["skin"]))
             others = f"{entry['mean']:g} ± {entry['sd']:g}" if middle is None else f"{middle:.4g} for the same declared"
             departures.setdefault(one["skin"], []).append(
-                f"in {entry['parameter'].replace('_', ' ')}: {one['value']:g} {entry['unit']}, where the others have "
-                f"{others} ({in_percent(one['probability'])})"
+                f"in {quantity_in_words(entry['parameter'])}: {one['value']:g}{_unit(entry['unit'])}, where the others "
+                f"have {others} ({in_percent(one['probability'])})"
             )
     told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
     told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
-    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides)
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides, names=names)
+
+
+def _unit(label: str) -> str:
+    return "" if label == "-" else f" {label}"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.diagnosis.several.dates import Dated
 from underskin.errors import InvalidInput
@@ -17,7 +18,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab
 
 _STATED = 0.98  # probability of a change that is stated
-_PRIOR, _USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
+_PRIOR, USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
 _SUSPECTED = 0.5  # the same prior of a sensor that one of two campaigns says stands alone
 _WORTH, _MEDIAN_SQUARE = 4.0, 0.455  # sensors that the stated uncertainties are worth; of a χ² of one degree of freedom
 _FEWEST_COMMON = 3  # sensors, so that one can be told from the others
@@ -34,7 +35,6 @@ class SensorsOfCampaign:
     uncertainty: Floats
     low: Floats
     high: Floats
-    unsure: float  # relative, of all alike: what the mechanisms leave
 
     def in_report(self) -> list[dict[str, Any]]:
         """Rows of `d33.per_sensor`."""
@@ -60,14 +60,14 @@ class Change:
     value: float
     uncertainty: float  # of its logarithm
     probability: float
+    causes: tuple[str, ...] = ()  # of a change of all: mechanisms that would make it
 
 
 Values = Mapping[str, Mapping[str, float]]  # of mechanisms' parameters
 
 
-def sensors_of(campaign: Campaign, values: Values, unsure: float, table: SigmaTable) -> SensorsOfCampaign | None:
-    """With mechanisms at these values, which leave d33 `unsure` by so much for all sensors alike; None where no
-    recording can be inverted."""
+def sensors_of(campaign: Campaign, values: Values, table: SigmaTable) -> SensorsOfCampaign | None:
+    """With mechanisms at these values; None where no recording can be inverted."""
     model = AdoptedModel(campaign.skin, {name: found for name, found in values.items() if found}, 0.0)
     try:
         as_base, _ = model.as_base_model(campaign, table)
@@ -77,7 +77,7 @@ def sensors_of(campaign: Campaign, values: Values, unsure: float, table: SigmaTa
     seen = np.flatnonzero(np.isfinite(found.sensors.value))
     value, uncertainty, low, high = (to_lab("d33_pc_per_n", part[seen]) for part in vars(found.sensors).values())
     ids = tuple(found.sensor_ids[row] for row in seen)
-    return SensorsOfCampaign(campaign.name, ids, value, uncertainty, low, high, unsure)
+    return SensorsOfCampaign(campaign.name, ids, value, uncertainty, low, high)
 
 
 def corrected(campaign: Campaign, found: Sequence[Change], number: int) -> Campaign:
@@ -100,9 +100,12 @@ def _times(entry: FrfRecording, factor: float) -> FrfRecording:
     return FrfRecording.of_lines(entry, measured.frequency, factor * measured.values, measured.coherence)
 
 
-def changes(each: Sequence[SensorsOfCampaign | None], alone: Sequence[frozenset[str]]) -> list[Change]:
+def changes(
+    each: Sequence[SensorsOfCampaign | None], alone: Sequence[frozenset[str]], unsure: Sequence[float]
+) -> list[Change]:
     """What changed from one campaign to the next: all sensors together, and single ones beyond that; `alone` are those
-    of which each campaign by itself finds that their level stands beside that of the others."""
+    of which each campaign by itself finds that their level stands beside that of the others, and `unsure` by how much
+    ln d33 of all since the campaign before is by the mechanisms taken into account."""
     found: list[Change] = []
     for number in range(1, len(each)):
         before, after = each[number - 1], each[number]
@@ -110,7 +113,7 @@ def changes(each: Sequence[SensorsOfCampaign | None], alone: Sequence[frozenset[
             continue
         common = [sensor for sensor in before.ids if sensor in after.ids]
         if common:
-            found += _between(before, after, common, number, alone[number - 1] ^ alone[number])
+            found += _between(before, after, common, number, alone[number - 1] ^ alone[number], unsure[number])
     return found
 
 
@@ -120,6 +123,7 @@ def _between(
     common: Sequence[str],
     number: int,
     suspected: frozenset[str],
+    unsure: float,
 ) -> list[Change]:
     rows = np.array([(before.ids.index(sensor), after.ids.index(sensor)) for sensor in common])
     change = np.log(np.abs(after.d33[rows[:, 1]] / before.d33[rows[:, 0]]))
@@ -127,9 +131,9 @@ def _between(
         before.uncertainty[rows[:, 0]] / np.abs(before.d33[rows[:, 0]]),
         after.uncertainty[rows[:, 1]] / np.abs(after.d33[rows[:, 1]]),
     )
-    middle = float(np.median(change))
+    middle = _median(change, 1 / deviation)
     around = change - middle
-    of_middle = float(1.25 * np.sqrt(np.mean(deviation**2) / len(change)))
+    of_middle = float(1.25 / np.sqrt((deviation**-2).sum()))
     own = np.hypot(deviation, of_middle) * _as_others_scatter(around / np.hypot(deviation, of_middle))
     priors = [_SUSPECTED if sensor in suspected else _PRIOR / len(common) for sensor in common]
     beyond = np.array([_probability(x, sd, prior) for x, sd, prior in zip(around, own, priors, strict=True)])
@@ -138,11 +142,18 @@ def _between(
         for place, sensor in enumerate(common)
         if len(common) >= _FEWEST_COMMON and beyond[place] > _STATED and abs(around[place]) > _LEAST
     ]
-    of_all = float(np.hypot(of_middle, np.hypot(before.unsure, after.unsure)))
+    of_all = float(np.hypot(of_middle * _as_all_scatter(around / deviation), unsure))
     together = _probability(middle, of_all, _PRIOR)
     if together > _STATED and abs(middle) > _LEAST_OF_ALL:
         found.insert(0, Change(None, number, float(np.expm1(middle)), of_all, together))
     return found
+
+
+def _median(values: Floats, weights: Floats) -> float:
+    """That by weights: between values, at half of the weight."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - weights[order] / 2
+    return float(np.interp(weights.sum() / 2, below, values[order]))
 
 
 def _as_others_scatter(scores: Floats) -> Floats:
@@ -156,9 +167,17 @@ def _as_others_scatter(scores: Floats) -> Floats:
     return np.sqrt((_WORTH + others * typical) / (_WORTH + others))
 
 
+def _as_all_scatter(scores: Floats) -> float:
+    """The same of the change that all sensors share."""
+    if len(scores) < _FEWEST_COMMON:
+        return 1.0
+    others = len(scores) - 1
+    return float(np.sqrt((_WORTH + others * np.median(scores**2) / _MEDIAN_SQUARE) / (_WORTH + others)))
+
+
 def _probability(change: float, deviation: float, prior: float) -> float:
     """That it changed at all: usual changes are of some 20 %."""
-    both = (deviation**2 + _USUAL**2, deviation**2)
+    both = (deviation**2 + USUAL**2, deviation**2)
     changed, same = (-0.5 * (change**2 / variance + np.log(variance)) for variance in both)
     return float(1 / (1 + (1 - prior) / prior * np.exp(np.clip(same - changed, -700, 700))))
 
@@ -175,7 +194,7 @@ def change_in_words(change: Change, dated: Dated) -> str:
     before, after = (dated.called(number) for number in (change.since - 1, change.since))
     low, high = sorted(abs(100 * (change.value + end * SDS_OF_95 * change.uncertainty)) for end in (-1, 1))
     size = f"{abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g})"
-    causes = "an amplifier's gain, the temperature" if change.value > 0 else "ageing, a gain, the temperature"
-    causes += ", or a glue line or a thickness that changed everywhere alike,"
+    causes = " or ".join([*(in_words([name]) for name in change.causes), "an amplifier's gain", "the temperature"])
     level = "" if change.sensor is not None else f", a change of level that {causes} would make"
-    return f"d33 {whose} {way} by {size} between {before} and {after}{level}"
+    untold = f"{level}: these recordings do not tell which" if level else ""
+    return f"d33 {whose} {way} by {size} between {before} and {after}{untold}"

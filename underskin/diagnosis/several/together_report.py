@@ -1,17 +1,20 @@
 """The report of campaigns of one skin that were diagnosed together."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded
-from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
+from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.several import quoted
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
 from underskin.diagnosis.several.dates import Dated
+from underskin.diagnosis.several.level import AGEING, causes, unsure_of_changes
 from underskin.diagnosis.several.posteriors import Shared, combined, values
 from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
 from underskin.findings.formatting import in_percent
@@ -27,7 +30,7 @@ def together_report(
     name: str,
     campaigns: Sequence[Campaign],
     results: Sequence[DiagnosisResult],
-    reports: Sequence[dict[str, Any]],
+    reports: Sequence[Reported],
     usable: Sequence[int],
     dated: Dated,
     alone: Sequence[frozenset[str]],
@@ -47,20 +50,26 @@ def together_report(
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
-        sensors_of(campaigns[number], strengths[place], _unsure(candidates[place], leader.sets[place]), table)
+        sensors_of(campaigns[number], strengths[place], table)
         if undescribed[place] <= _DESCRIBED
         else None  # whose levels no mechanism here explains
         for place, number in enumerate(usable)
     ]
-    changed = changes(sensors, [alone[number] for number in usable])
+    unsure = unsure_of_changes(candidates, leader)
+    changed = [
+        change
+        if change.sensor is not None
+        else replace(change, causes=causes(candidates[change.since], leader.sets[change.since], change))
+        for change in changes(sensors, [alone[number] for number in usable], unsure)
+    ]
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
-    last = reports[usable[-1]]
+    last_name, last = names[-1], reports[usable[-1]].d33
     findings = [
         {**finding, "statement": f"{campaign.name}: {finding['statement']}"}
         for campaign, own in zip(campaigns, reports, strict=True)
-        for finding in own["findings"]
+        for finding in own.document["findings"]
     ]
     return {
         "schema": SCHEMA,
@@ -68,7 +77,9 @@ def together_report(
         "campaigns": [campaign.name for campaign in campaigns],
         "verdict": verdict,
         "probability": round(probability, 3),
-        "statement": _statement(verdict, probability, leader, undescribed, mechanisms, changed, dated),
+        "statement": _statement(
+            verdict, probability, leader, undescribed, mechanisms, changed, dated, quoted.of_campaigns(last_name, last)
+        ),
         "location": {
             "axes": [],
             "region": {},
@@ -76,21 +87,18 @@ def together_report(
             "statement": "See each campaign's own diagnosis.",
         },
         "mechanisms": mechanisms,
-        "presence": _presence(found, described),
+        "presence": [*_presence(found, described), *_groups(changed)],
         "unnamed": None,
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
-        "not_identifiable": [],
+        "not_identifiable": quoted.not_identifiable({last_name: last}),
         "findings": findings,
         "fit": None,
         "power": [],
-        "d33": {**(last["d33"] or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
+        "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
         "next_experiment": None,
         "provenance": {
             **results[usable[-1]].provenance,
-            "each": [
-                {"campaign": own["campaign"], "verdict": own["verdict"], "probability": own["probability"]}
-                for own in reports
-            ],
+            "each": [{key: own.document[key] for key in ("campaign", "verdict", "probability")} for own in reports],
         },
     }
 
@@ -120,17 +128,6 @@ def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> li
         else:
             runs.append({number: shared})
     return runs
-
-
-def _unsure(candidate: Candidate, names: Sequence[str]) -> float:
-    """By how much a d33 is unsure beyond what the base model leaves: what the mechanisms' strengths do to it."""
-    both = [candidate.explained(frozenset(own)) for own in (names, ())]
-    deviations = []
-    for fit in both:
-        assert fit is not None
-        stated = parameter(fit, place_of(fit, "d33"))
-        deviations.append(float(np.log(stated["high"] / stated["low"])) / (2 * SDS_OF_95))
-    return float(np.sqrt(max(deviations[0] ** 2 - deviations[1] ** 2, 0.0)))
 
 
 def _verdict(leader: Course, described: float, undescribed: Sequence[float], changed: Sequence[Change]) -> str:
@@ -180,13 +177,15 @@ def _scope(where: Sequence[int], able: Sequence[int], dated: Dated) -> dict[str,
 
 
 def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
-    """A d33 that fell from one campaign to the next, as by ageing, of one sensor or of all.
+    """A d33 that changed from one campaign to the next, under the most probable mechanism that would do that: of one
+    sensor ageing, where it fell.
 
     Each has a statement, since a change of level alone does not tell its cause.
     """
     entries = []
     for change in changed:
-        if change.value > 0:
+        could = change.causes if change.sensor is None else (AGEING,) if change.value < 0 else ()
+        if not could:
             continue
         half = SDS_OF_95 * change.uncertainty
         ends = {"value": 100 * change.value, "low": 100 * (change.value - half), "high": 100 * (change.value + half)}
@@ -198,7 +197,7 @@ def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
         }
         entries.append(
             {
-                "name": "ageing",
+                "name": could[0],
                 "probability": round(change.probability, 3),
                 "parameters": [
                     {"name": "change_of_d33", "unit": "%", **{key: rounded(at, 3) for key, at in ends.items()}}
@@ -209,6 +208,15 @@ def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
             }
         )
     return entries
+
+
+def _groups(changed: Sequence[Change]) -> list[dict[str, Any]]:
+    """The mechanisms of which one made a change of level."""
+    return [
+        {"mechanisms": sorted(change.causes), "probability": round(change.probability, 3)}
+        for change in changed
+        if change.causes
+    ]
 
 
 def _presence(found: Courses, described: float) -> list[dict[str, Any]]:
@@ -239,6 +247,7 @@ def _statement(
     mechanisms: Sequence[dict[str, Any]],
     changed: Sequence[Change],
     dated: Dated,
+    of_d33: str,
 ) -> str:
     percent = in_percent(probability)
     names = dated.names
@@ -259,7 +268,7 @@ def _statement(
     else:
         begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
         stated = f"{begin}: {', '.join(parts)} ({percent})"
-    return of_clauses([stated], said, [dated.order_clause()])
+    return of_clauses([stated], said, [dated.order_clause(), of_d33], names=names)
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:

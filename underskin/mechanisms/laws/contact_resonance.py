@@ -1,15 +1,28 @@
 """The mechanism `contact_resonance`."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from underskin.autodiff import Differentiated
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.autodiff import Differentiated, constant
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.models.frf_design import FrfDesign, frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
+from underskin.physics.contact_curves import CurveGrid
+from underskin.physics.elastic_layer import Layer
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import Conditions
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.resonance import resonance
+from underskin.units import to_si
+from underskin.weak_cache import cached_while_alive
 
 _MASS = "what sits in front of a force cell, from a bead to a shaker's table: 2 g within a factor of 6"
 _DAMPING = "silicones lose little, tan δ 0.02 to 0.3, ζ half of it: 0.05 within a factor of 2.7"
+
+_BROADER, _BROAD = 3.0, 0.03  # times the damping that is seen, and at least that damping
 
 
 class ContactResonance(Mechanism):
@@ -35,9 +48,40 @@ class ContactResonance(Mechanism):
         Parameter("damping_ratio", "-", 1e-3, 1.0, Normal(-3.0, 1.0), "log", limit=None, shown=0.05, reason=_DAMPING),
     )
 
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """The mass that has the resonances which recordings show on the base model's contacts, and their damping; a
+        larger one as well, from which a fit finds a sharp resonance that other contacts have elsewhere."""
+        return _shown(conditions)
+
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """The tip's transfer function."""
         assert contacts.stiffness is not None
         natural = (contacts.stiffness * (1e3 / values["tip_mass"])) ** 0.5
         ratio = 2 * np.pi * design.line_frequency / natural[design.line_contact]
         return 1.0 / (1.0 - ratio * ratio + 2j * values["damping_ratio"] * ratio)
+
+
+@cached_while_alive  # a diagnosis composes dozens of models of one campaign
+def _shown(conditions: Conditions) -> list[tuple[float, float]]:
+    """Tip mass [g] and damping ratio."""
+    skin = conditions.skin
+    measured = [entry for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    seen = [(place, found) for place, entry in enumerate(measured) if (found := resonance(lines_of(entry))) is not None]
+    if not seen or skin.youngs_modulus_mpa is None or skin.thickness_mm is None:
+        return []
+    design = frf_design(conditions, (), neighbours=False)
+    modulus, thickness = to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa), to_si("thickness_mm", skin.thickness_mm)
+    contacts = Contacts(
+        design.force,
+        design.indenter_radius,
+        design.dwell,
+        modulus=constant(modulus, 0, (1,)),
+        thickness=constant(thickness, 0, (1,)),
+        poisson_ratio=constant(skin.poisson_ratio, 0, (1,)),
+    )
+    curves = layer_curves(CurveGrid(np.zeros(1)), Layer(skin.poisson_ratio))
+    spring = stiffness(contacts, press(contacts, None), curves).value[0]
+    own = design.point_contact[design.point]
+    masses = [1e3 * spring[own[place]] / (2 * np.pi * found.frequency) ** 2 for place, found in seen]
+    mass, damping = float(np.median(masses)), float(np.median([found.damping for _, found in seen]))
+    return [(mass, damping), (mass, max(_BROADER * damping, _BROAD))]

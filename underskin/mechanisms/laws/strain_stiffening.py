@@ -29,6 +29,18 @@ _COEFFICIENT = Parameter(
     shown=5.0,
     reason="1 for a neo-Hookean solid, 1.1 to 1.2 for the silicones of docs/mechanisms.md; filled elastomers more",
 )
+_EXPONENT = Parameter(
+    name="stiffening_exponent",
+    unit="-",
+    low=1.0,
+    high=2.0,
+    prior=Normal(2.0, 0.3),
+    scale="linear",
+    limit=None,
+    shown=2.0,
+    starts=(1.0, 2.0),
+    reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
+)
 _SPHERE = (
     Parameter(
         name="stiffening_coefficient",
@@ -53,18 +65,7 @@ _SPHERE = (
         starts=(-1.0, 1.0),
         reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
     ),
-    Parameter(
-        name="stiffening_exponent",
-        unit="-",
-        low=1.0,
-        high=2.0,
-        prior=Normal(2.0, 0.3),
-        scale="linear",
-        limit=None,
-        shown=2.0,
-        starts=(1.0, 2.0),
-        reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
-    ),
+    _EXPONENT,
 )
 _YEOH = (
     Parameter(
@@ -89,6 +90,7 @@ _YEOH = (
         shown=0.02,
         reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
     ),
+    _EXPONENT,
 )
 
 
@@ -99,9 +101,9 @@ class StrainStiffening(Mechanism):
     plain = """The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the
     contact grows less, and the force rises more, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
-    together. Curves: nominal stress (E/3)(λ⁻² − λ) f(I), I = λ² + 2/λ − 3, λ = 1 − strain; compression f = 1 + 2 c2 I +
-    3 c3 I² (Yeoh); under a sphere f = (1 + q c J)^(1/q), J = 3 (I/3)^(m/2), the secant ratio at ε multiplying
-    the modulus."""
+    together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
+    compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
+    a sphere f = (1 + q c J)^(1/q), the secant ratio at ε multiplying the modulus."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
     strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0, or c = 0,
     a curve is neo-Hookean, not a straight line: the base model is recovered at small strain."""
@@ -148,7 +150,7 @@ class StrainStiffening(Mechanism):
         if "stiffening_form" in values:
             curve.stiffening = tuple(values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         else:
-            curve.yeoh = values["second_over_first"], values["third_over_first"]
+            curve.yeoh = values["second_over_first"], values["third_over_first"], values["stiffening_exponent"]
 
 
 def _radius_ratio(excess: Array) -> tuple[Array, Array]:

@@ -61,15 +61,16 @@ class CompressionModel(CurveModel):
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive.
 
-        Yeoh: (λ⁻² − λ)(1 + 2 c2 I + 3 c3 I²)/3, I = I1 − 3.
+        Stiffening: (λ⁻² − λ)(1 + 2 c2 J + 3 c3 J²)/3, J = 3 (I/3)^(m/2), I = I1 − 3; Yeoh's law at m = 2.
         """
         stress = strain
         if curve.yeoh is not None:
-            second, third = map(numbers, curve.yeoh)
+            second, third, exponent = map(numbers, curve.yeoh)
             stretch = 1.0 - strain
             invariant = stretch * stretch + 2.0 / stretch - 3.0
             neo_hookean = 1.0 / (stretch * stretch) - stretch
-            stress = neo_hookean * (1.0 + 2.0 * second * invariant + 3.0 * third * invariant * invariant) / 3.0
+            grown = 3.0 * (np.maximum(invariant, 0.0) / 3.0) ** (0.5 * exponent)
+            stress = neo_hookean * (1.0 + 2.0 * second * grown + 3.0 * third * grown * grown) / 3.0
         if curve.platen_friction is None:
             return stress
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))

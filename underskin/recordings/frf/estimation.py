@@ -1,13 +1,9 @@
-"""The FRF, charge over force, from time series: H1, H2 and Hv with their coherence, for stepped sine, periodic and
-broadband forces.
+"""The FRF, charge over force, from time series: for stepped sine, periodic and broadband forces.
 
-Convention e^(+iωt): a charge that lags the force has a negative phase. With S the spectra averaged over n blocks
-(Bendat and Piersol, Random Data, chapters 5 and 9)
-    H1 = S_fq/S_ff    H2 = S_qq/S_qf    γ² = |S_fq|²/(S_ff S_qq)
-    Hv = (d + √(d² + 4 κ |S_fq|²))/(2 S_qf), d = S_qq − κ S_ff
+Convention e^(+iωt): a charge that lags the force has a negative phase. Spectra are averaged over n blocks, and the FRF
+is H1, H2 or Hv of them (`estimators` has the equations), with the coherence γ² and (Bendat and Piersol, Random Data,
+chapter 9)
     var log|H| = var phase = (1 − γ²)/(2 n γ²)    var γ² = 2 γ² (1 − γ²)²/n.
-H1 is unbiased by noise in the charge, H2 by noise in the force, and Hv (total least squares) by noise in both whose
-power has the ratio κ; κ is taken to be the ratio of the signals' own powers, so that Hv does not depend on units.
 """
 
 from dataclasses import replace
@@ -16,9 +12,10 @@ import numpy as np
 
 from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.estimators import Estimator, ratio
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
-from underskin.recordings.frf.spectral_average import Blocks, Estimator, Frf, averaged, ratio, without_line
+from underskin.recordings.frf.spectral_average import Blocks, Frf, averaged, without_line
 from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
 from underskin.units import Complexes, Floats, Mask, to_si
 
@@ -28,12 +25,12 @@ _BLOCKS = 15  # of a broadband record, half overlapping, where no resolution is 
 
 
 def lines_of(recording: FrfRecording) -> Frf:
-    """The FRF of a recording: its own lines, or the estimate from its time series."""
+    """The FRF of a recording: its own lines, or the estimate from its time series by its estimator, H1 without one."""
     if recording.sample_rate_hz is not None:
         assert recording.force_n is not None
         assert recording.charge_pc is not None
         force, charge = to_si("force_n", recording.force_n), to_si("charge_pc", recording.charge_pc)
-        return estimate(force, charge, recording.sample_rate_hz)
+        return estimate(force, charge, recording.sample_rate_hz, estimator=recording.estimator or "H1")
     assert recording.frequency_hz is not None
     assert recording.frf_re_pc_per_n is not None
     assert recording.frf_im_pc_per_n is not None
@@ -53,7 +50,7 @@ def estimate(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     sample_rate : float
         [Hz].
     estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see the module.
+        Which noise it is unbiased by: see `estimators`.
 
     Returns
     -------
@@ -101,7 +98,7 @@ def broadband(
     window : str
         Taper of a block, a name of `scipy.signal.get_window`.
     estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see the module.
+        Which noise it is unbiased by: see `estimators`.
 
     Returns
     -------
@@ -141,7 +138,7 @@ def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Es
     sample_rate : float
         [Hz].
     estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see the module.
+        Which noise it is unbiased by: see `estimators`.
 
     Returns
     -------
@@ -178,7 +175,7 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
     sample_rate : float
         [Hz].
     estimator : "H1", "H2" or "Hv"
-        Which noise it is unbiased by: see the module.
+        Which noise it is unbiased by: see `estimators`.
 
     Returns
     -------

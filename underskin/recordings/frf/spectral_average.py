@@ -1,18 +1,18 @@
-"""H1, H2 and Hv with their coherence from spectra averaged over blocks of two signals (equations in `estimation`)."""
+"""The FRF from spectra averaged over blocks of two signals."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.errors import ErrorCode, InvalidInput, unusable
+from underskin.errors import unusable
 from underskin.findings import sentences
+from underskin.recordings.frf.estimators import Estimator, ratio
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
 from underskin.units import Complexes, Floats
 
-Estimator = Literal["H1", "H2", "Hv"]
 _TINY = float(np.finfo(float).tiny)
 
 
@@ -93,24 +93,6 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
         charge_power.mean(axis=0),
         passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
     )
-
-
-def ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Complexes, Floats]:
-    """H and γ² of spectra (blocks, lines)."""
-    if estimator not in ("H1", "H2", "Hv"):
-        raise InvalidInput("estimator", estimator, "must be H1, H2 or Hv", code=ErrorCode.NOT_ONE_OF)
-    ff, qq = (np.mean(np.abs(blocks) ** 2, axis=0) for blocks in (force, charge))
-    fq = np.mean(np.conj(force) * charge, axis=0)
-    coherence = np.minimum(np.abs(fq) ** 2 / np.maximum(ff * qq, _TINY), 1.0)
-    if estimator == "H1":
-        return fq / np.maximum(ff, _TINY), coherence
-    if estimator == "H2":
-        return qq * fq / np.maximum(np.abs(fq) ** 2, _TINY), coherence
-    kappa = qq.sum() / max(ff.sum(), _TINY)
-    difference = qq - kappa * ff
-    root = np.sqrt(difference**2 + 4 * kappa * np.abs(fq) ** 2)
-    share = np.where(difference > 0, (difference + root) / (2 * np.maximum(np.abs(fq) ** 2, _TINY)), 0)
-    return fq * np.where(difference > 0, share, 2 * kappa / np.maximum(root - difference, _TINY)), coherence
 
 
 def without_line(blocks: Floats) -> Floats:

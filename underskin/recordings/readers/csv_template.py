@@ -30,6 +30,7 @@ from underskin.recordings.readers import template_columns, text
 from underskin.recordings.readers.calendar_times import iso_time
 from underskin.recordings.readers.template_columns import FURTHER, NO_NAME, Column, NoField
 from underskin.recordings.readers.unit_labels import lab_field, labelled_unit
+from underskin.recordings.shown_values import CellText
 from underskin.recordings.time_zone import time_zone
 from underskin.units import LAB, LabField
 
@@ -38,7 +39,7 @@ _TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
 _SEPARATORS = ("\t", ";", ",")
 _POSITION = ("position_x_mm", "position_y_mm")
 _SENSOR = ("id", "x_mm", "y_mm")
-_TEXTS = ("id", "kind", "sensor", "recorded_at", "name", "skin.id")
+_TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id")
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(_POSITION)) - {"conditions"}
 _ID = "id"
@@ -68,7 +69,7 @@ def _separator(content: str) -> str | None:
 
 def _first_cells(line: str, separator: str) -> list[str]:
     try:
-        return text.cells(line, separator)[:2]
+        return [cell.lower() for cell in text.cells(line, separator)[:2]]
     except ValueError:
         return []
 
@@ -119,7 +120,7 @@ class _Template:
 
     def _above(self, row: list[str], index: int) -> tuple[str, str, Any]:
         """A line above the table: what it is about (campaign, skin or sensor), its field and its value."""
-        name = row[0]
+        name = template_columns.in_small_letters(row[0])
         self._require_few(row, index, 4 if name == "sensor" else 2)
         cell = row[1] if len(row) > 1 else ""
         if name == "sensor":
@@ -244,7 +245,7 @@ class _Template:
             return number * factor
         if text.is_grouped(cell):
             raise self._error(place[0], f"{field} = {cell!r} {text.ungrouped(cell)}", place[1])
-        return cell
+        return CellText(cell, f"line {place[0] + 1}, column {place[1] + 1}")
 
     def _time(self, cell: str, place: tuple[int, int]) -> str:
         zone = time_zone()

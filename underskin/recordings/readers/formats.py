@@ -6,14 +6,14 @@ Another package adds a format through an entry point of the group `underskin.rea
 import importlib
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import BinaryIO
 
 from underskin import extensions
 from underskin.errors import FileError
 from underskin.recordings.channels import Contents, Document
-from underskin.recordings.readers import csv_template, lvm_file, text
+from underskin.recordings.readers import csv_template, cut_end, lvm_file, text
 
 MODULES = {
     "JSON": "json_file",
@@ -25,6 +25,7 @@ MODULES = {
     "MATLAB": "mat_file",
     "HDF5": "hdf5_file",
 }
+_TABLES = ("CSV template", "CSV", "LVM")
 BINARY = ("TDMS", "UFF", "MATLAB", "HDF5")
 GROUP = "underskin.readers"
 _SUFFIXES = (".json", ".csv", ".tdms", ".lvm", ".uff", ".unv", ".mat", ".h5", ".hdf5")  # of the formats of MODULES
@@ -147,7 +148,9 @@ def parse(name: str, stream: BinaryIO, file: str) -> Contents | Document:
     if name in MODULES:
         module = importlib.import_module(f"underskin.recordings.readers.{MODULES[name]}")
         held = module.read(stream, file)
-        return held if isinstance(held, Contents | Document) else Document(held)
+        held = held if isinstance(held, Contents | Document) else Document(held)
+        cut = cut_end.warning(stream) if name in _TABLES else ""
+        return replace(held, warnings=(*held.warnings, cut)) if cut else held
     stream.seek(0)
     contents = formats_of_other_packages()[name].read(stream, file)
     if not isinstance(contents, Contents):

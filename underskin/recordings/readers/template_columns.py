@@ -19,6 +19,7 @@ FURTHER = "conditions."  # what else the lab noted, a column each
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
 _PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
+_PHASE_ALONE, _TURN = "frf_phase", 2 * math.pi
 NO_NAME = ("", "unnamed: 0")  # the second by pandas
 _ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
 
@@ -53,6 +54,9 @@ def columns(
     for place, heading in enumerate(headings):
         cells = [cell for row in rows for cell in row[place : place + 1] if cell]
         meant = field_of(heading, known)
+        if meant is None and heading.strip().lower().replace(" ", "_") == _PHASE_ALONE:
+            meant = PHASE, _angle_of(place, heading, [text.number(cell, decimal) for cell in cells])
+            left_out.append(f"{heading!r} is read as degrees: it has values beyond 2π")
         if meant is None:
             left_out += _without(place, heading, cells, known, decimal)
             continue
@@ -82,6 +86,21 @@ def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
         if name == "frf_magnitude" and given is not None and given.dimension == "charge/force":
             return MAGNITUDE, given.to_si / 1e-12
     return lab_field(heading) or lab_field(lower)
+
+
+def in_small_letters(name: str) -> str:
+    """A name whose letters may be capitals, but those of the unit in brackets behind it as they are."""
+    bracket = min((place for mark in "[(" if (place := name.find(mark)) >= 0), default=len(name))
+    return name[:bracket].lower() + name[bracket:]
+
+
+def _angle_of(place: int, heading: str, values: Sequence[float | None]) -> float:
+    """The factor to rad of a phase whose unit its heading does not say, by its values; raises NoField where they may be
+    either."""
+    if any(value is not None and abs(value) > _TURN for value in values):
+        return _ANGLES["deg"]
+    names = " or ".join(f"{_PHASE_ALONE}_{angle}" for angle in ("deg", "rad"))
+    raise NoField(place, f"{heading!r} has no unit, and its values may be degrees or radians: call it {names}")
 
 
 def _without(place: int, heading: str, cells: Sequence[str], known: Collection[str], decimal: str) -> list[str]:

@@ -1,0 +1,88 @@
+"""The command that looks for what keeps a server from its work."""
+
+import json
+from typing import Annotated
+
+import typer
+
+from service.cli.shared import read_settings, use_folder_of_lab
+from service.jobs import WorkerProcesses
+from service.jobs.process import Given
+from service.settings import Settings
+from service.usecases.checkup import Finding, Level, examine
+from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
+
+_LIMIT_S = 120.0
+_MARKS = {Level.OK: "ok", Level.WARNING: "warning", Level.CRITICAL: "CRITICAL"}
+
+# Enough to be diagnosed, not enough to say anything: it is the worker that is tried.
+_TRIAL = {
+    "schema": "campaign/1",
+    "name": "trial",
+    "skin": {
+        "poisson_ratio": 0.5,
+        "thickness_mm": 2.5,
+        "youngs_modulus_mpa": 16.0,
+        "sensor_radius_mm": 1.5,
+        "sensors": [{"id": "s1", "x_mm": 0.0, "y_mm": 0.0}],
+    },
+    "recordings": [
+        {
+            "id": f"r{number}",
+            "sensor": "s1",
+            "indenter_radius_mm": 4.0,
+            "preload_n": preload,
+            "dynamic_force_n": 0.09,
+            "frequency_hz": [10.0, 20.0, 50.0],
+            "frf_re_pc_per_n": [7.4, 7.41, 7.39],
+            "frf_im_pc_per_n": [0.0, 0.01, -0.01],
+        }
+        for number, preload in enumerate((0.5, 1.0, 2.0, 3.0))
+    ],
+}
+
+
+def doctor(
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON, for programs.")] = False,
+) -> None:
+    """Look at store, disk, tables, keys, backups, clock and workers; say what is wrong and what to do.
+
+    The exit status is that of monitoring systems: 0 where all is well, 1 with warnings, 2 where something keeps the
+    server from its work or endangers what it keeps.
+    """
+    settings = read_settings()
+    use_folder_of_lab(settings)
+    findings = [*examine(settings), _of_workers(settings)]
+    if as_json:
+        entries = [
+            {"check": one.check, "level": one.level.name.lower(), "found": one.found, "advice": one.advice}
+            for one in findings
+        ]
+        typer.echo(json.dumps(entries, indent=1, ensure_ascii=False))
+    else:
+        for one in findings:
+            advice = f"\n{'':23}→ {one.advice}" if one.advice else ""
+            typer.echo(f"{_MARKS[one.level]:>9}  {one.check:12}{one.found}{advice}")
+    raise typer.Exit(max(one.level for one in findings))
+
+
+def _of_workers(settings: Settings) -> Finding:
+    """A small campaign, diagnosed in a process of its own as a server does it."""
+    if settings.diagnosis_workers == 0:
+        return Finding("workers", Level.OK, "this server runs no diagnoses")
+    path = settings.tables / SIGMA_TABLE
+    try:
+        processes = WorkerProcesses(
+            path, load_table(path).sha256, int(settings.diagnosis_memory_mb * 1e6), keeps_ready=False
+        )
+        with processes.at_work([Given(json.dumps(_TRIAL).encode(), "trial")]) as worker:
+            while not worker.ended and worker.news.wait(_LIMIT_S):
+                worker.news.clear()
+            failure = "" if "report" in worker.said else worker.failure if worker.ended else "it did not end"
+        processes.stop()
+    except OSError as error:
+        failure = str(error)
+    if failure:
+        advice = "see the memory that is free, and UNDERSKIN_DIAGNOSIS_MEMORY_MB"
+        return Finding("workers", Level.CRITICAL, f"a trial diagnosis failed: {failure}", advice)
+    return Finding("workers", Level.OK, f"a trial diagnosis ended; at most {settings.diagnosis_workers} at once")

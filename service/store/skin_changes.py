@@ -1,0 +1,31 @@
+"""Whether anything of a skin that its page shows has changed: a mark of it all, from counts alone."""
+
+import hashlib
+
+from sqlalchemy import Connection, func, select
+
+from service.store import inversions, skins
+from service.store.diagnosed_together import has_one_of
+from service.store.tables import campaigns, diagnoses, models
+from service.store.tables import inversions as derived
+from service.store.tables import skins as skin_rows
+
+
+def mark(connection: Connection, root: str, table_sha256: str) -> str:
+    """Another one after an arrival, a withdrawal, a correction, an exclusion, a join, a computed d33, a step of a
+    diagnosis and an adoption."""
+    of_skin = campaigns.c.skin_id.in_(skins.members(root))
+    numbers = select(campaigns.c.number).where(of_skin)
+    with_one = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
+    queries = (
+        select(func.count(), func.max(campaigns.c.number), func.sum(campaigns.c.revision)).where(of_skin),
+        select(func.count()).select_from(campaigns).join(derived, inversions.fresh(table_sha256)).where(of_skin),
+        select(diagnoses.c.state, func.count(), func.max(diagnoses.c.number))
+        .where(with_one)
+        .group_by(diagnoses.c.state)
+        .order_by(diagnoses.c.state),
+        select(func.count(), func.count(models.c.withdrawn_at)).where(models.c.skin_id.in_(skins.members(root))),
+        select(func.count()).select_from(skin_rows).where(skin_rows.c.root_id == root),
+    )
+    counts = [[tuple(row) for row in connection.execute(query)] for query in queries]
+    return hashlib.sha256(repr(counts).encode()).hexdigest()[:16]

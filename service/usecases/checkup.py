@@ -1,0 +1,223 @@
+"""What can keep a server from its work: store, disk, tables, keys, backups, clock and queue, each looked at once.
+
+A check answers with what it found and, where something is wrong, what to do; it changes nothing.
+"""
+
+import os
+import shutil
+import sqlite3
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import IntEnum
+from pathlib import Path
+
+from sqlalchemy import ColumnElement, Connection, func, select
+from sqlalchemy.exc import DBAPIError
+
+from service.auth.keys import KeyStore, KeysUnreadable
+from service.settings import Settings
+from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
+from service.store.tables import campaigns
+from service.store.tables import diagnoses as queue
+from service.usecases.scheduled_backups import kept
+from underskin import TableError
+from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
+
+_LITTLE_MB, _TOO_LITTLE_MB = 2000, 200
+_SKEW_S = 5.0  # of two clocks
+_WAITS_S = 300.0  # a diagnosis in the queue
+
+
+class Level(IntEnum):
+    """As monitoring systems count: the exit status of the worst finding."""
+
+    OK = 0
+    WARNING = 1
+    CRITICAL = 2
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a check found, in words, and what to do where that is anything."""
+
+    check: str
+    level: Level
+    found: str
+    advice: str = ""
+
+
+def examine(settings: Settings) -> Iterator[Finding]:
+    """One finding or more of every check; a check that cannot be carried out says so."""
+    yield from _of_folder(settings.data)
+    yield from _of_disk(settings)
+    yield _of_tables(settings.tables)
+    try:
+        store = database(settings.database_url, settings.data)
+    except StoreError as error:
+        yield Finding("store", Level.CRITICAL, str(error), "set UNDERSKIN_DATABASE_URL right")
+        return
+    with closing(store):
+        answers = _of_store(store, settings.data)
+        yield answers
+        yield from _of_backups(settings, store)
+        is_well = answers.level is Level.OK
+        if is_well:
+            for look in (_of_clock, _of_queue):
+                yield store.read(look)
+        needed = is_well and store.read(key_requirement.is_needed)
+        yield from _of_keys(KeyStore(settings.data), needed=needed)
+
+
+def _of_folder(folder: Path) -> Iterator[Finding]:
+    if not folder.is_dir():
+        yield Finding(
+            "data folder", Level.CRITICAL, f"{folder} is not there",
+            "set UNDERSKIN_DATA to the server's folder, or mount its disk",
+        )  # fmt: skip
+        return
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    if not os.access(folder, os.W_OK | os.X_OK):
+        who = f"chown it to the user that runs the server (this one has the number {os.geteuid()})"
+        yield Finding("data folder", Level.CRITICAL, f"{folder} cannot be written to (mode {mode:o})", who)
+    elif mode & 0o007:
+        yield Finding("data folder", Level.WARNING, f"everybody may enter {folder} (mode {mode:o})", "chmod 700 it")
+    else:
+        yield Finding("data folder", Level.OK, f"{folder}, mode {mode:o}")
+    open_to_all = [
+        path.name for path in sorted(folder.glob("*")) if path.is_file() and stat.S_IMODE(path.stat().st_mode) & 0o007
+    ]
+    if open_to_all:
+        named = ", ".join(open_to_all[:5])
+        yield Finding("data folder", Level.WARNING, f"everybody may read {named}", "chmod 600 these files")
+
+
+def _of_disk(settings: Settings) -> Iterator[Finding]:
+    for name, folder in (("disk", settings.data), ("disk of the backups", settings.backup_to)):
+        if folder is None or not folder.is_dir():
+            continue
+        free = shutil.disk_usage(folder).free / 1e6
+        level = Level.CRITICAL if free < _TOO_LITTLE_MB else Level.WARNING if free < _LITTLE_MB else Level.OK
+        advice = "" if level is Level.OK else f"make room: below {_TOO_LITTLE_MB} MB nothing more may be kept"
+        yield Finding(name, level, f"{free:,.0f} MB free in {folder}", advice)
+
+
+def _of_tables(folder: Path) -> Finding:
+    try:
+        table = load_table(folder / SIGMA_TABLE)
+    except (TableError, OSError) as error:
+        return Finding("tables", Level.CRITICAL, str(error), "set UNDERSKIN_TABLES, or install underskin again")
+    return Finding("tables", Level.OK, f"{folder / SIGMA_TABLE}, SHA-256 {table.sha256[:12]}…")
+
+
+def _of_store(store: Database, folder: Path) -> Finding:
+    if not store.is_made():
+        return Finding("store", Level.WARNING, f"there is none in {folder} yet", "start the server once, or set "
+                       "UNDERSKIN_DATA to its folder")  # fmt: skip
+    try:
+        version = migrate.version(store)
+        if version is None:
+            return Finding("store", Level.WARNING, "it is empty", "start the server once")
+        migrate.require_known(version)
+        count = store.read(_count_campaigns)
+        damage = _damage(store)
+    except (StoreError, StoreMoved) as error:
+        return Finding("store", Level.CRITICAL, str(error), "see docs/store.md")
+    except (DBAPIError, OSError) as error:
+        return Finding("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}",
+                       "see whether the database runs, and its address in UNDERSKIN_DATABASE_URL")  # fmt: skip
+    if damage:
+        return Finding("store", Level.CRITICAL, f"it is damaged: {damage}", "stop the server and restore a backup")
+    if version != migrate.VERSIONS[-1]:
+        return Finding("store", Level.WARNING, f"its schema is {version}, the newest {migrate.VERSIONS[-1]}",
+                       "start this server: it backs the store up and brings it up to date")  # fmt: skip
+    return Finding("store", Level.OK, f"{count:,} campaigns, schema {version}")
+
+
+def _count_campaigns(connection: Connection) -> int:
+    return int(connection.execute(select(func.count()).select_from(campaigns)).scalar_one())
+
+
+def _damage(store: Database) -> str:
+    """What SQLite finds wrong with its file; PostgreSQL looks after its own."""
+    if not store.is_sqlite:
+        return ""
+    uri = Path(str(store.url.database)).absolute().as_uri() + "?mode=ro"
+    with closing(sqlite3.connect(uri, uri=True)) as connection:
+        found = str(connection.execute("PRAGMA quick_check").fetchone()[0])
+    return "" if found == "ok" else found
+
+
+def _of_keys(keys: KeyStore, *, needed: bool) -> Iterator[Finding]:
+    if not keys.file_exists():
+        if needed:
+            yield Finding("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",
+                          "put it back, or make a key with `underskin key create NAME`")  # fmt: skip
+        else:
+            yield Finding("keys", Level.OK, "none: the server answers on this machine only")
+        return
+    try:
+        known = keys.entries()
+    except KeysUnreadable as error:
+        yield Finding("keys", Level.CRITICAL, str(error), "put a copy back, or remove the file and make keys anew")
+        return
+    level, advice = (Level.OK, "") if known else (Level.WARNING, "make one with `underskin key create NAME`")
+    yield Finding("keys", level, f"{len(known)} in {keys.path}", advice)
+
+
+def _of_backups(settings: Settings, store: Database) -> Iterator[Finding]:
+    if settings.backup_to is None:
+        yield Finding("backups", Level.WARNING, "the server makes none by itself",
+                      "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
+        return
+    newest = next(iter(kept(settings.backup_to)), None) if settings.backup_to.is_dir() else None
+    if newest is None:
+        yield Finding("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
+                      "start the server; its log says why none can be made")  # fmt: skip
+        return
+    hours = newest.age_s / 3600
+    if hours > 2 * settings.backup_every:
+        yield Finding("backups", Level.CRITICAL, f"the newest, {newest.path.name}, is {hours:.0f} hours old",
+                      "see that the server runs; its log says why none can be made")  # fmt: skip
+        return
+    try:
+        backup.verify(store, newest.path)
+    except (StoreError, OSError) as error:
+        yield Finding("backups", Level.CRITICAL, str(error), "look at the disk, and make one: `underskin backup FILE`")
+        return
+    yield Finding("backups", Level.OK, f"{newest.path.name}, {hours:.1f} hours old, read whole")
+
+
+def _of_clock(connection: Connection) -> Finding:
+    ahead = diagnoses.clock(connection) - time.time()
+    if abs(ahead) > _SKEW_S:
+        return Finding("clock", Level.WARNING, f"the database's clock is {ahead:+.0f} s from this machine's",
+                      "have both follow a time server")  # fmt: skip
+    last = connection.execute(select(func.max(campaigns.c.received_at))).scalar()
+    now = datetime.now(UTC)
+    if last is not None and (datetime.fromisoformat(last) - now).total_seconds() > _SKEW_S:
+        return Finding("clock", Level.WARNING, f"a campaign came in at {last}; now it is {now:%Y-%m-%d %H:%M} UTC",
+                      "set this machine's clock, and have it follow a time server")  # fmt: skip
+    return Finding("clock", Level.OK, f"{now:%Y-%m-%d %H:%M:%S} UTC")
+
+
+def _of_queue(connection: Connection) -> Finding:
+    silent = diagnoses.clock(connection) - diagnoses.HEARTBEAT_TIMEOUT_S
+    is_running = queue.c.state == "running"
+    running = _count(connection, is_running, queue.c.alive_at >= silent)
+    left = _count(connection, is_running, queue.c.alive_at < silent)
+    waiting = _count(connection, queue.c.state == "queued")
+    oldest = connection.execute(select(func.min(queue.c.asked_at)).where(queue.c.state == "queued")).scalar()
+    waits = 0.0 if oldest is None else (datetime.now(UTC) - datetime.fromisoformat(oldest)).total_seconds()
+    said = f"{running} running, {waiting} waiting"
+    if left or (waits > _WAITS_S and not running):
+        return Finding("diagnoses", Level.WARNING, f"{said}, {left} left by a server that ended",
+                      "see that a server with UNDERSKIN_DIAGNOSIS_WORKERS above 0 runs")  # fmt: skip
+    return Finding("diagnoses", Level.OK, said)
+
+
+def _count(connection: Connection, *conditions: ColumnElement[bool]) -> int:
+    return int(connection.execute(select(func.count()).select_from(queue).where(*conditions)).scalar_one())

@@ -1,0 +1,78 @@
+"""`--estimator` of the commands that read files themselves."""
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.cli.commands import PRESSED, refused, run
+from tests.support.store_server import campaign
+
+RATE = 2000.0
+
+
+def written(folder: Path, estimator: str | None = None) -> Path:
+    """Two recordings of a sensor, as time series of 7 pC/N with noise of 30 % in the force alone, and one of lines."""
+    random = np.random.default_rng(900_004)
+    document: dict[str, Any] = campaign("shaken", sensors=1)
+    lines = {**document["recordings"][0], "id": "lines"}
+    for recording in document["recordings"]:
+        force = 0.05 * random.standard_normal(8000)
+        for field in ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence"):
+            del recording[field]
+        recording["sample_rate_hz"] = RATE
+        recording["force_n"] = (2 + force + 0.015 * random.standard_normal(8000)).tolist()
+        recording["charge_pc"] = (7 * force).tolist()
+        if estimator is not None:
+            recording["estimator"] = estimator
+    document["recordings"].append(lines)
+    file = folder / f"{estimator}.json"
+    file.write_text(json.dumps(document))
+    return file
+
+
+def d33_of_series(output: str) -> float:
+    """At 2 N, where there is a time series alone."""
+    rows = csv.DictReader(io.StringIO(output))
+    return next(float(row["d33_pc_per_n"]) for row in rows if (row["level"], row["preload_n"]) == ("cell", "2.0"))
+
+
+@pytest.mark.slow
+def test_what_the_command_says_counts_for_more_than_the_file_and_lines_are_left(tmp_path: Path) -> None:
+    file = written(tmp_path, "H1")
+    by_file, chosen = run("d33", str(file), "--csv"), run("d33", str(file), "--csv", "--estimator", "H2")
+    assert (by_file.returncode, chosen.returncode) == (0, 0), chosen.stderr
+    assert d33_of_series(by_file.stdout) / d33_of_series(chosen.stdout) == pytest.approx(1 / 1.09, abs=0.01)
+    assert "look at: H2 is for time series, which 1 of 3 recordings are not" in chosen.stderr
+    assert "H2 is for time series" not in by_file.stderr
+
+
+@pytest.mark.slow
+def test_a_diagnosis_takes_it_too(tmp_path: Path) -> None:
+    file = written(tmp_path)
+    done = run("diagnose", str(file), "--estimator", "Hv", "--output-dir", str(tmp_path / "reports"))
+    assert done.returncode == 0, done.stderr
+    assert "look at: Hv is for time series, which 1 of 3 recordings are not" in done.stderr
+    reports = {}
+    for name in ("H1", "H2"):
+        done = run("diagnose", str(written(tmp_path, name)), "--output-dir", str(tmp_path / name))
+        given = run("diagnose", str(file), "--estimator", name, "--output-dir", str(tmp_path / f"{name} given"))
+        assert (done.returncode, given.returncode) == (0, 0), given.stderr
+        reports[name] = [
+            json.loads((tmp_path / folder / f"{stem}.json").read_text())["fit"]
+            for folder, stem in ((name, name), (f"{name} given", "None"))
+        ]
+    assert reports["H1"][0] == reports["H1"][1]
+    assert reports["H2"][0] == reports["H2"][1]
+    assert reports["H1"] != reports["H2"]
+
+
+def test_columns_have_none(tmp_path: Path) -> None:
+    columns = [part for name, value in PRESSED.items() for part in ("--" + name.replace("_", "-"), str(value))]
+    line = refused("d33", *columns, "--preload-n", "1", "--frf-pc-per-n", "7", "--estimator", "Hv")
+    assert line == "underskin: --estimator goes with FILE, and none is given"
+    assert "'h1' is not one of" in refused("d33", str(written(tmp_path)), "--estimator", "h1")

@@ -1,0 +1,167 @@
+"""Backups on a schedule by a real server: made, read back, rotated, restored; and what the doctor says of it all."""
+
+import json
+import os
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.usecases.scheduled_backups import kept
+from tests.support.diagnosed import sent
+from tests.support.store_server import Place, Server, campaign, running
+
+_NONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
+_SECOND = str(1 / 3600)  # in hours
+
+
+def scheduled(folder: Path, **settings: str) -> dict[str, str]:
+    return {**_NONE, "UNDERSKIN_BACKUP_TO": str(folder), **settings}
+
+
+def wait_for(folder: Path, count: int) -> list[Path]:
+    """Until there are so many backups, or more."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        found = [entry.path for entry in kept(folder)] if folder.is_dir() else []
+        if len(found) >= count:
+            return found
+        time.sleep(0.05)
+    raise AssertionError(f"{found} instead of {count} backups")
+
+
+def doctor(place: Place, **settings: str) -> tuple[int, dict[str, dict[str, Any]]]:
+    """Exit status, and the worst finding of each check."""
+    done = place.command("doctor", "--json", **settings)
+    assert done.stdout, done.stderr
+    levels = ("ok", "warning", "critical")
+    findings: dict[str, dict[str, Any]] = {}
+    for entry in json.loads(done.stdout):
+        worst = findings.get(entry["check"])
+        if worst is None or levels.index(entry["level"]) > levels.index(worst["level"]):
+            findings[entry["check"]] = entry
+    return done.returncode, findings
+
+
+def metric(server: Server, name: str) -> float:
+    found = re.search(rf"^{name} (\S+)$", server.http.get("/metrics").text, flags=re.MULTILINE)
+    assert found is not None
+    return float(found[1])
+
+
+def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    with running(place, **_NONE) as server:
+        first = sent(server, campaign("kept"))
+    with running(place, **scheduled(folder)) as server:
+        (file,) = wait_for(folder, 1)
+        assert file.stat().st_mode & 0o077 == 0
+        later = sent(server, campaign("later"))
+        time.sleep(1.1)
+        assert metric(server, "underskin_backup_age_seconds") < 60
+        assert metric(server, "underskin_backup_bytes") == file.stat().st_size
+        assert "Last backup" in server.http.get("/").text
+    with running(place, **scheduled(folder)):  # the one that is there is young enough
+        time.sleep(1.0)
+        assert [entry.path for entry in kept(folder)] == [file]
+    restored = place.command("restore", str(file))
+    assert restored.returncode == 0, restored.stderr
+    with running(place, **_NONE) as server:
+        assert server.http.get(f"/v1/campaigns/{first}").status_code == 200
+        assert server.http.get(f"/v1/campaigns/{later}").status_code == 404
+
+
+def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    others = [folder / name for name in ("underskin-notes.txt", "before-restore-1.sqlite3", "underskin-x.sqlite3")]
+    for other in others:
+        other.write_text("mine")
+    with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND, UNDERSKIN_BACKUP_KEEP="2")):
+        (first, *_) = wait_for(folder, 1)
+        deadline = time.monotonic() + 60
+        while first.exists():
+            assert time.monotonic() < deadline, "the oldest backup stays"
+            time.sleep(0.05)
+        assert 1 <= len(kept(folder)) <= 3
+    assert all(other.read_text() == "mine" for other in others)
+    assert not list(folder.glob("*.part*"))
+
+
+def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "not-a-folder"
+    folder.write_text("a file")
+    log = place.folder.parent / f"{place.folder.name}.log"
+    with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
+        deadline = time.monotonic() + 60
+        while "no scheduled backup could be made" not in log.read_text():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert metric(server, "underskin_backup_failures_total") >= 1
+        assert "overdue" in server.http.get("/").text
+        folder.unlink()
+        wait_for(folder, 1)
+
+
+@pytest.mark.slow
+def test_two_servers_make_one_backup_between_them(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    with running(place, **scheduled(folder)), running(place, **scheduled(folder)):
+        wait_for(folder, 1)
+        time.sleep(2.0)
+        assert len(kept(folder)) == 1
+
+
+def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    place.folder.chmod(0o700)
+    with running(place, **scheduled(folder)) as server:
+        sent(server, campaign("kept"))
+        wait_for(folder, 1)
+        status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(folder))
+    assert {entry["level"] for name, entry in found.items() if not name.startswith("disk")} == {"ok"}, found
+    assert status <= 1  # the disk of a test machine may be nearly full
+    assert found["store"]["found"].startswith("1 campaigns")
+    assert "trial diagnosis ended" in found["workers"]["found"]
+
+
+def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    place = Place(folder)
+    with running(place, **_NONE) as server:
+        sent(server, campaign("kept"))
+        assert place.command("key", "create", "lab").returncode == 0
+    (folder / "keys.json").unlink()
+    folder.chmod(0o755)
+    backups = tmp_path / "backups"
+    backups.mkdir()
+    (backups / "underskin-20200101T000000Z.sqlite3").write_bytes(b"")
+    tables = tmp_path / "tables"
+    tables.mkdir()
+    status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), UNDERSKIN_TABLES=str(tables), **_NONE)
+    assert status == 2
+    assert {name: entry["level"] for name, entry in found.items() if entry["level"] != "ok" and "disk" not in name} == {
+        "data folder": "warning", "tables": "critical", "backups": "critical", "keys": "critical",
+    }  # fmt: skip
+    assert all(entry["advice"] for entry in found.values() if entry["level"] != "ok")
+
+
+def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    place = Place(folder)
+    with running(place, **_NONE) as server:
+        for number in range(4):
+            sent(server, campaign(f"kept {number}", lines=200))
+        server.process.terminate()
+        server.process.wait(30)
+    file = folder / "underskin.sqlite3"
+    content = bytearray(file.read_bytes())
+    content[8192 : len(content) // 2] = os.urandom(len(content) // 2 - 8192)
+    file.write_bytes(content)
+    status, found = doctor(place, **_NONE)
+    assert status == 2
+    assert found["store"]["level"] == "critical"

@@ -1,0 +1,47 @@
+"""What the service answered, for scripts as JSON, for eyes as tables."""
+
+import json
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, Any
+
+import typer
+
+Document = Mapping[str, Any]
+AsJson = Annotated[bool, typer.Option("--json", help="Write JSON, with the fields of the HTTP interface.")]
+
+
+def write_json(document: Any) -> None:
+    """A document, or a list of them."""
+    typer.echo(json.dumps(document, default=dict, ensure_ascii=False, indent=1))
+
+
+def write_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """A table; the last column takes what is left of the line."""
+    from rich.box import SIMPLE_HEAD
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from underskin.cli.columns import PIPED_WIDTH
+
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in headings:
+        table.add_column(heading, overflow="fold", no_wrap=heading in ("id", "campaign"))
+    for row in rows:
+        table.add_row(*map(Text, row))
+    Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH).print(table)
+
+
+def moment(time: str | None) -> str:
+    """A time of the interface, to the minute, in UTC."""
+    return "-" if time is None else time[:16].replace("T", " ")
+
+
+def state_of(campaign: Document) -> str:
+    """Whether figures use a campaign and, where not, why."""
+    if campaign["state"] == "withdrawn":
+        return f"withdrawn: {campaign['withdraw_reason']}"
+    if campaign["state"] == "corrected":
+        return f"corrected by {campaign['corrected_by']}"
+    return "in use"

@@ -1,0 +1,133 @@
+"""The commands that read what the service keeps: campaigns, skins and history."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import typer
+
+from underskin.cli.documents import AsJson, Document, moment, state_of, write_json, write_rows
+from underskin.cli.store import LOCAL, KeyOption, Url, connect
+from underskin.findings.formatting import significant
+
+State = Literal["current", "corrected", "withdrawn", "all"]
+
+
+def campaigns(
+    campaign: Annotated[str | None, typer.Argument(help="One campaign, with its recordings and diagnoses.")] = None,
+    skin: Annotated[str | None, typer.Option(help="Only those of this skin and of those joined to it.")] = None,
+    state: Annotated[State, typer.Option(help="Only those in this state.")] = "current",
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """Campaigns that the service keeps, the latest arrival first, or one of them with its recordings."""
+    with connect(url, key) as client:
+        if campaign is not None:
+            detail = client.campaigns.get(campaign)
+            diagnoses = list(client.diagnoses.all(campaign=campaign))
+            if json:
+                write_json({**detail, "diagnoses": diagnoses})
+            else:
+                _show(detail, diagnoses)
+            return
+        if skin is not None:
+            client.skins.get(skin)  # one that does not exist has no campaigns either, and is a slip
+        entries = list(client.campaigns.all(skin=skin, state=state))
+    if json:
+        write_json(entries)
+    else:
+        write_rows(("campaign", "skin", "name", "recorded (UTC)", "recordings", "state"), map(_row, entries))
+
+
+def skins(json: AsJson = False, url: Url = LOCAL, key: KeyOption = None) -> None:
+    """Skins that the service keeps, by id."""
+    with connect(url, key) as client:
+        entries = list(client.skins.all())
+    if json:
+        write_json(entries)
+    else:
+        rows = ((entry["id"], moment(entry["created_at"]), str(entry["campaigns"])) for entry in entries)
+        write_rows(("skin", "since (UTC)", "campaigns"), rows)
+
+
+def history(
+    skin: Annotated[str, typer.Argument(help="The skin.")],
+    model: Annotated[
+        Literal["paper", "adopted"], typer.Option(help="`adopted`: d33 by the model in force of the skin.")
+    ] = "paper",
+    json: AsJson = False,
+    url: Url = LOCAL,
+    key: KeyOption = None,
+) -> None:
+    """The d33 of each sensor of a skin over time, its trend, and what is left out."""
+    with connect(url, key) as client:
+        found = client.skins.history(skin, model=model)
+    if json:
+        write_json(found)
+        return
+    points = [(sensor["sensor"], point) for sensor in found["sensors"] for point in sensor["points"]]
+    headings = ("sensor", "time (UTC)", "d33 pC/N", "±", "campaign")
+    write_rows(headings, (_point(sensor, point) for sensor, point in points))
+    trends = [(sensor["sensor"], _trend(sensor)) for sensor in found["sensors"]]
+    write_rows(("sensor", "trend"), trends)
+    for left in found["left_out_campaigns"]:
+        typer.echo(f"left out: campaign {left['campaign_id']}: {left['reason']}")
+    for left in found["left_out_points"]:
+        typer.echo(f"left out: sensor {left['sensor']} of campaign {left['campaign_id']}: {left['reason']}")
+    for left in found["left_out_recordings"]:
+        typer.echo(f"left out: recording {left['recording']} of campaign {left['campaign_id']}: {left['reason']}")
+
+
+def _row(entry: Document) -> tuple[str, ...]:
+    excluded = f" − {entry['excluded']}" if entry["excluded"] else ""
+    recorded = moment(entry["recorded_at"] or entry["received_at"])
+    return entry["id"], entry["skin_id"], entry["name"], recorded, f"{entry['recordings']}{excluded}", state_of(entry)
+
+
+def _show(detail: Document, diagnoses: Sequence[Document]) -> None:
+    write_rows(("campaign", "skin", "name", "recorded (UTC)", "recordings", "state"), [_row(detail)])
+    write_rows(
+        ("recording", "kind", "sensor", "recorded (UTC)", "state"),
+        (
+            (
+                entry["id"],
+                entry["kind"],
+                entry["sensor"] or "-",
+                moment(entry["recorded_at"]),
+                "in use" if entry["excluded_at"] is None else f"excluded: {entry['exclude_reason']}",
+            )
+            for entry in detail["entries"]
+        ),
+    )
+    if diagnoses:
+        write_rows(
+            ("diagnosis", "asked (UTC)", "state", "verdict"),
+            ((one["id"], moment(one["asked_at"]), one["state"], one["verdict"] or "-") for one in diagnoses),
+        )
+    for entry in detail["refused"]:
+        for error in entry["errors"]:
+            typer.echo(f"refused: {entry['id']} {error['field']}: {error['allowed']}")
+    for note in detail["notes"]:
+        typer.echo(note)
+
+
+def _point(sensor: str, point: Document) -> tuple[str, ...]:
+    value, uncertainty = point["d33_pc_per_n"], point["d33_uncertainty_pc_per_n"]
+    timed = "" if point["time_is"] == "recorded" else point["time_is"]
+    return (
+        sensor,
+        moment(point["time"]),
+        timed,
+        significant(value, 4),
+        significant(uncertainty, 2),
+        point["campaign_id"],
+    )
+
+
+def _trend(sensor: Document) -> str:
+    trend = sensor["trend"]
+    if trend is None:
+        return f"none: {sensor['no_trend']}"
+    slope, uncertainty = trend["slope_pc_per_n_per_year"], trend["slope_uncertainty_pc_per_n_per_year"]
+    weight = "significant" if trend["significant"] else "not significant"
+    return f"{significant(slope, 2)} ± {significant(uncertainty, 1)} pC/N a year, {weight}"

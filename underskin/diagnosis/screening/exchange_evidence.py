@@ -1,0 +1,88 @@
+"""How probable the levels of recordings are with two sensors exchanged from some recording on, and without.
+
+A recording's level is
+    y_i = d S_i(e) + N(0, (s d S_i)² + (p d |∂S_i/∂place|)² + (f d max S)²),
+with S_i the response of the sensor that is taken to have answered, e the vector by which all contacts miss their
+places, s what sensors, scatter and unnamed physics make of a level, p the scatter of places, and f what reaches a
+sensor that is pressed nowhere near (its neighbours' charge). With probability ε a level is anything up to twice the
+largest. The evidence is averaged over e, d, s, p and f, and over the recordings from which on the sensors may be
+exchanged: one half for all of them, the other half evenly over the later ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import log
+
+import numpy as np
+from scipy.special import logsumexp
+
+from underskin.diagnosis.screening.displaced_response import DisplacedResponse, displaced_response
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import SkinDescription
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, Indices
+
+_ASTRAY = 1e-5  # ε
+_DISTANCES_MM, _DIRECTIONS, _MISS_MM = (0.3, 0.7, 1.2, 1.8), 8, 0.7  # of e, and its prior standard deviation
+_FREE = np.array(  # d over the usual one, s, p [mm], f
+    [*product(np.exp(np.linspace(-0.6, 0.6, 9)), (0.05, 0.12, 0.3), (0.05, 0.3), (0.02, 0.1))]
+)
+
+
+@dataclass(frozen=True)
+class Start:
+    """From which of the pair's recordings on, in time, two sensors are exchanged, and by how much ln evidence gains."""
+
+    first: int
+    gain: float
+
+
+class ExchangeEvidence:
+    """The evidence of exchanges among the sensors of a campaign."""
+
+    def __init__(
+        self, skin: SkinDescription, entries: Sequence[FrfRecording], level: Floats, largest: float, table: SigmaTable
+    ) -> None:
+        """Work out the evidence as given; `level` (recordings,) over the usual one at the `largest` S [C/N]."""
+        self._skin, self._entries, self._table = skin, entries, table
+        angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+        around = np.column_stack([np.cos(angles), np.sin(angles)])
+        self._miss_mm = np.concatenate([np.zeros((1, 2)), *(distance * around for distance in _DISTANCES_MM)])
+        own = self._response(entries, [entry.sensor for entry in entries])
+        self._largest, self._level, self._own = largest, level, own
+        self._total = np.stack([self._density(own, self._level, at).sum(axis=-1) for at in range(len(self._miss_mm))])
+        self._total += self._prior[:, None]
+
+    def exchange(self, own: Indices, others: Sequence[str]) -> Start:
+        """The most probable start of an exchange; `own` are the pair's recordings in time, `others` the other sensor of
+        each."""
+        turned = self._response([self._entries[number] for number in own], others)
+        given = DisplacedResponse(self._own.value[:, own], self._own.slope[:, own])
+        level, evidence = self._level[own], np.full(len(own), -np.inf)
+        for at, total in enumerate(self._total):
+            change = self._density(turned, level, at) - self._density(given, level, at)
+            since = np.cumsum(change[:, ::-1], axis=1)[:, ::-1]
+            evidence = np.logaddexp(evidence, logsumexp(total[:, None] + since, axis=0))
+        prior = np.full(len(own), -log(2 * max(len(own) - 1, 1)))
+        prior[0] = -log(2)
+        weighed = evidence - logsumexp(self._total) + prior
+        return Start(int(np.argmax(weighed)), float(logsumexp(weighed)))
+
+    @property
+    def _prior(self) -> Floats:
+        """Of e but for a constant (displacements,), which stand for areas."""
+        distance = np.hypot(*self._miss_mm.T)
+        area = np.maximum(distance, _DISTANCES_MM[0] / 2)
+        return np.asarray(np.log(area) - distance**2 / (2 * _MISS_MM**2))
+
+    def _response(self, entries: Sequence[FrfRecording], sensors: Sequence[str]) -> DisplacedResponse:
+        return displaced_response(self._skin, entries, sensors, self._miss_mm, self._table)
+
+    def _density(self, response: DisplacedResponse, level: Floats, at: int) -> Floats:
+        """ln of that of each level under one displacement (d and noises, recordings)."""
+        d, s, p, f = _FREE.T[:, :, None]
+        value, slope = response.value[at] / self._largest, response.slope[at] / self._largest
+        variance = d**2 * ((s * value) ** 2 + (p * slope) ** 2 + f**2)
+        usual = np.exp(-0.5 * (level - d * value) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
+        return np.asarray(np.log((1 - _ASTRAY) * usual + 0.5 * _ASTRAY))
