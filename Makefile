@@ -7,8 +7,10 @@ TESTS  ?= tests
 # From Debian: the proxy with TLS, its certificate, and what runs the examples.
 TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 
-# What `make bench` measures against and `.venv` does not hold: each in an environment of its own.
+# What `.venv` cannot hold, each in an environment of its own: what `make bench` measures against, and what generates a
+# client in `make test`.
 PEERS = tesseract nanite
+GENERATOR = openapi-client
 
 # Two processes; the tests of one file stay in one of them, since they share servers.
 PYTEST = $(PYTHON) -m pytest --numprocesses 2 --dist loadfile
@@ -19,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help serve unit test check docs tables paper tour mechanisms proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour openapi mechanisms proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -30,11 +32,11 @@ serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 unit: $(VENV)/.dev ## run the quick tests, without server, browser or database (TESTS=...)
 	$(PYTEST) -m unit --durations 5 $(TESTS)
 
-test: $(VENV)/.dev ## run the tests at reduced counts (TESTS=tests/physics for some of them)
+test: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at reduced counts (TESTS=tests/physics for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
 	$(PYTEST) $(TESTS)
 
-soak: $(VENV)/.dev ## run the tests at full counts, the long ones included
+soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full counts, the long ones included
 	@scripts/system-packages.sh $(TEST_PACKAGES)
 	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS)
 
@@ -60,6 +62,10 @@ tour: $(VENV)/.dev ## regenerate docs/tour.md and its screenshots
 	@scripts/system-packages.sh chromium
 	$(PYTHON) -m docs.tour
 
+openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the client's typed answers
+	$(PYTHON) -m scripts.openapi_examples
+	$(PYTHON) -m scripts.client_documents
+
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
 
@@ -74,7 +80,7 @@ lock: $(VENV)/.dev ## resolve pyproject.toml into the lock files
 	scripts/lock.sh $(PYTHON)
 
 clean: ## remove the environment and all caches
-	rm -rf $(VENV) $(PEERS:%=$(VENV)-%) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(PEERS:%=$(VENV)-%) $(VENV)-$(GENERATOR) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV)/.created: scripts/make-venv.sh
@@ -96,6 +102,6 @@ $(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
 
 $(VENV)-%/.installed: requirements-%.lock
 	@scripts/make-venv.sh $(VENV)-$*
-	@echo "Installing $*, a peer to measure against, into $(VENV)-$* ..."
+	@echo "Installing $* into $(VENV)-$* ..."
 	@$(VENV)-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
 	@touch $@

@@ -15,7 +15,7 @@ compile() { # OUTPUT ARGUMENT...
 compile requirements.lock pyproject.toml --extra server --extra fem --group build
 # The same versions, and everything that tests, checks, documents and measures.
 compile requirements-dev.lock pyproject.toml --all-extras --group build --constraint requirements.lock
-# Peers of `make bench`, each in an environment of its own.
-for peer in tesseract nanite; do
-    compile "requirements-$peer.lock" --group "$peer"
+# What is installed in an environment of its own: a generator of clients for the tests, peers of `make bench`.
+for group in openapi-client tesseract nanite; do
+    compile "requirements-$group.lock" --group "$group"
 done

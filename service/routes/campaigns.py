@@ -27,7 +27,8 @@ router = APIRouter(prefix="/v1", tags=["campaigns"], route_class=JsonRoute)
 
 
 _FILE: dict[str, Any] = {"schema": {"type": "string", "format": "binary"}}
-_EXAMPLE: dict[str, Any] = {
+_CAMPAIGN: dict[str, Any] = {"$ref": "#/components/schemas/Campaign"}
+EXAMPLE: dict[str, Any] = {
     "schema": "campaign/1",
     "name": "first day",
     "skin": {
@@ -40,16 +41,17 @@ _EXAMPLE: dict[str, Any] = {
     },
     "recordings": [
         {
-            "id": "r1",
+            "id": name,
             "sensor": "s01",
             "indenter_radius_mm": 4.0,
-            "preload_n": 1.0,
+            "preload_n": preload,
             "dynamic_force_n": 0.09,
             "recorded_at": "2017-05-03T09:00:00Z",
             "frequency_hz": [10.0, 20.0, 40.0],
-            "frf_re_pc_per_n": [7.1, 7.0, 7.0],
+            "frf_re_pc_per_n": lines,
             "frf_im_pc_per_n": [0.1, 0.0, 0.0],
         }
+        for name, preload, lines in (("r1", 1.0, [7.1, 7.0, 7.0]), ("r2", 2.0, [6.8, 6.7, 6.7]))
     ],
 }
 _BODY: dict[str, Any] = {
@@ -60,8 +62,14 @@ _BODY: dict[str, Any] = {
         "channels are. What the query says may be fields of the form instead; what both say must be the same. "
         "Other fields that are no files are refused.",
         "content": {
-            "application/json": {"schema": {"type": "object", "description": "campaign/1"}, "example": _EXAMPLE},
-            "application/octet-stream": {**_FILE, "example": orjson.dumps(_EXAMPLE).decode()},
+            "application/json": {
+                "schema": {
+                    "anyOf": [_CAMPAIGN, {"type": "array", "items": _CAMPAIGN, "minItems": 1}],
+                    "description": "One campaign, or a list of them.",
+                },
+                "example": EXAMPLE,
+            },
+            "application/octet-stream": {**_FILE, "example": orjson.dumps(EXAMPLE).decode()},
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
@@ -76,7 +84,8 @@ _BODY: dict[str, Any] = {
                         **models.SendOptions.model_json_schema()["properties"],
                     },
                     "additionalProperties": {**_FILE["schema"], "description": "More files, by any other names."},
-                }
+                },
+                "example": {FILE: [orjson.dumps(EXAMPLE).decode()], "together": "palm 3 on Monday"},
             },
         },
     }
@@ -165,7 +174,7 @@ def one(campaign_id: CampaignId, store: Store) -> models.CampaignDetail:
     responses={
         200: {
             "content": {
-                "application/json": {"schema": {"type": "object", "description": "campaign/1"}},
+                "application/json": {"schema": _CAMPAIGN},
                 "application/x-hdf5": _FILE,
             }
         }

@@ -71,7 +71,7 @@ def add_columns_route(
         tags=[path[1:]],
         summary=summary,
         responses={200: {"model": answer_kind, "content": OTHER_ANSWERS}},
-        openapi_extra=described_body(kind.model_json_schema(), example, **others),
+        openapi_extra=described_body(kind.__name__, example, **others),
     )(endpoint)
 
 
@@ -92,8 +92,9 @@ async def _in_thread(work: Callable[[], Response]) -> Response:
         return await asyncio.to_thread(work)
 
 
-def described_body(schema: dict[str, Any], example: dict[str, Any], **others: dict[str, Any]) -> dict[str, Any]:
-    """OpenAPI's description of a JSON body that a route reads itself; `others`: by media type."""
+def described_body(component: str, example: dict[str, Any], **others: dict[str, Any]) -> dict[str, Any]:
+    """OpenAPI's description of a JSON body that a route reads itself, by its schema's name; `others`: by media type."""
+    schema = {"$ref": f"#/components/schemas/{component}"}
     return {
         "requestBody": {
             "required": True,

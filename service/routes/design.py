@@ -28,7 +28,7 @@ EXAMPLE = {
     operation_id="design",
     summary="A skin before it is built",
     responses={200: {"model": DesignAnswer}},
-    openapi_extra=described_body(DesignRequest.model_json_schema(), EXAMPLE),
+    openapi_extra=described_body(DesignRequest.__name__, EXAMPLE),
 )
 async def post(request: Request, table: Table) -> Response:
     """How much of a load reaches a sensor, how finely the array tells where it is, and how far apart two loads must be.

@@ -17,7 +17,7 @@ from underskin.mechanisms.declared.document import LARGEST_BYTES
 
 router = APIRouter(prefix="/v1", tags=["mechanisms"])
 
-_EXAMPLE: dict[str, Any] = {
+EXAMPLE: dict[str, Any] = {
     "schema": "mechanism/1",
     "name": "loose_cable",
     "description": "A cable that comes loose takes its share of the charge from some recording on.",
@@ -39,7 +39,7 @@ _BODY: dict[str, Any] = {
         "content": {
             "application/yaml": {
                 "schema": _TEXT,
-                "example": yaml.safe_dump({**_EXAMPLE, "name": "loose_plug"}, sort_keys=False),
+                "example": yaml.safe_dump({**EXAMPLE, "name": "loose_plug"}, sort_keys=False),
             },
             "application/json": {
                 "schema": {
@@ -52,7 +52,7 @@ _BODY: dict[str, Any] = {
                         "schema": {**_TEXT, "description": "`mechanism/1`."},
                     },
                 },
-                "example": _EXAMPLE,
+                "example": EXAMPLE,
             },
         },
     }

@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 
 from service.routes.columns_endpoint import OTHER_ANSWERS, Accept, answer_json, described_body, respond
-from service.schemas.stress import StressAnswer
+from service.schemas.stress import StressAnswer, StressRequest
 from service.usecases import stress as usecase
 from service.usecases.tables import influence_table
 from underskin.array_stress.request import read_request
@@ -33,7 +33,7 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": StressAnswer, "conten
     operation_id="stress",
     summary="Charge on every sensor of an array",
     responses=_ANSWER,
-    openapi_extra=described_body({"$ref": "#/components/schemas/StressRequest"}, EXAMPLE),
+    openapi_extra=described_body(StressRequest.__name__, EXAMPLE),
 )
 async def stress(request: Request, accept: Accept = "application/json") -> Response:
     """Linear superposition over all loads: off-centre, several, sheared, ν < 0.5, a yielding glue line."""

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, WithJsonSchema
 
 from service.problems import validated
 from underskin.errors import ErrorCode, conflicting
@@ -133,7 +133,9 @@ class RecordingEntry(BaseModel):
 class CampaignDetail(CampaignEntry):
     """A campaign and its recordings, without their arrays."""
 
-    skin: dict[str, Any] = Field(description="The skin as the campaign declares it.")
+    skin: Annotated[dict[str, Any], WithJsonSchema({"allOf": [{"$ref": "#/components/schemas/Skin"}]})] = Field(
+        description="The skin as the campaign declares it."
+    )
     entries: list[RecordingEntry] = Field(description="Its recordings.")
     refused: list[RecordingResult] = Field(description="Recordings that were sent with it and not kept.")
     notes: list[str] = Field(description="What its reader remarked.")

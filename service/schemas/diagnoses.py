@@ -4,10 +4,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
+from service.schemas.described import DescribedBy
+from service.schemas.report import Report, ReportMechanism, Verdict
+from service.schemas.report_fit import Fit, Provenance
+
 State = Literal["queued", "running", "done", "failed", "cancelled"]
 DiagnosisKind = Literal["campaign", "skin", "fleet"]
-Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
-
 
 MOST_TOGETHER = 200  # campaigns of one diagnosis
 FEWEST_SKINS = 3  # of a fleet
@@ -94,7 +96,7 @@ class DiagnosisEntry(Asked):
 class Diagnosis(DiagnosisEntry):
     """A diagnosis and its report."""
 
-    report: dict[str, Any] | None = Field(description="`report/1`, once it is done.")
+    report: Annotated[dict[str, Any], DescribedBy(Report)] | None = Field(description="`report/1`, once it is done.")
 
 
 class DiagnosisList(BaseModel):
@@ -136,11 +138,17 @@ class ModelEntry(ModelVersion):
     outdated: str | None = Field(
         description="Why it serves no figures: its campaign was changed after the diagnosis; null where it serves."
     )
-    mechanisms: list[dict[str, Any]] = Field(description="Names, probabilities and parameters, as in `report/1`.")
+    mechanisms: list[Annotated[dict[str, Any], DescribedBy(ReportMechanism)]] = Field(
+        description="Names, probabilities and parameters, as in `report/1`."
+    )
     probability: float = Field(description="The report's probability of what it states.")
     statement: str = Field(description="The report's statement.")
-    fit: dict[str, Any] = Field(description="How well the recordings are fitted before and after, as in `report/1`.")
-    provenance: dict[str, Any] = Field(description="Versions, hashes of tables and seed, as in `report/1`.")
+    fit: Annotated[dict[str, Any], DescribedBy(Fit)] = Field(
+        description="How well the recordings are fitted before and after, as in `report/1`."
+    )
+    provenance: Annotated[dict[str, Any], DescribedBy(Provenance)] = Field(
+        description="Versions, hashes of tables and seed, as in `report/1`."
+    )
     needs: list[str] = Field(description="What `/v1/frf` and `/v1/d33` must be told beside what every skin needs.")
     depends_on_frequency: bool = Field(description="Whether they must be told `frequency_hz` too.")
 

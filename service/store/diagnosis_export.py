@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field, StringConstraints
 from sqlalchemy import Connection, Table, insert, select
 
-from service.schemas.diagnoses import DiagnosisKind, Verdict
+from service.schemas.diagnoses import DiagnosisKind
+from service.schemas.report import Verdict
 from service.store import diagnosed_together, skins
 from service.store.codec import compressed, decompressed
 from service.store.diagnosed_together import Member, Together

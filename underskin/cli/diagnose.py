@@ -242,7 +242,7 @@ def _of_store(
 def _start(client: "Client", campaign: str, without: Sequence[str]) -> str | _Outcome:
     """The id of the diagnosis."""
     try:
-        return str(client.diagnoses.start(campaign, without=without)["id"])
+        return client.diagnoses.start(campaign, without=without).id
     except UnderskinError as error:
         return _Outcome(campaign, f"{campaign}: {error}")
 
@@ -253,13 +253,13 @@ def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, 
         finished = client.diagnoses.wait(diagnosis)
     except UnderskinError as error:
         return _Outcome(campaign, f"{campaign}: {error}")
-    document = finished["report"]
-    if document is None:
-        return _Outcome(campaign, f"{campaign}: {finished['state']}: {finished['reason'] or 'no report'}")
+    if finished.report is None:
+        return _Outcome(campaign, f"{campaign}: {finished.state}: {finished.reason or 'no report'}")
+    document = dict(finished.report)
     write_report(document, output_dir / f"{campaign}.json")
     if html:
         write_page(document, output_dir / f"{campaign}.html")
-    return _Outcome(campaign, verdict=str(document["verdict"]))
+    return _Outcome(campaign, verdict=finished.report.verdict)
 
 
 def plan(

@@ -13,7 +13,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Write JSON, with the field
 
 def write_json(document: Any) -> None:
     """A document, or a list of them."""
-    typer.echo(json.dumps(document, ensure_ascii=False, indent=1))
+    typer.echo(json.dumps(document, default=dict, ensure_ascii=False, indent=1))
 
 
 def write_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:

@@ -9,6 +9,7 @@ from underskin.errors import UnderskinError
 from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
+    from underskin.client.campaigns import SentFile
     from underskin.client.service_client import Client
 
 Line = tuple[bool, str]  # whether it is good news, and the words
@@ -34,7 +35,7 @@ def sent(
     return [line for result in results for line in outcome(client, result)]
 
 
-def results_of(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list[dict[str, Any]]:
+def results_of(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list["SentFile"]:
     """What the service answers to files, the same however often they are sent; raises UnderskinError, OSError."""
     from underskin.client.content_key import content_key
 

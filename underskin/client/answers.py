@@ -96,7 +96,7 @@ class StressAnswer(ServiceAnswer):
 
 @dataclass(frozen=True)
 class Adopted:
-    """The adopted model of a skin, and the columns that it may need (`client.skins.model(...)["needs"]`)."""
+    """The adopted model of a skin, and the columns that it may need (`client.skins.model(...).needs`)."""
 
     skin_id: str
     sensor: str | None = None

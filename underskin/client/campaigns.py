@@ -1,29 +1,46 @@
 """Campaigns and skins through the client: `client.campaigns` and `client.skins`.
 
-Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), as dictionaries.
+Answers are the documents of the HTTP interface (docs/store.md, /openapi.json): their fields are attributes with types,
+and as a mapping each is the JSON object itself (`underskin.client.documents`).
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 from uuid import uuid4
 
 import orjson
 
 from underskin.client.content_key import label_of
 from underskin.client.counted_file import CountedFile
+from underskin.client.documents.campaign_d33 import D33
+from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
+from underskin.client.documents.diagnoses import Asked, ModelEntry, ModelVersion
+from underskin.client.documents.document import Document
+from underskin.client.documents.skin_imports import Imported
+from underskin.client.documents.skins import History, SkinDetail, SkinEntry
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
 from underskin.recordings.frf.estimators import Estimator
 
-Document = dict[str, Any]
 ModelName = Literal["paper", "adopted"]
 Progress = Callable[[int], object]  # of bytes
 _TRIES = 3
 _path, _skin = partial(path_of, "campaigns"), partial(path_of, "skins")
+_Answer = TypeVar("_Answer")
+_Entry = TypeVar("_Entry", bound=Document)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SentFile(CampaignResult):
+    """What became of one campaign of files that were sent."""
+
+    repeated: bool
+    """Whether it had been stored before, under the same `idempotency_key`."""
 
 
 def _uncounted(_: int) -> None:
@@ -46,7 +63,7 @@ class Campaigns:
         all_or_nothing: bool = False,
         estimator: Estimator | None = None,
         idempotency_key: str | None = None,
-    ) -> Document:
+    ) -> CampaignResult:
         """Send a campaign, or its document; the answer says of each recording whether it was accepted.
 
         `estimator`: how FRFs are estimated from time series, whatever the campaign says.
@@ -59,9 +76,12 @@ class Campaigns:
         said = {"corrects": corrects, "reason": reason, "estimator": estimator}
         query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
         headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency_key or uuid4().hex}
-        return self._again(
-            lambda: self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
-        )
+
+        def send() -> CampaignResult:
+            answer = self._session.json("POST", "/v1/campaigns", **query, headers=headers, content=content)
+            return CampaignResult.of(answer)
+
+        return _again(send)
 
     def post_files(
         self,
@@ -76,13 +96,12 @@ class Campaigns:
         estimator: Estimator | None = None,
         idempotency_key: str | None = None,
         progress: Progress = _uncounted,
-    ) -> list[Document]:
+    ) -> list[SentFile]:
         """Send files as instruments write them; one entry a campaign. `rig` describes their channels.
 
-        `repeated` of an entry says whether it had been stored before, under the same `idempotency_key`. `together`
-        joins the files, for instance one file for each press, into one campaign of that name. `estimator` is how FRFs
-        are estimated from time series, whatever the files or the rig say. `progress` is called with the bytes of each
-        part that was read to be sent, less than 0 where a request begins anew.
+        `together` joins the files, for instance one file for each press, into one campaign of that name. `estimator` is
+        how FRFs are estimated from time series, whatever the files or the rig say. `progress` is called with the bytes
+        of each part that was read to be sent, less than 0 where a request begins anew.
         """
         if not files:
             raise too_few("files", [], "must name at least one file")
@@ -90,7 +109,7 @@ class Campaigns:
         said = {"corrects": corrects, "reason": reason, "together": together, "estimator": estimator}
         query = query_of(skin=skin, all_or_nothing=all_or_nothing, **said)
 
-        def send() -> Document:
+        def send() -> list[SentFile]:
             with ExitStack() as opened:
                 sources = [("file", Path(file), progress) for file in files]
                 sources += [] if rig is None else [("rig", Path(rig), _uncounted)]
@@ -102,9 +121,9 @@ class Campaigns:
                     "POST", "/v1/campaigns", **query, headers=headers, files=parts
                 )
             repeated = "Idempotency-Replayed" in received
-            return {"campaigns": [{**entry, "repeated": repeated} for entry in answer["campaigns"]]}
+            return [SentFile.of({**entry, "repeated": repeated}) for entry in answer["campaigns"]]
 
-        return list(self._again(send)["campaigns"])
+        return _again(send)
 
     def all(
         self,
@@ -114,45 +133,34 @@ class Campaigns:
         name_contains: str | None = None,
         recorded_from: str | None = None,
         recorded_to: str | None = None,
-    ) -> Iterator[Document]:
+    ) -> Iterator[CampaignEntry]:
         """Campaigns, the latest arrival first, without their recordings."""
         filters = {"skin": skin, "name_contains": name_contains, "state": state}
         moments = {"recorded_from": recorded_from, "recorded_to": recorded_to}
-        yield from pages(self._session, "/v1/campaigns", "campaigns", **filters, **moments)
+        yield from pages(CampaignEntry, self._session, "/v1/campaigns", "campaigns", **filters, **moments)
 
-    def get(self, campaign_id: str) -> Document:
+    def get(self, campaign_id: str) -> CampaignDetail:
         """A campaign and its recordings, without their arrays."""
-        return self._session.json("GET", _path(campaign_id))
+        return CampaignDetail.of(self._session.json("GET", _path(campaign_id)))
 
     def load(self, campaign_id: str) -> Campaign:
         """A campaign as it was sent, with its arrays."""
         return parse(self._session.json("GET", _path(campaign_id, "document")))
 
-    def d33(
-        self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper"
-    ) -> Document:
+    def d33(self, campaign_id: str, band_hz: tuple[float, float] | None = None, *, model: ModelName = "paper") -> D33:
         """d33 by sensor, indenter and preload, over the flat zone or a given band, and what is left out."""
         low, high = (None, None) if band_hz is None else band_hz
         query = query_of(band_low_hz=low, band_high_hz=high, model=model)
-        return self._session.json("GET", _path(campaign_id, "d33"), **query)
+        return D33.of(self._session.json("GET", _path(campaign_id, "d33"), **query))
 
-    def withdraw(self, campaign_id: str, reason: str) -> Document:
+    def withdraw(self, campaign_id: str, reason: str) -> CampaignDetail:
         """Exclude a campaign from all results; it can still be read."""
-        return self._session.json("POST", _path(campaign_id, "withdraw"), json={"reason": reason})
+        return CampaignDetail.of(self._session.json("POST", _path(campaign_id, "withdraw"), json={"reason": reason}))
 
-    def exclude(self, campaign_id: str, recording: str, reason: str) -> Document:
+    def exclude(self, campaign_id: str, recording: str, reason: str) -> CampaignDetail:
         """Exclude a recording from all results; it can still be read."""
         body = {"recording": recording, "reason": reason}
-        return self._session.json("POST", _path(campaign_id, "exclusions"), json=body)
-
-    def _again(self, send: Callable[[], Document]) -> Document:
-        """Repeat a request, under its one Idempotency-Key, until an answer comes; three times at most."""
-        for _ in range(_TRIES - 1):
-            try:
-                return send()
-            except Unreachable:
-                continue
-        return send()
+        return CampaignDetail.of(self._session.json("POST", _path(campaign_id, "exclusions"), json=body))
 
 
 class Skins:
@@ -161,21 +169,22 @@ class Skins:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def all(self, *, id_contains: str | None = None) -> Iterator[Document]:
+    def all(self, *, id_contains: str | None = None) -> Iterator[SkinEntry]:
         """Skins by id."""
-        yield from pages(self._session, "/v1/skins", "skins", id_contains=id_contains)
+        yield from pages(SkinEntry, self._session, "/v1/skins", "skins", id_contains=id_contains)
 
-    def get(self, skin_id: str) -> Document:
+    def get(self, skin_id: str) -> SkinDetail:
         """A skin, and the skins that were joined to it."""
-        return self._session.json("GET", _skin(skin_id))
+        return SkinDetail.of(self._session.json("GET", _skin(skin_id)))
 
-    def join(self, skin_id: str, other: str, reason: str) -> Document:
+    def join(self, skin_id: str, other: str, reason: str) -> SkinDetail:
         """Count the skin `other` as `skin_id` from now on."""
-        return self._session.json("POST", _skin(skin_id, "join"), json={"skin_id": other, "reason": reason})
+        body = {"skin_id": other, "reason": reason}
+        return SkinDetail.of(self._session.json("POST", _skin(skin_id, "join"), json=body))
 
-    def history(self, skin_id: str, *, model: ModelName = "paper") -> Document:
+    def history(self, skin_id: str, *, model: ModelName = "paper") -> History:
         """d33 of each sensor over time, its trend, and what is left out."""
-        return self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model))
+        return History.of(self._session.json("GET", _skin(skin_id, "history"), **query_of(model=model)))
 
     def diagnose(
         self,
@@ -184,7 +193,7 @@ class Skins:
         name: str | None = None,
         *,
         without: Sequence[str] = (),
-    ) -> Document:
+    ) -> Asked:
         """Start one diagnosis of several campaigns of the skin together; its `id` and `state`.
 
         Without `campaigns` it is of all that are in use. `name` is what the report is called, without one the skin's
@@ -192,23 +201,24 @@ class Skins:
         with the diagnosis that there is.
         """
         given = {"campaigns": None if campaigns is None else list(campaigns), "name": name, "without": list(without)}
-        return self._session.json("POST", _skin(skin_id, "diagnosis"), json=given)
+        return Asked.of(self._session.json("POST", _skin(skin_id, "diagnosis"), json=given))
 
-    def adopt(self, skin_id: str, diagnosis_id: str) -> Document:
+    def adopt(self, skin_id: str, diagnosis_id: str) -> ModelEntry:
         """Adopt the model of an explained diagnosis for the skin; requests with the model `adopted` use it."""
-        return self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id})
+        return ModelEntry.of(self._session.json("POST", _skin(skin_id, "model"), json={"diagnosis_id": diagnosis_id}))
 
-    def withdraw_model(self, skin_id: str, reason: str) -> Document:
+    def withdraw_model(self, skin_id: str, reason: str) -> ModelVersion:
         """Withdraw the adopted model; its version stays on record with date and reason."""
-        return self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason))
+        return ModelVersion.of(self._session.json("DELETE", _skin(skin_id, "model"), **query_of(reason=reason)))
 
-    def model(self, skin_id: str) -> Document:
+    def model(self, skin_id: str) -> ModelEntry:
         """The model in force, with the campaign and the evidence that it comes from."""
-        return self._session.json("GET", _skin(skin_id, "model"))
+        return ModelEntry.of(self._session.json("GET", _skin(skin_id, "model")))
 
-    def models(self, skin_id: str) -> list[Document]:
+    def models(self, skin_id: str) -> list[ModelEntry]:
         """All models that the skin ever had, the latest adoption first."""
-        return list(self._session.json("GET", _skin(skin_id, "model", "versions"))["models"])
+        answer = self._session.json("GET", _skin(skin_id, "model", "versions"))
+        return [ModelEntry.of(entry) for entry in answer["models"]]
 
     def export(self, skin_id: str, file: str | Path, progress: Progress = _uncounted) -> None:
         """Write everything stored of a skin into one HDF5 file; `progress` is called with the bytes of each chunk."""
@@ -222,11 +232,11 @@ class Skins:
         finally:
             part.unlink(missing_ok=True)
 
-    def load(self, file: str | Path, progress: Progress = _uncounted) -> Document:
+    def load(self, file: str | Path, progress: Progress = _uncounted) -> Imported:
         """Import a file that `export` wrote; `progress` is called with the bytes of each part that is sent."""
         headers = {"Content-Type": "application/octet-stream"}
         with CountedFile(Path(file), progress) as source:
-            return self._session.json("POST", "/v1/skins/import", headers=headers, content=source)
+            return Imported.of(self._session.json("POST", "/v1/skins/import", headers=headers, content=source))
 
 
 def query_of(**given: Any) -> dict[str, dict[str, Any]]:
@@ -234,12 +244,22 @@ def query_of(**given: Any) -> dict[str, dict[str, Any]]:
     return {"params": {name: value for name, value in given.items() if value is not None}}
 
 
-def pages(session: Session, path: str, noun: str, **filters: str | None) -> Iterator[Document]:
+def _again(send: Callable[[], _Answer]) -> _Answer:
+    """Repeat a request, under its one Idempotency-Key, until an answer comes; three times at most."""
+    for _ in range(_TRIES - 1):
+        try:
+            return send()
+        except Unreachable:
+            continue
+    return send()
+
+
+def pages(kind: type[_Entry], session: Session, path: str, noun: str, /, **filters: str | None) -> Iterator[_Entry]:
     """The entries of a list, page after page."""
     cursor: str | None = None
     while True:
         page = session.json("GET", path, **query_of(limit=200, cursor=cursor, **filters))
-        yield from page[noun]
+        yield from map(kind.of, page[noun])
         cursor = page["next"]
         if cursor is None:
             return

@@ -1,15 +1,16 @@
 """Diagnoses through the client: `client.diagnoses`.
 
     started = client.diagnoses.start(campaign_id)
-    report = client.diagnoses.wait(started["id"], progress=print)["report"]
+    report = client.diagnoses.wait(started.id, progress=print).report
 
-Answers are the documents of the HTTP interface (docs/store.md, /openapi.json), as dictionaries.
+Answers are the documents of the HTTP interface (docs/store.md, /openapi.json); see `underskin.client.documents`.
 """
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 
-from underskin.client.campaigns import Document, pages
+from underskin.client.campaigns import pages
+from underskin.client.documents.diagnoses import Asked, Diagnosis, DiagnosisEntry
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable
 
@@ -23,17 +24,17 @@ class Diagnoses:
     def __init__(self, session: Session) -> None:
         self._session = session
 
-    def start(self, campaign_id: str, *, without: Sequence[str] = ()) -> Document:
+    def start(self, campaign_id: str, *, without: Sequence[str] = ()) -> Asked:
         """Start a diagnosis; its `id` and `state`. A campaign that was diagnosed as it is now is `done` at once.
 
         `without`: mechanisms to leave out of the catalogue, "suppose that it is not these".
         """
         body = {"json": {"without": list(without)}} if without else {}
-        return self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"), **body)
+        return Asked.of(self._session.json("POST", path_of("campaigns", campaign_id, "diagnosis"), **body))
 
-    def get(self, diagnosis_id: str) -> Document:
+    def get(self, diagnosis_id: str) -> Diagnosis:
         """A diagnosis: its `state` and `progress` and, once it is done, its `report`."""
-        return self._session.json("GET", path_of("diagnoses", diagnosis_id))
+        return Diagnosis.of(self._session.json("GET", path_of("diagnoses", diagnosis_id)))
 
     def all(
         self,
@@ -42,14 +43,14 @@ class Diagnoses:
         skin: str | None = None,
         state: str | None = None,
         kind: str | None = None,
-    ) -> Iterator[Document]:
+    ) -> Iterator[DiagnosisEntry]:
         """Diagnoses, the latest first, without their reports; `kind`: `campaign`, `skin` or `fleet`."""
         filters = {"campaign": campaign, "skin": skin, "state": state, "kind": kind}
-        yield from pages(self._session, "/v1/diagnoses", "diagnoses", **filters)
+        yield from pages(DiagnosisEntry, self._session, "/v1/diagnoses", "diagnoses", **filters)
 
     def wait(
         self, diagnosis_id: str, *, progress: Callable[[float], object] = lambda _: None, timeout: float | None = None
-    ) -> Document:
+    ) -> Diagnosis:
         """The diagnosis once it is done, has failed or was cancelled; `progress` is called with its progress, 0 to 1.
 
         A server that does not answer, for instance while it restarts, is tried again for a minute. Raises TimeoutError
@@ -60,8 +61,8 @@ class Diagnoses:
             try:
                 diagnosis = self.get(diagnosis_id)
                 answered_at = time.monotonic()
-                progress(diagnosis["progress"])
-                if diagnosis["state"] not in ("queued", "running"):
+                progress(diagnosis.progress)
+                if diagnosis.state not in ("queued", "running"):
                     return diagnosis
             except Unreachable:
                 if time.monotonic() - answered_at > _ANSWER_TIMEOUT_S:
@@ -70,6 +71,6 @@ class Diagnoses:
                 raise TimeoutError(f"diagnosis {diagnosis_id} is not done after {timeout:g} s; it goes on")
             time.sleep(_POLL_S)
 
-    def cancel(self, diagnosis_id: str) -> Document:
+    def cancel(self, diagnosis_id: str) -> DiagnosisEntry:
         """Cancel a diagnosis; raises ServiceError (409) if it is done or has failed."""
-        return self._session.json("DELETE", path_of("diagnoses", diagnosis_id))
+        return DiagnosisEntry.of(self._session.json("DELETE", path_of("diagnoses", diagnosis_id)))

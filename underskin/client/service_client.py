@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
+from underskin.client.documents.design import DesignAnswer
 from underskin.client.fleets import Fleets
 from underskin.client.http_session import Session
 from underskin.client.mechanisms import Mechanisms
@@ -126,9 +127,9 @@ class Client:
         values = {field.name: _field(field.name, document, single=False) for field in fields(answers.StressAnswer)}
         return answers.StressAnswer(**values | {"sensor": tuple(document["sensor"])})
 
-    def design(self, **fields: float) -> dict[str, Any]:
+    def design(self, **fields: float) -> DesignAnswer:
         """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
-        return self._request("POST", "/v1/design", fields)
+        return DesignAnswer.of(self._request("POST", "/v1/design", fields))
 
     def tables(self) -> tuple[answers.TableEntry, ...]:
         """The tables of the service: σ and influence, which answers are computed from, and contact, reference data."""

@@ -28,7 +28,8 @@ from underskin.units import Complexes, Floats
 SCHEMA = "campaign/1"
 
 
-def _estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # noqa: ARG001
+def read_estimator(name: str, value: Any, units_checked: bool) -> Estimator:  # noqa: ARG001
+    """How an FRF is estimated from a time series."""
     return checked_estimator(name, shown(value))
 
 
@@ -46,7 +47,7 @@ class FrfRecording(FrfConditions):
     sample_rate_hz: field.Positive | None = None
     force_n: field.Series | None = None
     charge_pc: field.Series | None = None
-    estimator: Annotated[Estimator, _estimator] | None = None
+    estimator: Annotated[Estimator, read_estimator] | None = None
 
     @classmethod
     def of_lines(
@@ -229,20 +230,20 @@ def _unmet_needs(
     return refused
 
 
-_LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
-_TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
+LINES = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
+TIME_SERIES = ("sample_rate_hz", "force_n", "charge_pc")
 
 
 def _not_one_of_two_forms(document: Mapping[str, Any]) -> list[InvalidInput]:
     """An FRF or the time series it is estimated from: one of the two, whole."""
-    series = [name for name in _TIME_SERIES if document.get(name) is not None]
-    lines = [name for name in (*_LINES, "coherence") if document.get(name) is not None]
+    series = [name for name in TIME_SERIES if document.get(name) is not None]
+    lines = [name for name in (*LINES, "coherence") if document.get(name) is not None]
     if document.get("estimator") is not None and not series:
         allowed = "must be absent where there is no time series"
         return [errors.conflicting("estimator", shown(document["estimator"]), allowed)]
     if series and lines:
         return [errors.conflicting(series[0], "given", "must be absent where the FRF itself is given")]
-    needed = _TIME_SERIES if series else _LINES
+    needed = TIME_SERIES if series else LINES
     return [errors.required(name) for name in needed if document.get(name) is None]
 
 

@@ -29,7 +29,8 @@ class Sensor:
     y_mm: field.Number
 
 
-def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
+def read_sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
+    """The sensors of an array, each with an id of its own."""
     if not isinstance(value, list | tuple):
         raise wrong_type(name, shown(value), "must be a list of sensors")
     sensors = [field.build(Sensor, f"{name}[{index}]", entry, units_checked) for index, entry in enumerate(value)]
@@ -41,7 +42,7 @@ def _sensors(name: str, value: Any, units_checked: bool) -> tuple[Sensor, ...]:
     return tuple(sensors)
 
 
-Sensors = Annotated[tuple[Sensor, ...], _sensors]
+Sensors = Annotated[tuple[Sensor, ...], read_sensors]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from underskin.errors import InvalidInput
 from underskin.recordings import validation
 from underskin.recordings.shown_values import named, shown
 
-_CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_MOST_CONDITIONS = 100
+CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+MOST_CONDITIONS = 100
 BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
     (
         *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
@@ -25,11 +25,11 @@ def further(field: str, value: Any, units_checked: bool) -> dict[str, float | st
     """What else a lab noted, by names of its own: numbers or short words; null where it was not noted."""
     document = validation.mapping(field, value)
     noted: dict[str, float | str] = {}
-    if len(document) > _MOST_CONDITIONS:
-        raise errors.out_of_range(field, len(document), f"must be at most {_MOST_CONDITIONS} columns")
+    if len(document) > MOST_CONDITIONS:
+        raise errors.out_of_range(field, len(document), f"must be at most {MOST_CONDITIONS} columns")
     for key, entry in document.items():
         place = f"{field}.{named(key)}"
-        if not isinstance(key, str) or not _CONDITION.fullmatch(key):
+        if not isinstance(key, str) or not CONDITION.fullmatch(key):
             raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
         if key in BUILT_IN_AXES:
             raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")

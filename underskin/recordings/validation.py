@@ -23,10 +23,10 @@ from underskin.units import Floats, checked
 BuiltModel = TypeVar("BuiltModel")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
 
-_LARGEST_COUNT = 2**53
-_FREQUENCIES_HZ = (1e-6, 1e9)
+LARGEST_COUNT = 2**53
+FREQUENCIES_HZ = (1e-6, 1e9)
 _MOST_UNKNOWN = 20  # unknown fields of one object that are listed; a document may hold millions
-_COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
+COHERENCE_ROUNDING = 1e-6  # single-precision instruments write 1.0000001
 
 
 def check_fields(
@@ -36,7 +36,7 @@ def check_fields(
 
     `model` is a dataclass; a field that has a default may be left out or null.
     """
-    known = _checks(model)
+    known = checks_of(model)
     refused = _unknown_fields(document, known, f"unknown field; known: {', '.join(known)}")
     values: dict[str, Any] = {}
     for name, (field_check, default) in known.items():
@@ -82,7 +82,7 @@ def build(model: type[BuiltModel], prefix: str, document: Any, units_checked: bo
 
 
 @cache
-def _checks(model: Any) -> dict[str, tuple[Check, Any]]:
+def checks_of(model: Any) -> dict[str, tuple[Check, Any]]:
     """Each field's check and default."""
     hints = get_type_hints(model, include_extras=True)
     return {field.name: (_annotated_check(hints[field.name]), field.default) for field in fields(model)}
@@ -154,8 +154,8 @@ def poisson_ratio(field: str, value: Any, units_checked: bool) -> float:  # noqa
 def count(field: str, value: Any, units_checked: bool) -> int:  # noqa: ARG001
     """A whole number, 0 to 2⁵³: as far as floats, and so JSON, hold every one."""
     result = number(field, value)
-    if result < 0 or not result.is_integer() or int(value) > _LARGEST_COUNT:
-        raise _wrong_type(field, value, f"must be a whole number, 0 to {_LARGEST_COUNT}")
+    if result < 0 or not result.is_integer() or int(value) > LARGEST_COUNT:
+        raise _wrong_type(field, value, f"must be a whole number, 0 to {LARGEST_COUNT}")
     return int(value)
 
 
@@ -213,7 +213,7 @@ def rows(field: str, value: Any, units_checked: bool) -> Floats:
 def frequencies(field: str, value: Any, units_checked: bool) -> Floats:
     """An increasing column of frequencies above 0, from far below to far above what any instrument records."""
     column = increasing(field, value, units_checked)
-    low, high = _FREQUENCIES_HZ
+    low, high = FREQUENCIES_HZ
     for bad, allowed in (
         (column <= 0, "must be greater than 0 (leave out the line at 0 Hz)"),
         ((column < low) | (column > high), f"must be {low:g} to {high:g} Hz"),
@@ -233,7 +233,7 @@ def not_falling(field: str, value: Any, units_checked: bool) -> Floats:
 def coherence(field: str, value: Any, units_checked: bool) -> Floats:
     """A column of coherences γ², 0 to 1."""
     column = series(field, value, units_checked)
-    bad = (column < 0) | (column > 1 + _COHERENCE_ROUNDING)
+    bad = (column < 0) | (column > 1 + COHERENCE_ROUNDING)
     _refuse_where(field, column, bad, "must be 0 to 1", ErrorCode.OUT_OF_RANGE)
     return column
 

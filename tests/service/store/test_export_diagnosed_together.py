@@ -12,6 +12,7 @@ import pytest
 from tests.support.diagnosed import finished, sent
 from tests.support.store_server import Server, campaign
 from underskin import Client
+from underskin.client.documents.diagnoses import Diagnosis
 
 Rows = list[dict[str, Any]]
 
@@ -41,7 +42,7 @@ def diagnosed_together(server: Server, client: Client) -> tuple[list[str], str]:
     return [one["id"] for one in own], fleet["id"]
 
 
-def told(client: Client, ids: list[str]) -> list[dict[str, Any]]:
+def told(client: Client, ids: list[str]) -> list[Diagnosis]:
     return [client.diagnoses.get(diagnosis_id) for diagnosis_id in ids]
 
 

@@ -1,0 +1,166 @@
+"""`report/1`, the result of a diagnosis, as OpenAPI describes it; `underskin.diagnosis.reporting` writes it.
+
+Reports are answered as they were kept and not validated again; tests hold them to these models. A field with a default
+is left out of reports that it says nothing of. Numbers that are not finite are null.
+"""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.schemas.report_fit import Fit, Parameter, Provenance, UnnamedLaw
+from service.schemas.report_several import Contradiction, KindParameter, Population, Scope, SensorLevel, SkinValue
+from underskin.findings.codes import FindingCode
+
+Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
+RecordingKind = Literal["frf", "indentation", "compression"]
+
+
+class LocatedAxis(BaseModel):
+    """Whether the misfit depends on one axis, such as the preload."""
+
+    axis: str = Field(description="A field of the campaign or of its `conditions`.", examples=["preload_n"])
+    p_value: float | None = Field(
+        description="Probability of so strong a dependence where there is none, over all axes; null where undecidable."
+    )
+    share_percent: float = Field(description="Share of the misfit that goes with this axis [%].")
+    undecidable: str | None = Field(default=None, description="Why it cannot be decided.")
+
+
+class Location(BaseModel):
+    """Where recordings and the paper's model differ."""
+
+    axes: list[LocatedAxis] = Field(description="One entry an axis that was looked at.")
+    region: dict[str, list[float | str | None]] = Field(
+        description="The smallest region that holds most of the misfit: by axis its ends, or words."
+    )
+    effect_percent: float | None = Field(description="By how much the charge differs there [%].")
+    effect_interval_percent: list[float | None] | None = Field(
+        default=None, description="Its 95 % interval, low and high [%]."
+    )
+    statement: str = Field(description="The same in words.")
+
+
+class ReportMechanism(BaseModel):
+    """A mechanism that the recordings ask for."""
+
+    name: str = Field(description="Its name in the catalogue.", examples=["contact_resonance"])
+    probability: float = Field(description="Posterior that it is there, 0 to 1.")
+    parameters: list[Parameter] = Field(description="How strong it is.")
+    explains_percent: float | None = Field(
+        description="Share of the misfit beyond noise that it takes away [%]; null where that says nothing."
+    )
+    scope: Scope | None = Field(default=None, description="Of several campaigns or skins: where it acts.")
+    statement: str | None = Field(default=None, description="What is to be known of it, in words.")
+
+
+class PresentGroup(BaseModel):
+    """Mechanisms that these recordings cannot tell apart."""
+
+    mechanisms: list[str] = Field(description="Their names.")
+    probability: float = Field(description="Posterior that at least one of them is there, 0 to 1.")
+
+
+class Alternative(BaseModel):
+    """Another answer than the one that leads."""
+
+    mechanisms: list[str] = Field(description="Names, or `nothing_missing`, or `none_of_these`.")
+    probability: float = Field(description="Its posterior, 0 to 1.")
+    why_not: str = Field(description="What speaks against it, in words.")
+
+
+class NotIdentifiable(BaseModel):
+    """A mechanism that these recordings cannot tell from something else."""
+
+    mechanism: str = Field(description="Its name.")
+    confounded_with: str = Field(description="What it looks like here: another mechanism, `d33` or `noise`.")
+    reason: str = Field(description="Why, in words.")
+
+
+class ReportFinding(BaseModel):
+    """Something that looks wrong in the data, or limits the answer."""
+
+    code: FindingCode = Field(description="The kind of finding; docs/findings.md explains each.")
+    recording: str = Field(description="Id of the recording; empty for the whole campaign.")
+    field: str = Field(description="The field that it is about.")
+    statement: str = Field(description="The finding in words.")
+
+
+class Power(BaseModel):
+    """What the campaign could have seen of a mechanism."""
+
+    mechanism: str = Field(description="Its name.")
+    smallest_visible_percent: float | None = Field(
+        description="The smallest change of the charge by which it would have been named [%]."
+    )
+
+
+class ReportD33(BaseModel):
+    """d33, averaged over the answers that remain, with their probabilities."""
+
+    name: Literal["d33"] | None = Field(default=None, description="What it is.")
+    unit: str | None = Field(default=None, description="Of the three numbers.", examples=["pC/N"])
+    value: float | None = Field(default=None, description="Its median.")
+    low: float | None = Field(default=None, description="Lower end of its 95 % interval.")
+    high: float | None = Field(default=None, description="Upper end of its 95 % interval.")
+    quotable: bool = Field(description="Whether one answer stands, fits to the noise, and nothing hidden moves d33.")
+    per_sensor: list[SensorLevel] | None = Field(
+        default=None, description="Of several campaigns: one entry a campaign and sensor."
+    )
+    per_skin: list[SkinValue] | None = Field(default=None, description="Of a fleet: one entry a skin.")
+
+
+class PlannedRecording(BaseModel):
+    """A recording to make next; beside these, any axis of the campaign may be stated."""
+
+    model_config = ConfigDict(extra="allow")
+
+    sensor: str = Field(description="Id of the sensor to press.")
+    indenter_radius_mm: float = Field(description="Radius of the sphere [mm].")
+    preload_n: float = Field(description="Static force [N].")
+    dynamic_force_n: float = Field(description="Peak amplitude of the oscillating force [N].")
+    position_mm: list[float] | None = Field(default=None, description="Place of the sphere, x and y [mm].")
+    dwell_s: float | None = Field(default=None, description="How long to hold the preload before [s].")
+    load_cycles: float | None = Field(default=None, description="Load cycles that the skin has seen [-].")
+    repeats: int = Field(description="How often to record this.")
+
+
+class NextExperiment(BaseModel):
+    """The recordings that would best tell what is still open apart."""
+
+    recordings: list[PlannedRecording] = Field(description="In this order; empty where none would help.")
+    separates: list[list[str]] = Field(description="The sets of mechanisms that they tell apart.")
+    probability_of_deciding: float = Field(description="Probability that they settle it, 0 to 1.")
+    without_it: float = Field(description="Probability that the leader is right without them, 0 to 1.")
+    minutes: float = Field(description="How long they take [min].")
+    statement: str = Field(description="The same in words.")
+
+
+class Report(BaseModel):
+    """The result of a diagnosis (`report/1`)."""
+
+    document: Literal["report/1"] = Field(alias="schema", description="The format.")
+    campaign: str = Field(description="Name of the campaign; of several, what they are called together.")
+    campaigns: list[str] | None = Field(default=None, description="Of several: the names of all.")
+    verdict: Verdict = Field(description="What the probabilities say; docs/diagnosis.md explains each.")
+    probability: float = Field(description="Posterior of the stated answer, 0 to 1.")
+    statement: str = Field(description="The result in up to three sentences.")
+    location: Location = Field(description="Where recordings and the paper's model differ.")
+    mechanisms: list[ReportMechanism] = Field(description="The set of mechanisms that leads.")
+    presence: list[PresentGroup] = Field(description="Groups of mechanisms, the most probable first.")
+    unnamed: UnnamedLaw | None = Field(description="Of `unexplained`: the law that describes the misfit best.")
+    alternatives: list[Alternative] = Field(description="Other answers, the most probable first.")
+    not_identifiable: list[NotIdentifiable] = Field(description="What these recordings cannot tell.")
+    findings: list[ReportFinding] = Field(description="What looks wrong in the data, or limits the answer.")
+    fit: Fit | None = Field(description="How much better the recordings are described; null of several campaigns.")
+    power: list[Power] = Field(description="What the campaign could have seen.")
+    d33: ReportD33 | None = Field(description="d33 of the sensors; null of curves and where nothing can be told.")
+    by_kind: list[KindParameter] | None = Field(
+        default=None, description="Of several kinds of recordings: what each alone tells."
+    )
+    contradictions: list[Contradiction] | None = Field(
+        default=None, description="Of several kinds of recordings: where they contradict one another."
+    )
+    population: list[Population] | None = Field(default=None, description="Of a fleet: each quantity over its skins.")
+    next_experiment: NextExperiment | None = Field(description="What to record next; null where all is decided.")
+    provenance: Provenance = Field(description="What it was made with.")

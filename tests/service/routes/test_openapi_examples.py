@@ -1,0 +1,143 @@
+"""Every request and every answer of the OpenAPI document has an example: valid, and what a real server answers."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import jsonschema_rs
+import orjson
+import pytest
+
+from scripts.openapi_examples import FILE, walk
+from service.schemas.report import Report
+from tests.support.document_schemas import closed
+from tests.support.server import running
+
+STORED = orjson.loads(FILE.read_bytes())
+CALCULATIONS = ("sigma_one", "sigma_columns", "frf_columns", "d33_columns", "stress", "design", "umbridge_gradient")
+# Without an example: arrays and files, and answers that are the document itself or never come.
+BINARY = ("application/x-npz", "application/x-hdf5", "application/octet-stream")
+NO_ANSWER = ("openapi", "umbridge_apply_hessian")
+
+
+@pytest.fixture(scope="module")
+def document(http: httpx.Client) -> dict[str, Any]:
+    described: dict[str, Any] = http.get("/openapi.json").json()
+    return described
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What a server over an empty store answers now."""
+    folder = tmp_path_factory.mktemp("walked")
+    settings = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1", "UNDERSKIN_MECHANISMS": str(folder / "mechanisms")}
+    with running(folder, settings) as server, httpx.Client(base_url=server.url, timeout=60) as http:
+        return walk(http)
+
+
+def operations(document: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for methods in document["paths"].values():
+        yield from methods.values()
+
+
+def contents(operation: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Where, media type and content of each body of an operation."""
+    for media_type, content in operation.get("requestBody", {}).get("content", {}).items():
+        yield "request", media_type, content
+    for status, answer in operation["responses"].items():
+        for media_type, content in answer["content"].items():
+            yield status, media_type, content
+
+
+def test_every_request_and_every_answer_has_a_valid_example(document: dict[str, Any]) -> None:
+    checked = 0
+    for operation in operations(document):
+        for where, media_type, content in contents(operation):
+            place = f"{operation['operationId']} {where} {media_type}"
+            if "example" not in content:
+                never = operation["operationId"] in NO_ANSWER and where.startswith("2")
+                assert never or media_type in BINARY, place
+            elif media_type.endswith("json"):
+                checked += 1
+                schema = content["schema"] | {"components": document["components"]}
+                jsonschema_rs.Draft202012Validator(schema).validate(content["example"])
+    assert checked > 120
+
+
+def test_every_parameter_that_is_required_has_an_example(document: dict[str, Any]) -> None:
+    required = [
+        parameter
+        for operation in operations(document)
+        for parameter in operation.get("parameters", [])
+        if parameter["required"]
+    ]
+    assert len(required) > 20
+    assert [parameter["name"] for parameter in required if "example" not in parameter] == []
+
+
+def test_every_property_of_every_schema_is_described(document: dict[str, Any]) -> None:
+    described = 0
+    for name, schema in document["components"]["schemas"].items():
+        assert schema.get("description"), name
+        for own, entry in schema.get("properties", {}).items():
+            described += 1
+            assert "$ref" in entry or entry["description"], f"{name}.{own}"
+    assert described > 500
+
+
+def test_a_server_answers_as_the_examples_say(walked: dict[str, Any]) -> None:
+    """Field by field of the same types; rerun scripts/openapi_examples.py where they have changed."""
+    assert set(walked) == set(STORED)
+    for name, stored in STORED.items():
+        report = walked[name]["answer"].pop("report", None) if name == "diagnosis" else None
+        if report is not None:
+            jsonschema_rs.Draft202012Validator(closed(Report.model_json_schema())).validate(report)
+            stored["answer"].pop("report")
+        assert shape(walked[name]) == shape(stored), name
+
+
+@pytest.mark.parametrize("name", CALCULATIONS)
+def test_a_server_calculates_what_the_examples_say(walked: dict[str, Any], name: str) -> None:
+    numbers, expected = list(leaves(walked[name]["answer"])), list(leaves(STORED[name]["answer"]))
+    assert numbers == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    assert numbers
+
+
+def test_the_example_of_a_form_is_accepted(http: httpx.Client, document: dict[str, Any]) -> None:
+    body = document["paths"]["/v1/campaigns"]["post"]["requestBody"]["content"]["multipart/form-data"]
+    (file,) = body["example"]["file"]
+    fields = {name: value for name, value in body["example"].items() if name != "file"}
+    answer = http.post("/v1/campaigns", data=fields, files={"file": ("first.json", file.encode())})
+    assert answer.status_code == 201, answer.text
+    (sent,) = answer.json()["campaigns"]
+    assert sent["status"] == "ok"
+    assert http.get(f"/v1/campaigns/{sent['id']}").json()["name"] == fields["together"]
+
+
+def shape(document: Any) -> Any:
+    """The names of fields, and the types of values; of a list its first entry, of an open mapping nothing."""
+    if isinstance(document, dict):
+        opened = {"about", "region", "provenance", "fit", "mechanisms", "scalars"} & set(document)
+        return {name: None if name in opened else shape(value) for name, value in document.items()}
+    if isinstance(document, list):
+        return [shape(entry) for entry in document[:1]]
+    return "number" if isinstance(document, int | float) else type(document).__name__
+
+
+def leaves(document: Any) -> Iterator[float]:
+    """All numbers, in order."""
+    if isinstance(document, dict):
+        document = list(document.values())
+    if isinstance(document, list):
+        for entry in document:
+            yield from leaves(entry)
+    elif isinstance(document, float):
+        yield document
+
+
+def test_the_examples_are_of_one_run() -> None:
+    """Ids are numbered and times are replaced, so that a rerun does not change them."""
+    text = Path(FILE).read_text()
+    assert "c-0000000000000001" in text
+    assert "2026-01-05T09:00:00Z" in text
