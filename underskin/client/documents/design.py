@@ -47,6 +47,9 @@ class DesignAnswer(Document):
     status: Literal["ok", "out_of_domain"]
     """`out_of_domain`: outside the table, and null what depends on it; never extrapolated."""
 
+    limit: str | None
+    """Which limit it exceeds, with the highest force; null where it is `ok`."""
+
     contact_radius_mm: float
     """Radius a of the contact, Hertz [mm]."""
 
