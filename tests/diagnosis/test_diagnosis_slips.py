@@ -1,7 +1,7 @@
 """Slips of a lab in whole campaigns: named, put right or left out, and never seen in what physics does."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -11,44 +11,21 @@ import pytest
 from rig.draw import drawn, record
 from rig.recorded import campaign as recorded_campaign
 from tests.support.diagnosis_campaigns import Made, campaign
-from underskin.diagnosis.data.inspected import Inspected
+from tests.support.slip_campaigns import MADE, changed, named, times
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.caveats import slips
 from underskin.diagnosis.screening.inspection import inspect
-from underskin.findings.codes import FindingCode, Reason
+from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
-MADE = Made(sensors=3, repeats=2, lines=20)
-SLIPS = {
-    *(FindingCode.CONJUGATED, FindingCode.SENSORS_EXCHANGED, FindingCode.GAIN_STEPS, FindingCode.WARM_UP),
-    *(FindingCode.WEAK, FindingCode.STRONG, FindingCode.SIGN_FLIPPED),
-}
-Change = Callable[[FrfRecording, int], FrfRecording]
-
 
 @pytest.fixture(scope="module")
 def good(table: SigmaTable) -> Campaign:
     return campaign(MADE, table)
-
-
-def times(entry: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    other = real if imaginary is None else imaginary
-    return replace(entry, frf_re_pc_per_n=real * entry.frf_re_pc_per_n, frf_im_pc_per_n=other * entry.frf_im_pc_per_n)
-
-
-def changed(made: Campaign, change: Change) -> Campaign:
-    entries = frf_recordings(made)
-    return replace(made, recordings=tuple(change(entry, number) for number, entry in enumerate(entries)))
-
-
-def named(inspected: Inspected) -> list[Reason]:
-    return [entry.reason for entry in inspected.findings if entry.code in SLIPS]
 
 
 def lines(made: Campaign) -> dict[str, np.ndarray]:
@@ -232,125 +209,6 @@ def test_a_warm_up_is_told_beside_steps_of_its_first_recordings(table: SigmaTabl
 def test_a_fall_that_load_cycles_explain_is_ageing(good: Campaign, table: SigmaTable) -> None:
     aged = changed(good, lambda entry, n: times(entry, 1 + 0.3 * float(np.exp(-n / 2))))
     assert named(inspect(aged, table)) == []
-
-
-def exchanged(first: str, second: str, since: int = 0) -> Change:
-    other = {first: second, second: first}
-    return lambda entry, n: replace(entry, sensor=other.get(entry.sensor, entry.sensor)) if n >= since else entry
-
-
-def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTable) -> None:
-    inspected = inspect(changed(good, exchanged("s0", "s2")), table)
-    assert named(inspected) == [Reason.LABELS_EXCHANGED]
-    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
-        entry.sensor for entry in frf_recordings(good)
-    ]
-
-
-def test_an_exchange_shows_nowhere_where_each_contact_is_on_its_own_sensor(good: Campaign, table: SigmaTable) -> None:
-    centred = changed(good, lambda entry, _: replace(entry, position_mm=None))
-    assert named(inspect(changed(centred, exchanged("s0", "s2")), table)) == []
-
-
-def test_cables_exchanged_from_some_recording_on(good: Campaign, table: SigmaTable) -> None:
-    """Told by the places; without them by the sensors' gains; and by two sensors that are silent since."""
-    since = 26
-    inspected = inspect(changed(good, exchanged("s0", "s2", since)), table)
-    assert named(inspected) == [Reason.CABLES_EXCHANGED]
-    told = next(entry for entry in inspected.findings if entry.reason == Reason.CABLES_EXCHANGED)
-    assert told.arguments["since"] == "r26"
-    gains = {"s0": 0.8, "s1": 1.0, "s2": 1.2}
-    unequal = changed(good, lambda entry, _: replace(times(entry, gains[entry.sensor]), position_mm=None))
-    by_gains = inspect(changed(unequal, exchanged("s0", "s2", since)), table)
-    assert named(by_gains) == [Reason.CABLES_EXCHANGED]
-    assert [entry.sensor for entry in frf_recordings(by_gains.campaign)] == [
-        entry.sensor for entry in frf_recordings(good)
-    ]
-
-
-def test_two_sensors_that_fall_silent_together_have_their_cables_exchanged(good: Campaign, table: SigmaTable) -> None:
-    random = np.random.default_rng(6)
-
-    def unheard(entry: FrfRecording, n: int) -> FrfRecording:
-        if n < 26 or entry.sensor == "s1":
-            return replace(entry, position_mm=None)
-        real, imaginary = 0.02 * random.normal(size=(2, MADE.lines))
-        return replace(entry, position_mm=None, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
-
-    inspected = inspect(changed(good, unheard), table)
-    assert named(inspected) == [Reason.CABLES_EXCHANGED]
-    assert len(inspected.campaign.recordings) == 26 + 8
-
-
-def test_exchanged_labels_are_told_where_all_contacts_miss_their_places(table: SigmaTable) -> None:
-    """The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place."""
-    description = drawn(934567, 56, "single")
-    assert set(description["effects"]) == {"misalignment"}
-    made, _ = from_dict(recorded_campaign(record(description)))
-    assert named(inspect(made, table)) == []
-    inspected = inspect(changed(made, exchanged("s02", "s04")), table)
-    assert named(inspected) == [Reason.LABELS_EXCHANGED]
-    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
-        entry.sensor for entry in frf_recordings(made)
-    ]
-
-
-def test_the_labels_of_an_array_of_two_sensors_are_exchanged(table: SigmaTable) -> None:
-    """No recording then answers as given."""
-    two = campaign(Made(sensors=2, repeats=2, lines=20), table)
-    inspected = inspect(changed(two, exchanged("s0", "s1")), table)
-    assert named(inspected) == [Reason.LABELS_EXCHANGED]
-    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
-        entry.sensor for entry in frf_recordings(two)
-    ]
-
-
-def test_a_single_recording_after_an_exchange_tells_it_by_its_place(good: Campaign, table: SigmaTable) -> None:
-    last = max(number for number, entry in enumerate(frf_recordings(good)) if entry.sensor in ("s0", "s2"))
-    inspected = inspect(changed(good, exchanged("s0", "s2", last)), table)
-    assert named(inspected) == [Reason.CABLES_EXCHANGED]
-    told = next(entry for entry in inspected.findings if entry.reason == Reason.CABLES_EXCHANGED)
-    assert told.arguments["recordings"] == 1
-    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
-        entry.sensor for entry in frf_recordings(good)
-    ]
-
-
-def test_a_step_of_one_sensor_alone_is_no_exchange(good: Campaign, table: SigmaTable) -> None:
-    """Though another sensor has just the level that it steps to."""
-    gains = {"s0": 0.8, "s1": 1.0, "s2": 0.95}
-
-    def stepped(entry: FrfRecording, n: int) -> FrfRecording:
-        gain = gains["s2"] if entry.sensor == "s0" and n >= 26 else gains[entry.sensor]
-        return replace(times(entry, gain), position_mm=None)
-
-    assert named(inspect(changed(good, stepped), table)) == []
-
-
-def test_sensors_that_all_fall_silent_are_not_exchanged(good: Campaign, table: SigmaTable) -> None:
-    """Two of three may be exchanged; of two, or where no other answers, the amplifier may have failed."""
-    random = np.random.default_rng(6)
-
-    def unheard(entry: FrfRecording, n: int) -> FrfRecording:
-        if n < 26:
-            return replace(entry, position_mm=None)
-        real, imaginary = 0.02 * random.normal(size=(2, MADE.lines))
-        return replace(entry, position_mm=None, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
-
-    for left in ({"s0", "s1", "s2"}, {"s0", "s2"}):
-        silent = changed(good, unheard)
-        silent = replace(silent, recordings=tuple(entry for entry in frf_recordings(silent) if entry.sensor in left))
-        inspected = inspect(silent, table)
-        assert named(inspected) == []
-        assert FindingCode.NO_RESPONSE in {entry.code for entry in inspected.findings}
-
-
-def test_a_silent_recording_near_a_crossing_of_zero_is_physics(table: SigmaTable) -> None:
-    """The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero."""
-    description = drawn(956789, 88, "single")
-    assert set(description["effects"]) == {"thickness_error"}
-    made, _ = from_dict(recorded_campaign(record(description)))
-    assert FindingCode.NO_RESPONSE not in {entry.code for entry in inspect(made, table).findings}
 
 
 @pytest.mark.parametrize("hidden", ["none", "single"])
