@@ -10,6 +10,7 @@ from service.jobs import WorkerProcesses
 from service.jobs.process import Given
 from service.settings import Settings
 from service.usecases.checkup import Finding, Level, examine
+from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LIMIT_S = 120.0
@@ -80,7 +81,7 @@ def _of_workers(settings: Settings) -> Finding:
                 worker.news.clear()
             failure = "" if "report" in worker.said else worker.failure if worker.ended else "it did not end"
         processes.stop()
-    except OSError as error:
+    except (TableError, OSError) as error:
         failure = str(error)
     if failure:
         advice = "see the memory that is free, and UNDERSKIN_DIAGNOSIS_MEMORY_MB"

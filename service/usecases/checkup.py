@@ -23,12 +23,13 @@ from service.settings import Settings
 from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
-from service.usecases.scheduled_backups import kept
+from service.usecases.scheduled_backups import kept, newest
 from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LITTLE_MB, _TOO_LITTLE_MB = 2000, 200
 _SKEW_S = 5.0  # of two clocks
+_DATABASE = "see whether the database runs, and its address in UNDERSKIN_DATABASE_URL"
 _WAITS_S = 300.0  # a diagnosis in the queue
 
 
@@ -64,12 +65,16 @@ def examine(settings: Settings) -> Iterator[Finding]:
         answers = _of_store(store, settings.data)
         yield answers
         yield from _of_backups(settings, store)
-        is_well = answers.level is Level.OK
-        if is_well:
-            for look in (_of_clock, _of_queue):
-                yield store.read(look)
-        needed = is_well and store.read(key_requirement.is_needed)
-        yield from _of_keys(KeyStore(settings.data), needed=needed)
+        needed: bool | None = None
+        try:
+            if store.is_made() and migrate.version(store) is not None:
+                needed = store.read(key_requirement.is_needed)
+            if answers.level is Level.OK:
+                for look in (_of_clock, _of_queue):
+                    yield store.read(look)
+        except (DBAPIError, StoreMoved, OSError) as error:
+            yield Finding("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
+        yield from _of_keys(KeyStore(settings.data), needed=needed, made=store.is_made())
 
 
 def _of_folder(folder: Path) -> Iterator[Finding]:
@@ -128,7 +133,7 @@ def _of_store(store: Database, folder: Path) -> Finding:
         return Finding("store", Level.CRITICAL, str(error), "see docs/store.md")
     except (DBAPIError, OSError) as error:
         return Finding("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}",
-                       "see whether the database runs, and its address in UNDERSKIN_DATABASE_URL")  # fmt: skip
+                       _DATABASE)  # fmt: skip
     if damage:
         return Finding("store", Level.CRITICAL, f"it is damaged: {damage}", "stop the server and restore a backup")
     if version != migrate.VERSIONS[-1]:
@@ -151,9 +156,13 @@ def _damage(store: Database) -> str:
     return "" if found == "ok" else found
 
 
-def _of_keys(keys: KeyStore, *, needed: bool) -> Iterator[Finding]:
+def _of_keys(keys: KeyStore, *, needed: bool | None, made: bool) -> Iterator[Finding]:
+    """`needed`: None where the store could not be asked; `made`: whether there is a store."""
     if not keys.file_exists():
-        if needed:
+        if needed is None and made:
+            yield Finding("keys", Level.WARNING, f"{keys.path} is missing, and whether keys are needed cannot be told",
+                          "see to the store first")  # fmt: skip
+        elif needed:
             yield Finding("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",
                           "put it back, or make a key with `underskin key create NAME`")  # fmt: skip
         else:
@@ -173,22 +182,26 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Finding]:
         yield Finding("backups", Level.WARNING, "the server makes none by itself",
                       "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
         return
-    newest = next(iter(kept(settings.backup_to)), None) if settings.backup_to.is_dir() else None
-    if newest is None:
+    ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -_SKEW_S]
+    if ahead:
+        yield Finding("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
+                      "set the clock, and rename or delete what a wrong one dated")  # fmt: skip
+    last = newest(settings.backup_to)
+    if last is None:
         yield Finding("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
                       "start the server; its log says why none can be made")  # fmt: skip
         return
-    hours = newest.age_s / 3600
+    hours = last.age_s / 3600
     if hours > 2 * settings.backup_every:
-        yield Finding("backups", Level.CRITICAL, f"the newest, {newest.path.name}, is {hours:.0f} hours old",
+        yield Finding("backups", Level.CRITICAL, f"the newest, {last.path.name}, is {hours:.0f} hours old",
                       "see that the server runs; its log says why none can be made")  # fmt: skip
         return
     try:
-        backup.verify(store, newest.path)
+        backup.verify(store, last.path)
     except (StoreError, OSError) as error:
         yield Finding("backups", Level.CRITICAL, str(error), "look at the disk, and make one: `underskin backup FILE`")
         return
-    yield Finding("backups", Level.OK, f"{newest.path.name}, {hours:.1f} hours old, read whole")
+    yield Finding("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole")
 
 
 def _of_clock(connection: Connection) -> Finding:

@@ -1,16 +1,19 @@
 """Backups on a schedule: written, read back, and the oldest ones deleted, while the server answers.
 
 When the next one is due is read from the folder itself, so that a restart neither skips one nor makes one too many. Of
-several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile.
+several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile. A folder is
+for one store. None is deleted while the newest is far smaller than the largest, as where a server was started on an
+empty data folder.
 """
 
 import fcntl
 import logging
 import os
+import re
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,21 +21,24 @@ from pathlib import Path
 from prometheus_client import Counter, Gauge
 
 from service import durable
-from service.store import Database, StorageFull, StoreError, backup
+from service.store import Database, StorageFull, backup
 from service.usecases import mechanism_files
 
 logger = logging.getLogger("underskin")
 
-_PREFIX = "underskin-"
+_PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
+_NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
+_SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
+_SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 _LOOK_S = 60.0  # how often it is looked whether one is due
 _RETRY_S = 600.0  # after a failure
 _JOIN_S = 30.0
 _HOUR_S = 3600.0
 
-_age = Gauge("underskin_backup_age_seconds", "Age of the newest scheduled backup; NaN where there is none.")
-_age.set(float("nan"))
-_bytes = Gauge("underskin_backup_bytes", "Size of the newest scheduled backup.")
+_AGE = Gauge("underskin_backup_age_seconds", "Age of the newest scheduled backup; NaN where there is none.")
+_AGE.set(float("nan"))
+_BYTES = Gauge("underskin_backup_bytes", "Size of the newest scheduled backup.")
 _made = Counter("underskin_backups", "Scheduled backups that were written and read back.")
 _failed = Counter("underskin_backup_failures", "Scheduled backups that failed.")
 
@@ -46,22 +52,24 @@ class Kept:
 
     @property
     def age_s(self) -> float:
-        """Seconds since it was made, by this machine's clock; 0 for one of the future."""
-        return max(0.0, (datetime.now(UTC) - self.made_at).total_seconds())
+        """Seconds since it was made, by this machine's clock; less than 0 where one of the two clocks was wrong."""
+        return (datetime.now(UTC) - self.made_at).total_seconds()
 
 
 def kept(folder: Path) -> list[Kept]:
     """The scheduled backups in a folder, the newest first; what bears another name is left alone."""
-    found = []
+    entries = []
     for path in folder.glob(f"{_PREFIX}*"):
-        stamp = path.name.removeprefix(_PREFIX).partition(".")[0]
-        try:
-            moment = datetime.strptime(stamp, "%Y%m%dT%H%M%SZ").replace(tzinfo=UTC)
-        except ValueError:
-            continue
-        if path.suffix in (".sqlite3", ".pgdump"):
-            found.append(Kept(path, moment))
-    return sorted(found, key=lambda entry: entry.made_at, reverse=True)
+        match = _NAME.fullmatch(path.name)
+        with suppress(ValueError):  # no such day
+            if match is not None:
+                entries.append(Kept(path, datetime.strptime(match[1], _STAMP).replace(tzinfo=UTC)))
+    return sorted(entries, key=lambda entry: entry.made_at, reverse=True)
+
+
+def newest(folder: Path) -> Kept | None:
+    """The newest one that is not of the future: what a wrong clock dated ahead makes none superfluous."""
+    return next((entry for entry in kept(folder) if entry.age_s > -_SKEW_S), None)
 
 
 class ScheduledBackups:
@@ -82,8 +90,8 @@ class ScheduledBackups:
     @property
     def overdue(self) -> bool:
         """Whether the newest is older than twice the time between two, or there is none."""
-        newest = next(iter(kept(self._folder)), None)
-        return newest is None or newest.age_s > 2 * self._every_s
+        last = newest(self._folder)
+        return last is None or last.age_s > 2 * self._every_s
 
     def start(self) -> None:
         """Make the first one now if one is due."""
@@ -96,42 +104,60 @@ class ScheduledBackups:
             self._thread.join(_JOIN_S)
 
     def _watch(self) -> None:
+        _AGE.set_function(self._age_s)
+        _BYTES.set_function(self._size)
         wait = 0.0
         while not self._ending.wait(wait):
             try:
                 self._make_if_due()
                 wait = min(_LOOK_S, self._every_s / 10)
-            except (StoreError, OSError) as error:
+            except Exception as error:  # the thread has no caller to raise to, and must go on
                 _failed.inc()
-                logger.warning("no scheduled backup could be made: %s", error)
+                logger.warning("no scheduled backup could be made: %s", str(error).splitlines()[0])
                 wait = min(_RETRY_S, self._every_s / 10)
-            self._tell()
 
     def _make_if_due(self) -> None:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with _locked(self._folder) as ours:
-            newest = next(iter(kept(self._folder)), None)
-            if not ours or (newest is not None and newest.age_s < self._every_s):
+            last = newest(self._folder)
+            if not ours or (last is not None and last.age_s < self._every_s):
                 return
+            for left in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
+                left.unlink()
             started = time.monotonic()
             suffix = ".sqlite3" if self._store.is_sqlite else ".pgdump"
-            file = self._folder / f"{_PREFIX}{datetime.now(UTC):%Y%m%dT%H%M%SZ}{suffix}"
+            file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
                 self._store.write(mechanism_files.remember)
             except StorageFull as error:  # a full disk here keeps nobody from a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)
-            for old in kept(self._folder)[self._keep :]:
-                old.path.unlink()
+            self._rotate(file.stat().st_size)
             durable.keep_entries(self._folder)
         _made.inc()
         fields = {"file": str(file), "bytes": file.stat().st_size, "seconds": round(time.monotonic() - started, 1)}
         logger.info("backup made and read back", extra={"fields": fields})
 
-    def _tell(self) -> None:
-        newest = next(iter(kept(self._folder)), None)
-        _age.set(float("nan") if newest is None else newest.age_s)
-        _bytes.set(0 if newest is None else newest.path.stat().st_size)
+    def _rotate(self, size: int) -> None:
+        """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
+        entries = [entry for entry in kept(self._folder) if entry.age_s > -_SKEW_S]
+        largest = max(entry.path.stat().st_size for entry in entries)
+        if size < _SMALLER * largest:
+            logger.warning(
+                "the backup just made has %d bytes, an earlier one %d: no old ones are deleted until this is looked at",
+                size, largest,
+            )  # fmt: skip
+            return
+        for old in entries[self._keep :]:
+            old.path.unlink()
+
+    def _age_s(self) -> float:
+        last = newest(self._folder)
+        return float("nan") if last is None else last.age_s
+
+    def _size(self) -> float:
+        last = newest(self._folder)
+        return 0.0 if last is None else last.path.stat().st_size
 
 
 @contextmanager

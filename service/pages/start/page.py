@@ -11,7 +11,7 @@ from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
 from service.store import overview
-from service.usecases.scheduled_backups import ScheduledBackups, kept
+from service.usecases.scheduled_backups import ScheduledBackups, newest
 
 router = APIRouter()
 
@@ -62,5 +62,5 @@ def _backups(request: Request) -> dict[str, Any] | None:
     backups: ScheduledBackups | None = request.app.state.backups
     if backups is None:
         return None
-    newest = next(iter(kept(backups.folder)), None)
-    return {"last": None if newest is None else newest.made_at.isoformat(), "overdue": backups.overdue}
+    last = newest(backups.folder)
+    return {"last": None if last is None else last.made_at.isoformat(), "overdue": backups.overdue}

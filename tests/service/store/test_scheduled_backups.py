@@ -3,7 +3,9 @@
 import json
 import os
 import re
+import sqlite3
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +78,8 @@ def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_pat
 def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     folder.mkdir()
-    others = [folder / name for name in ("underskin-notes.txt", "before-restore-1.sqlite3", "underskin-x.sqlite3")]
+    names = ("notes.txt", "x.sqlite3", "20200101T000000Z.keep.sqlite3", "20209901T000000Z.sqlite3")
+    others = [folder / "before-restore-1.sqlite3", *(folder / f"underskin-{name}" for name in names)]
     for other in others:
         other.write_text("mine")
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND, UNDERSKIN_BACKUP_KEEP="2")):
@@ -103,6 +106,48 @@ def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_
         assert "overdue" in server.http.get("/").text
         folder.unlink()
         wait_for(folder, 1)
+
+
+def test_what_a_wrong_clock_dated_ahead_makes_none_superfluous(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    ahead = folder / "underskin-20990101T000000Z.sqlite3"
+    ahead.write_bytes(b"")
+    with running(place, **scheduled(folder)):
+        (_, made) = wait_for(folder, 2)
+    assert made.stat().st_size > 0
+    _, found = doctor(place, UNDERSKIN_BACKUP_TO=str(folder), **_NONE)
+    assert found["backups"]["level"] == "warning"
+    assert "ahead" in found["backups"]["found"]
+
+
+def test_no_old_one_is_deleted_while_the_newest_is_far_smaller(tmp_path: Path) -> None:
+    folder, data = tmp_path / "backups", tmp_path / "data"
+    folder.mkdir()
+    data.mkdir()
+    full = folder / "underskin-20200101T000000Z.sqlite3"
+    full.write_bytes(bytes(50_000_000))
+    with running(Place(data), **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND, UNDERSKIN_BACKUP_KEEP="1")):
+        wait_for(folder, 3)
+    assert full.exists()
+    assert "no old ones are deleted" in (tmp_path / "data.log").read_text()
+
+
+@pytest.mark.slow
+def test_a_store_that_is_busy_for_long_ends_no_schedule(tmp_path: Path) -> None:
+    folder, data = tmp_path / "backups", tmp_path / "data"
+    data.mkdir()
+    with running(Place(data), **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
+        wait_for(folder, 1)
+        with closing(sqlite3.connect(data / "underskin.sqlite3", isolation_level=None)) as other:
+            other.execute("BEGIN EXCLUSIVE")
+            deadline = time.monotonic() + 90
+            while "no scheduled backup could be made" not in (tmp_path / "data.log").read_text():
+                assert time.monotonic() < deadline
+                time.sleep(0.2)
+            other.execute("ROLLBACK")
+        count = len(kept(folder))
+        wait_for(folder, count + 1)
 
 
 @pytest.mark.slow
@@ -141,10 +186,11 @@ def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
     (backups / "underskin-20200101T000000Z.sqlite3").write_bytes(b"")
     tables = tmp_path / "tables"
     tables.mkdir()
-    status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), UNDERSKIN_TABLES=str(tables), **_NONE)
+    status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), UNDERSKIN_TABLES=str(tables))
     assert status == 2
     assert {name: entry["level"] for name, entry in found.items() if entry["level"] != "ok" and "disk" not in name} == {
         "data folder": "warning", "tables": "critical", "backups": "critical", "keys": "critical",
+        "workers": "critical",
     }  # fmt: skip
     assert all(entry["advice"] for entry in found.values() if entry["level"] != "ok")
 
