@@ -44,7 +44,7 @@ def test_curl(server_url: str) -> None:
     assert float(sigma) == pytest.approx(0.936505, abs=1e-6)
     assert '"status":["ok","ok","ok","out_of_domain"]' in answer.stdout
     assert re.search(
-        r"d33_uncertainty_pc_per_n,status\r?\n.*,14\.00.*,0\.189.*,ok\r?\n.*,22\.04.*,0\.191.*,ok", answer.stdout
+        r"d33_uncertainty_pc_per_n,limit,status\r?\n.*,14\.00.*,0\.189.*,ok\r?\n.*,22\.04.*,0\.191.*,ok", answer.stdout
     )
 
 
