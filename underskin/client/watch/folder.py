@@ -1,6 +1,7 @@
 """Which files of a folder are complete: instruments write for a while, and leave temporary files beside."""
 
 import os
+import stat
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -36,11 +37,13 @@ class WatchedFolder:
         self.path = path
         self._settle_s = settle_s
         self._seen: dict[Path, _Seen] = {}
+        self.unreadable: dict[Path, OSError] = {}  # what `settled` could not look at, and left out
 
     def settled(self) -> list[Path]:
         """Files that do not change any more and are not done, the oldest first; OSError where the folder is gone."""
         now = time.monotonic()
         seen = {}
+        self.unreadable = {}
         for path, status in self._files():
             known = self._seen.get(path)
             if known is None or (known.size, known.changed_ns) != (status.st_size, status.st_mtime_ns):
@@ -75,7 +78,7 @@ class WatchedFolder:
         self._seen[path].since = time.monotonic()
 
     def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
-        for folder, folders, names in os.walk(self.path, onerror=_raise):
+        for folder, folders, names in os.walk(self.path, onerror=self._leave_out):
             folders[:] = [name for name in folders if not name.startswith(".")]
             for name in names:
                 if name.startswith(".") or name.lower().endswith((*_TEMPORARY, *_BESIDE)):
@@ -85,12 +88,19 @@ class WatchedFolder:
                     status = path.stat()
                 except FileNotFoundError:  # renamed meanwhile
                     continue
-                if path.is_file() and status.st_size:
+                except OSError as error:  # such as a link to itself
+                    self._leave_out(error)
+                    continue
+                if stat.S_ISREG(status.st_mode) and status.st_size:
                     yield path, status
 
-
-def _raise(error: OSError) -> None:
-    raise error
+    def _leave_out(self, error: OSError) -> None:
+        """Go on without a file or folder; raises the error where it is of the watched folder itself."""
+        path = Path(error.filename)
+        if path == self.path:
+            raise error
+        if not isinstance(error, FileNotFoundError):  # a folder that was renamed meanwhile
+            self.unreadable[path] = error
 
 
 def _opens(path: Path) -> bool:

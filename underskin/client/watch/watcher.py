@@ -52,13 +52,16 @@ class Watcher:
         self._url, self._skin, self._rig, self._estimator = url, skin, rig, estimator
         self._kept, self._told = kept, told
         self._outage_s = 0.0  # to wait before the next try; 0 while all is well
-        self._unopened: set[Path] = set()  # of which was told that they cannot be opened
+        self._unopened: set[Path] = set()  # of which was told that they cannot be opened or looked at
 
     def step(self) -> float:
         """Send what is complete; the seconds to wait until the next step."""
         try:
             target = self._target()
-            for path in self._folder.settled():
+            settled = self._folder.settled()
+            for path, reason in self._folder.unreadable.items():
+                self._cannot_be("read", path, reason)
+            for path in settled:
                 if self._rig is None or path.resolve() != self._rig.resolve():
                     self._take(path, target)
         except (ServiceError, Unreachable, OSError) as error:
@@ -81,9 +84,7 @@ class Watcher:
         except FileNotFoundError:  # renamed meanwhile: found by its new name
             return
         except OSError as error:
-            if path not in self._unopened:
-                self._unopened.add(path)
-                self._told(False, f"{name}: cannot be opened: {error.strerror}; it is tried again")
+            self._cannot_be("opened", path, error)
             self._folder.postpone(path)
 
     def _send(self, path: Path, name: str, target: Target, sha256: str) -> None:
@@ -111,6 +112,13 @@ class Watcher:
             self._kept(name, results)
         elif unchanged:
             self._told(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
+
+    def _cannot_be(self, what: str, path: Path, error: OSError) -> None:
+        """Tell once of a file or folder that cannot be read or opened."""
+        if path not in self._unopened:
+            self._unopened.add(path)
+            name = path.relative_to(self._folder.path)
+            self._told(False, f"{name}: cannot be {what}: {error.strerror}; it is tried again")
 
     def _target(self) -> Target:
         rig = None if self._rig is None else content_sha256(self._rig)
