@@ -15,6 +15,7 @@ from underskin.client.service_client import Client
 from underskin.client.watch.folder import WatchedFolder
 from underskin.client.watch.journal import Journal
 from underskin.client.watch.watcher import Watcher
+from underskin.errors import ServiceError
 
 SETTLE_S = 5.0
 
@@ -122,3 +123,63 @@ def test_a_watched_folder_that_is_gone_is_an_outage(at: Bench) -> None:
     assert len(at.told) == 2, at.told
     assert "No such file or directory" in at.told[0]
     assert at.told[1] == "sending goes on"
+
+
+def _refused(status: int, allowed: str) -> ServiceError:
+    """As the service refuses a file."""
+    kind = {"type": "urn:underskin:problem:invalid-input", "title": "Invalid input", "detail": allowed}
+    return ServiceError(status, {**kind, "errors": [{"allowed": allowed}]})
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        _refused(422, "reading it as HDF5 took more than 60 s and was stopped (UNDERSKIN_READING_SECONDS)"),
+        _refused(422, "reading it takes more than 1000 MB of memory (UNDERSKIN_READING_MEMORY_MB)"),
+        _refused(413, "The body exceeds 100 MB; send less."),
+        ServiceError(400, {"title": "Bad Request", "detail": "not an answer of underskin: 'proxy'"}),
+        ServiceError(422, {"title": "Unprocessable Content", "detail": "not an answer of underskin: 'filter'"}),
+    ],
+    ids=lambda error: str(error)[:60],
+)
+def test_a_refusal_that_may_pass_is_no_final_one_and_stops_no_other_file(at: Bench, error: ServiceError) -> None:
+    def refuse(path: Path) -> None:
+        if path.name == "large.json":
+            raise error
+
+    at.service.at_post = refuse
+    at.save("large.json")
+    at.save("small.json")
+    at.step(0)
+    at.step()
+    assert [name for name, _ in at.service.kept] == ["small.json"]
+    assert f"large.json: {error}; it is sent again in 60 s" in at.told
+    at.step(59)
+    assert at.service.posts == 2
+    at.step(1)
+    assert at.service.posts == 3
+    assert f"large.json: {error}; it is sent again in 240 s" in at.told
+    at.service.at_post = lambda _: None
+    at.step(240)
+    assert [name for name, _ in at.service.kept] == ["small.json", "large.json"]
+
+
+def test_retries_end_and_a_restart_sends_again_what_is_not_in_the_journal(tmp_path: Path, clock: list[float]) -> None:
+    def refuse(path: Path) -> None:
+        if path.name == "large.json":
+            raise _refused(413, "The body exceeds 100 MB; send less.")
+        raise _refused(422, "must be finite and greater than 0 (N)")
+
+    with watched(tmp_path, Service(refuse), clock) as at:
+        at.save("spoilt.json")
+        at.save("large.json")
+        at.step(0)
+        for _ in range(10):
+            at.step(100_000)
+        assert at.service.posts == 1 + 6
+        assert len([words for words in at.told if words.startswith("spoilt.json: ")]) == 1
+        assert at.told[-1].endswith("it is left, and sent again once it has changed or at the next start")
+    with watched(tmp_path, Service(), clock) as again:
+        again.step(0)
+        again.step()
+        assert [name for name, _ in again.service.kept] == ["large.json"]

@@ -11,18 +11,25 @@ from underskin.errors import FileError
 from underskin.recordings.reading import read_contents
 
 _PATIENCE = 12  # times as long as a file must be unchanged, before one that no reader opens is taken as it is
+_RETRIES, _LONGER = (
+    5,
+    4,
+)  # of a file whose refusal may pass, and how many times as long the wait is from one to the next
 _TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
 _BESIDE = (".tdms_index",)  # LabVIEW's index of a file, which holds nothing of its own
 
 
 @dataclass
 class _Seen:
-    """A file as it was: size, time of change, since when (monotonic, s), and whether a reader opens it as it is."""
+    """A file as it was: size, time of change, since when (monotonic, s), whether a reader opens it as it is, how often
+    it was postponed, and until when."""
 
     size: int
     changed_ns: int
     since: float
     opens: bool | None = None
+    retries: int = 0
+    not_before: float = 0.0
     done: bool = False
 
 
@@ -50,7 +57,11 @@ class WatchedFolder:
                 known = _Seen(status.st_size, status.st_mtime_ns, now)
             seen[path] = known
         self._seen = seen
-        settled = [path for path, one in seen.items() if not one.done and now - one.since >= self._settle_s]
+        settled = [
+            path
+            for path, one in seen.items()
+            if not one.done and now - one.since >= self._settle_s and now >= one.not_before
+        ]
         return sorted(settled, key=lambda path: seen[path].changed_ns)
 
     def is_complete(self, path: Path) -> bool:
@@ -76,6 +87,17 @@ class WatchedFolder:
     def postpone(self, path: Path) -> None:
         """Take a file for one that has just changed."""
         self._seen[path].since = time.monotonic()
+
+    def retry_later(self, path: Path) -> float | None:
+        """Leave a file for a while, longer each time; the while (s), or None after the last time: the file is done."""
+        seen = self._seen[path]
+        if seen.retries == _RETRIES:
+            self.done(path)
+            return None
+        wait_s = self._settle_s * _PATIENCE * float(_LONGER**seen.retries)
+        seen.retries += 1
+        seen.not_before = time.monotonic() + wait_s
+        return wait_s
 
     def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
         for folder, folders, names in os.walk(self.path, onerror=self._leave_out):

@@ -12,6 +12,7 @@ from underskin.client.watch.folder import WatchedFolder
 from underskin.client.watch.journal import Journal, Target
 from underskin.errors import ServiceError, Unreachable
 from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.readers.parsing_limits import MEMORY_MB, SECONDS
 
 LOOK_S = 1.0  # between two looks at the folder
 _LONGEST_WAIT_S = 60.0  # between two tries of an outage
@@ -102,6 +103,9 @@ class Watcher:
         except ServiceError as error:
             if error.status not in _OF_THE_FILE:
                 raise
+            if _may_pass(error):
+                self._retry_later(path, name, error)
+                return
             refusal = str(error)
         self._goes_on()
         unchanged = self._folder.is_unchanged(path)  # else what it is now is sent once it is complete
@@ -112,6 +116,13 @@ class Watcher:
             self._kept(name, results)
         elif unchanged:
             self._told(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
+
+    def _retry_later(self, path: Path, name: str, error: ServiceError) -> None:
+        """Leave a file that may be taken another time; it is not in the journal, so that a restart sends it again."""
+        self._goes_on()
+        wait_s = self._folder.retry_later(path)
+        left = "it is left, and sent again once it has changed or at the next start"
+        self._told(False, f"{name}: {error}; {left if wait_s is None else f'it is sent again in {wait_s:.0f} s'}")
 
     def _cannot_be(self, what: str, path: Path, error: OSError) -> None:
         """Tell once of a file or folder that cannot be read or opened."""
@@ -136,3 +147,11 @@ class Watcher:
         if self._outage_s:
             self._told(True, "sending goes on")
         self._outage_s = 0.0
+
+
+def _may_pass(error: ServiceError) -> bool:
+    """Whether a refusal of a file may be another one next time: by a proxy, for its size, or since reading it took
+    longer or more memory than a busy server had."""
+    if error.is_foreign or error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
+        return True
+    return any(setting in entry["allowed"] for entry in error.problem["errors"] for setting in (SECONDS, MEMORY_MB))
