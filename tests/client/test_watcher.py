@@ -125,6 +125,27 @@ def test_a_watched_folder_that_is_gone_is_an_outage(at: Bench) -> None:
     assert at.told[1] == "sending goes on"
 
 
+def test_a_file_that_changes_while_another_one_is_sent_waits_until_it_is_complete(at: Bench) -> None:
+    complete = at.save("slow.json").read_bytes()
+    os.utime(at.folder / "slow.json", (2000, 2000))
+    at.save("first.json")
+    os.utime(at.folder / "first.json", (1000, 1000))  # which is sent first, as the older one
+
+    def go_on_writing(path: Path) -> None:
+        if path.name == "first.json":
+            (at.folder / "slow.json").write_bytes(complete + b" ")
+
+    at.service.at_post = go_on_writing
+    at.step(0)
+    at.step()
+    assert [name for name, _ in at.service.kept] == ["first.json"]
+    at.step()
+    assert [name for name, _ in at.service.kept] == ["first.json"]
+    at.step()
+    assert at.service.kept[1:] == [("slow.json", complete + b" ")]
+    assert at.told == ["first.json: kept", "slow.json: kept"]
+
+
 def _refused(status: int, allowed: str) -> ServiceError:
     """As the service refuses a file."""
     kind = {"type": "urn:underskin:problem:invalid-input", "title": "Invalid input", "detail": allowed}

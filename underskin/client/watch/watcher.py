@@ -96,10 +96,13 @@ class Watcher:
             "all_or_nothing": False,
             "together": None,
         }
+        key = content_key([path], terms)
+        if not self._folder.is_unchanged(path):  # since it was listed, others were sent and this one was read
+            return
         results: Results = []
         refusal = ""
         try:
-            results = self._client.campaigns.post_files([path], **terms, idempotency_key=content_key([path], terms))
+            results = self._client.campaigns.post_files([path], **terms, idempotency_key=key)
         except ServiceError as error:
             if error.status not in _OF_THE_FILE:
                 raise
