@@ -235,6 +235,11 @@ class ServiceError(UnderskinError):
         where = _KEY if status == HTTPStatus.UNAUTHORIZED else ""
         super().__init__(f"{status} {problem.get('title', '')}: {problem.get('detail', '')}{where}")
 
+    @property
+    def is_foreign(self) -> bool:
+        """Whether another program answered, such as a proxy before the server."""
+        return "type" not in self.problem
+
 
 class Unreachable(UnderskinError):
     """No answer came from the service; the message names its address and the reason."""

@@ -86,7 +86,7 @@ def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server:
         at.start()
         at.save("good.json", small("good"))
         at.wait_for("good.json: campaign c-")
-        assert (at.told.count("spoilt.json: "), at.told.count("notes.txt: ")) == (1, 1)
+        assert (at.told.count("\nspoilt.json: "), at.told.count("\nnotes.txt: ")) == (1, 1)
         at.save("spoilt.json", small("spoilt"))
         at.wait_for("spoilt.json: campaign c-")
         assert names(server, "refused") == ["good", "spoilt"]
@@ -147,6 +147,20 @@ def test_what_is_not_the_files_fault_is_tried_again(server: Server, tmp_path: Pa
         through.status = None
         at.wait_for("first.json: campaign c-")
         assert "sending goes on" in at.told
+        assert names(server, at.skin) == ["first"]
+
+
+@pytest.mark.parametrize("status", [400, 413])
+def test_a_refusal_by_a_proxy_is_no_final_one(server: Server, tmp_path: Path, status: int) -> None:
+    through = Network(address(server), status=status)
+    with network(through) as url, bench(tmp_path, url, f"proxy-{status}") as at:
+        at.save("first.json", small("first"))
+        at.start()
+        at.wait_for(f"first.json: {status} ")
+        assert "not an answer of underskin" in at.told
+        assert not (at.folder / JOURNAL).exists()
+        through.status = None
+        at.wait_for("first.json: campaign c-")
         assert names(server, at.skin) == ["first"]
 
 

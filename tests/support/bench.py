@@ -68,7 +68,8 @@ class Bench:
 
     def journal(self) -> list[dict[str, Any]]:
         """The entries of the journal."""
-        return list(json.loads((self.folder / JOURNAL).read_text())["entries"])
+        _, *entries = (self.folder / JOURNAL).read_text().splitlines()
+        return [json.loads(entry) for entry in entries]
 
 
 @contextmanager

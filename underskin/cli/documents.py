@@ -17,7 +17,10 @@ def write_json(document: Any) -> None:
 
 
 def write_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """A table; the last column takes what is left of the line."""
+    """A table; the last column takes what is left of the line.
+
+    Raises ValueError where a row has more or fewer cells than there are headings.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -29,6 +32,8 @@ def write_rows(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
     for heading in headings:
         table.add_column(heading, overflow="fold", no_wrap=heading in ("id", "campaign"))
     for row in rows:
+        if len(row) != len(headings):
+            raise ValueError(f"{len(row)} cells under {len(headings)} headings: {row}")
         table.add_row(*map(Text, row))
     Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH).print(table)
 

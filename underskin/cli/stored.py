@@ -66,7 +66,7 @@ def history(
         write_json(found)
         return
     points = [(sensor["sensor"], point) for sensor in found["sensors"] for point in sensor["points"]]
-    headings = ("sensor", "time (UTC)", "d33 pC/N", "±", "campaign")
+    headings = ("sensor", "time (UTC)", "time is", "d33 pC/N", "±", "campaign")
     write_rows(headings, (_point(sensor, point) for sensor, point in points))
     trends = [(sensor["sensor"], _trend(sensor)) for sensor in found["sensors"]]
     write_rows(("sensor", "trend"), trends)
@@ -113,11 +113,10 @@ def _show(detail: Document, diagnoses: Sequence[Document]) -> None:
 
 def _point(sensor: str, point: Document) -> tuple[str, ...]:
     value, uncertainty = point["d33_pc_per_n"], point["d33_uncertainty_pc_per_n"]
-    timed = "" if point["time_is"] == "recorded" else point["time_is"]
     return (
         sensor,
         moment(point["time"]),
-        timed,
+        point["time_is"],
         significant(value, 4),
         significant(uncertainty, 2),
         point["campaign_id"],

@@ -15,6 +15,7 @@ from underskin.errors import InvalidInput, ServiceError, Unreachable
 from underskin.units import Array
 
 _NPZ = "application/x-npz"
+_PROBLEM = "application/problem+json"
 _CONNECT_S = 10.0  # for a network that drops everything, long before a large file would take too long
 
 _ELSEWHERE = " (where it is elsewhere: base_url of Client, --url or UNDERSKIN_URL of the command line)"
@@ -50,7 +51,7 @@ class Session:
             response = self.http.request(method, path, **options)
         document = _document(response)
         if document is None or not response.is_success:
-            raise ServiceError(response.status_code, document or _foreign(response))
+            raise ServiceError(response.status_code, _problem(response))
         return document, response.headers
 
     def arrays(self, path: str, sent: Mapping[str, Any]) -> dict[str, Array]:
@@ -61,7 +62,7 @@ class Session:
         with self.stream("POST", path, content=file.getvalue(), headers=headers) as response:
             content = response.read()
         if response.headers.get("content-type") != _NPZ:
-            raise ServiceError(response.status_code, _foreign(response))
+            raise ServiceError(response.status_code, _problem(response))
         with np.load(io.BytesIO(content), allow_pickle=False) as answered:
             return dict(answered)
 
@@ -71,7 +72,7 @@ class Session:
         with self._reaching(), self.http.stream(method, path, **options) as response:
             if not response.is_success:
                 response.read()
-                raise ServiceError(response.status_code, _document(response) or _foreign(response))
+                raise ServiceError(response.status_code, _problem(response))
             yield response
 
     @contextmanager
@@ -97,6 +98,10 @@ def _document(response: httpx.Response) -> dict[str, Any] | None:
     return document if isinstance(document, dict) else None
 
 
-def _foreign(response: httpx.Response) -> dict[str, Any]:
-    """A problem document for an answer of another program, such as a proxy."""
+def _problem(response: httpx.Response) -> dict[str, Any]:
+    """The problem document of an answer; one without a `type` for an answer of another program, such as a proxy."""
+    if response.headers.get("content-type", "").startswith(_PROBLEM):
+        document = _document(response)
+        if document is not None and str(document.get("type")).startswith("urn:underskin:problem:"):
+            return document
     return {"title": response.reason_phrase, "detail": f"not an answer of underskin: {response.text[:200]!r}"}

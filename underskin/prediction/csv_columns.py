@@ -21,20 +21,20 @@ class CsvError(ValueError):
 @dataclass(frozen=True)
 class CsvColumn:
     """One column: its heading as written, the cells, the lines of the text on which they stand (from 1), the factor to
-    the unit of its field, and whether commas are decimal marks."""
+    the unit of its field, and the decimal mark."""
 
     heading: str
     cells: Sequence[str]
     lines: Sequence[int]
     factor: float
-    decimal_commas: bool
+    decimal: str
 
     def numbers(self, field: str) -> list[float]:
         """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
         return [self._number(field, row, cell) for row, cell in enumerate(self.cells)]
 
     def _number(self, field: str, row: int, cell: str) -> float:
-        value = _number(cell, decimal_commas=self.decimal_commas)
+        value = _number(cell, self.decimal)
         if value is not None:
             return value * self.factor
         hint = f"; {cell} {text.ungrouped(cell)}" if text.is_grouped(cell) else ""
@@ -55,9 +55,9 @@ def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
     """The columns of a text whose first line names the fields; `known` are those that there are.
 
     The text is UTF-8, UTF-16 or Latin-1. Cells are separated by commas, or by semicolons or tabs where the header is;
-    then numbers may have decimal commas. Headings are read in capitals or not, with units in brackets or in the name.
-    A first line `sep=;`, lines that begin with # and lines without a cell say nothing, and neither does a column
-    without a heading that is empty or counts the rows.
+    all numbers have the decimal mark that `text.decimal_mark` finds. Headings are read in capitals or not, with units
+    in brackets or in the name. A first line `sep=;`, lines that begin with # and lines without a cell say nothing, and
+    neither does a column without a heading that is empty or counts the rows.
 
     Raises:
         CsvError: the text is no CSV, a field comes twice, or a row has too many or too few cells.
@@ -66,18 +66,20 @@ def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
     fields: dict[str, CsvColumn] = {}
     unknown: dict[str, list[str]] = {}
     labels: dict[str, list[str]] = {}
-    for place, heading in enumerate(header):
-        cells = [row[place] for row in rows]
+    columns = [[row[place] for row in rows] for place in range(len(header))]
+    values = [cells for heading, cells in zip(header, columns, strict=True) if not _is_named_label(heading)]
+    decimal = text.decimal_mark(lambda _: values, separator)
+    for place, (heading, cells) in enumerate(zip(header, columns, strict=True)):
         meant = template_columns.field_of(heading, known)
         if meant is not None and meant[0] in known:
             field, factor = meant
             if field in fields:
                 twice = f"{fields[field].heading!r} and {heading!r} are the same"
                 raise CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
-            fields[field] = CsvColumn(heading, cells, lines, factor, separator != ",")
+            fields[field] = CsvColumn(heading, cells, lines, factor, decimal)
         elif _only_counts(place, heading, cells):
             continue
-        elif _is_label(heading, cells, separator):
+        elif _is_label(heading, cells, decimal):
             if heading in labels:
                 raise CsvError(f"must name each column once; its header has {heading!r} twice")
             labels[heading] = cells
@@ -133,18 +135,21 @@ def _only_counts(place: int, heading: str, cells: Sequence[str]) -> bool:
     return not any(cells) or (place == 0 and list(cells) in counts)
 
 
-def _is_label(heading: str, cells: Sequence[str], separator: str) -> bool:
+def _is_named_label(heading: str) -> bool:
     lower = heading.lower()
-    if lower in _LABELS or lower.startswith(template_columns.FURTHER):
+    return lower in _LABELS or lower.startswith(template_columns.FURTHER)
+
+
+def _is_label(heading: str, cells: Sequence[str], decimal: str) -> bool:
+    if _is_named_label(heading):
         return True
-    return bool(heading) and all(_number(cell, decimal_commas=separator != ",") is None for cell in cells)
+    return bool(heading) and all(_number(cell, decimal) is None for cell in cells)
 
 
-def _number(cell: str, *, decimal_commas: bool) -> float | None:
-    if cell.isascii() and "_" not in cell:
+def _number(cell: str, decimal: str) -> float | None:
+    if decimal == "." and cell.isascii() and "_" not in cell:
         try:
             return float(cell)  # most cells, in less time
         except ValueError:
             pass
-    value = text.number(cell, ".")
-    return text.number(cell, ",") if value is None and decimal_commas else value
+    return text.number(cell, decimal)

@@ -1,6 +1,8 @@
 """The commands on what the service keeps: as tables, as JSON, and each error in one line."""
 
 import json
+import re
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +45,16 @@ def rows(table: str) -> list[list[str]]:
     return [line.split() for line in body.splitlines()[1:] if line.strip()]
 
 
+def by_heading(table: str) -> list[dict[str, str]]:
+    """The rows of the first table in a text: what stands below each heading."""
+    headings, _, *body = f" {table.lstrip()}".splitlines()
+    names = re.split(r" {2,}", headings.strip())
+    starts = [headings.index(name) for name in names]
+    cells = list(zip(names, starts, [*starts[1:], None], strict=True))
+    lines = takewhile(str.strip, body)
+    return [{name: line[start:end].strip() for name, start, end in cells} for line in lines]
+
+
 def test_campaigns_and_skins_are_listed(server: Server) -> None:
     first, other = sent(server, "first", "palm"), sent(server, "second", "hand")
     assert [row[0] for row in rows(told(server, "campaigns"))] == [other, first]
@@ -78,10 +90,13 @@ def test_the_history_of_a_skin_and_what_it_leaves_out(server: Server) -> None:
     shown = told(server, "history", "palm")
     document = server.http.get("/v1/skins/palm/history").json()
     assert as_json(server, "history", "palm") == document
-    points = {line[-1]: float(line[3]) for line in rows(shown) if line[-1].startswith("c-")}
-    expected = {point["campaign_id"]: point["d33_pc_per_n"] for point in document["sensors"][0]["points"]}
-    assert points == pytest.approx(expected, rel=1e-3)
-    assert set(points) == {first, second}
+    points = [point for sensor in document["sensors"] for point in sensor["points"]]
+    table = by_heading(shown)
+    assert [row["time is"] for row in table] == [point["time_is"] for point in points]
+    for heading, field in (("d33 pC/N", "d33_pc_per_n"), ("±", "d33_uncertainty_pc_per_n")):
+        assert [float(row[heading]) for row in table] == pytest.approx([point[field] for point in points], rel=0.05)
+    assert [row["campaign"] for row in table] == [point["campaign_id"] for point in points]
+    assert {row["campaign"] for row in table} == {first, second}
     assert f"left out: campaign {gone}: withdrawn: wrong sphere" in shown
     assert "none: " in shown  # a trend needs more than two points
     assert "no adopted model" in refused(server, "history", "palm", "--model", "adopted")

@@ -1,23 +1,27 @@
 """The journal of a watched folder: what became of each content that was sent, kept in the folder itself.
 
-`.underskin-watch.json` is replaced whole, so that it is never half written. A file without an entry is sent again,
-which the service answers as before and keeps once, as long as name, rig and estimator are the same.
+`.underskin-watch.json` has a line for its schema, and one for each entry, which is appended; a last line that a power
+cut left unfinished is ignored. A file without an entry is sent again, which the service answers as before and keeps
+once, as long as name, rig and estimator are the same.
 """
 
 import fcntl
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from underskin.errors import UnderskinError
 
 NAME = ".underskin-watch.json"
 _LOCK = ".underskin-watch.lock"
-_SCHEMA = "watch/1"
+_SCHEMA = "watch/2"
+_FIRST_SCHEMA = "watch/1"  # one JSON document with all entries
+_HEADING = json.dumps({"schema": _SCHEMA}) + "\n"
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class Journal:
             raise UnderskinError(f"{folder} is watched by another process already") from None
         except OSError as error:
             raise UnderskinError(f"{folder / _LOCK} cannot be written and locked: {error.strerror}") from error
+        self._has_whole_lines = False  # of this schema, so that a line can be appended
         self._entries = self._read()
 
     def close(self) -> None:
@@ -79,26 +84,53 @@ class Journal:
         """Keep what became of a content; it is on the disk afterwards. Raises UnderskinError."""
         at = datetime.now(UTC).isoformat(timespec="seconds")
         self._entries.append(Entry(sha256, file, target.url, target.skin, target.terms, list(campaigns), at))
-        document = {"schema": _SCHEMA, "entries": list(map(asdict, self._entries))}
-        text = json.dumps(document, indent=1)  # in ASCII: a name may hold letters that have no encoding
-        part = self._path.with_name(f"{NAME}.part")
         try:
-            with part.open("w", encoding="utf-8") as written:
-                written.write(text)
-                written.flush()
-                os.fsync(written.fileno())
-            part.replace(self._path)
+            if self._has_whole_lines and self._path.exists():
+                with self._path.open("a", encoding="utf-8") as journal:
+                    _write(journal, [_line(self._entries[-1])])
+            else:
+                self._replace()
+                self._has_whole_lines = True
         except OSError as error:
             raise UnderskinError(f"the journal {self._path} cannot be written: {error.strerror}") from error
 
+    def _replace(self) -> None:
+        part = self._path.with_name(f"{NAME}.part")
+        with part.open("w", encoding="utf-8") as journal:
+            _write(journal, [_HEADING, *map(_line, self._entries)])
+        part.replace(self._path)
+        folder = os.open(self._path.parent, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # of a network share, which may not have it
+                os.fsync(folder)  # which holds the name
+        finally:
+            os.close(folder)
+
     def _read(self) -> list[Entry]:
         try:
-            document: Any = json.loads(self._path.read_text(encoding="utf-8"))
-            if document["schema"] != _SCHEMA:
+            text = self._path.read_text(encoding="utf-8")
+            if text.startswith(_HEADING):
+                *lines, unfinished = text.removeprefix(_HEADING).split("\n")
+                self._has_whole_lines = not unfinished
+                return [Entry(**json.loads(line)) for line in lines]
+            document: Any = json.loads(text)
+            if document["schema"] != _FIRST_SCHEMA:
                 raise ValueError(f"it is {document['schema']}, not {_SCHEMA}")
             return [Entry(**entry) for entry in document["entries"]]
         except FileNotFoundError:
             return []
         except (OSError, ValueError, KeyError, TypeError) as error:
+            self.close()
             again = "move it away; what was sent is sent again then, and kept once"
             raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {again}") from error
+
+
+def _line(entry: Entry) -> str:
+    return json.dumps(asdict(entry)) + "\n"  # in ASCII: a name may hold letters that have no encoding
+
+
+def _write(journal: TextIO, lines: Iterable[str]) -> None:
+    """Write lines, onto the disk."""
+    journal.writelines(lines)
+    journal.flush()
+    os.fsync(journal.fileno())

@@ -12,6 +12,7 @@ from underskin.client.watch.folder import WatchedFolder
 from underskin.client.watch.journal import Journal, Target
 from underskin.errors import ServiceError, Unreachable
 from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.readers.parsing_limits import MEMORY_MB, SECONDS
 
 LOOK_S = 1.0  # between two looks at the folder
 _LONGEST_WAIT_S = 60.0  # between two tries of an outage
@@ -52,13 +53,16 @@ class Watcher:
         self._url, self._skin, self._rig, self._estimator = url, skin, rig, estimator
         self._kept, self._told = kept, told
         self._outage_s = 0.0  # to wait before the next try; 0 while all is well
-        self._unopened: set[Path] = set()  # of which was told that they cannot be opened
+        self._unopened: set[Path] = set()  # of which was told that they cannot be opened or looked at
 
     def step(self) -> float:
         """Send what is complete; the seconds to wait until the next step."""
         try:
             target = self._target()
-            for path in self._folder.settled():
+            settled = self._folder.settled()
+            for path, reason in self._folder.unreadable.items():
+                self._cannot_be("read", path, reason)
+            for path in settled:
                 if self._rig is None or path.resolve() != self._rig.resolve():
                     self._take(path, target)
         except (ServiceError, Unreachable, OSError) as error:
@@ -81,9 +85,7 @@ class Watcher:
         except FileNotFoundError:  # renamed meanwhile: found by its new name
             return
         except OSError as error:
-            if path not in self._unopened:
-                self._unopened.add(path)
-                self._told(False, f"{name}: cannot be opened: {error.strerror}; it is tried again")
+            self._cannot_be("opened", path, error)
             self._folder.postpone(path)
 
     def _send(self, path: Path, name: str, target: Target, sha256: str) -> None:
@@ -94,13 +96,19 @@ class Watcher:
             "all_or_nothing": False,
             "together": None,
         }
+        key = content_key([path], terms)
+        if not self._folder.is_unchanged(path):  # since it was listed, others were sent and this one was read
+            return
         results: Results = []
         refusal = ""
         try:
-            results = self._client.campaigns.post_files([path], **terms, idempotency_key=content_key([path], terms))
+            results = self._client.campaigns.post_files([path], **terms, idempotency_key=key)
         except ServiceError as error:
             if error.status not in _OF_THE_FILE:
                 raise
+            if _may_pass(error):
+                self._retry_later(path, name, error)
+                return
             refusal = str(error)
         self._goes_on()
         unchanged = self._folder.is_unchanged(path)  # else what it is now is sent once it is complete
@@ -111,6 +119,20 @@ class Watcher:
             self._kept(name, results)
         elif unchanged:
             self._told(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
+
+    def _retry_later(self, path: Path, name: str, error: ServiceError) -> None:
+        """Leave a file that may be taken another time; it is not in the journal, so that a restart sends it again."""
+        self._goes_on()
+        wait_s = self._folder.retry_later(path)
+        left = "it is left, and sent again once it has changed or at the next start"
+        self._told(False, f"{name}: {error}; {left if wait_s is None else f'it is sent again in {wait_s:.0f} s'}")
+
+    def _cannot_be(self, what: str, path: Path, error: OSError) -> None:
+        """Tell once of a file or folder that cannot be read or opened."""
+        if path not in self._unopened:
+            self._unopened.add(path)
+            name = path.relative_to(self._folder.path)
+            self._told(False, f"{name}: cannot be {what}: {error.strerror}; it is tried again")
 
     def _target(self) -> Target:
         rig = None if self._rig is None else content_sha256(self._rig)
@@ -128,3 +150,11 @@ class Watcher:
         if self._outage_s:
             self._told(True, "sending goes on")
         self._outage_s = 0.0
+
+
+def _may_pass(error: ServiceError) -> bool:
+    """Whether a refusal of a file may be another one next time: by a proxy, for its size, or since reading it took
+    longer or more memory than a busy server had."""
+    if error.is_foreign or error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
+        return True
+    return any(setting in entry["allowed"] for entry in error.problem["errors"] for setting in (SECONDS, MEMORY_MB))

@@ -1,0 +1,96 @@
+"""The journal of a watched folder: what is in it after an end of any kind."""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from underskin.client.watch.journal import NAME, Journal, Target
+from underskin.errors import UnderskinError
+
+TARGET = Target("http://bench", "palm", "terms")
+
+
+@contextmanager
+def opened(folder: Path) -> Iterator[Journal]:
+    journal = Journal(folder)
+    try:
+        yield journal
+    finally:
+        journal.close()
+
+
+def known(folder: Path, *digests: str) -> list[bool]:
+    with opened(folder) as journal:
+        return [journal.known(TARGET, digest) is not None for digest in digests]
+
+
+def test_an_entry_is_appended_and_read_again(tmp_path: Path) -> None:
+    for number in range(4):
+        with opened(tmp_path) as journal:
+            journal.add(TARGET, f"a{number}", os.fsdecode(b"\xfcber Nacht.csv"), ["c-1"])
+            journal.add(TARGET, f"b{number}", "refused.csv", [])
+        lines = (tmp_path / NAME).read_text().splitlines(keepends=True)
+        assert len(lines) == 1 + 2 * (number + 1)
+    assert known(tmp_path, "a0", "b0", "a3", "b3", "c0") == [True, True, True, True, False]
+    with opened(tmp_path) as journal:
+        entry = journal.known(TARGET, "a2")
+        assert entry is not None
+        assert entry.file == os.fsdecode(b"\xfcber Nacht.csv")
+
+
+def test_a_line_that_a_power_cut_left_unfinished_is_ignored(tmp_path: Path) -> None:
+    with opened(tmp_path) as journal:
+        for digest in ("a", "b"):
+            journal.add(TARGET, digest, "file.csv", ["c-1"])
+    whole = (tmp_path / NAME).read_bytes()
+    for cut in range(whole.index(b"\n", 30) + 1, len(whole)):
+        (tmp_path / NAME).write_bytes(whole[:cut])
+        assert known(tmp_path, "a", "b") == [True, False]
+        with opened(tmp_path) as journal:
+            journal.add(TARGET, "c", "file.csv", ["c-2"])
+        assert known(tmp_path, "a", "b", "c") == [True, False, True]
+
+
+def test_a_journal_of_the_first_schema_is_read_and_gone_on_with(tmp_path: Path) -> None:
+    entry = {"sha256": "a", "file": "file.csv", "url": "http://bench", "skin": "palm", "terms": "terms"}
+    first = {"schema": "watch/1", "entries": [{**entry, "campaigns": ["c-1"], "at": "2026-01-01T00:00:00+00:00"}]}
+    (tmp_path / NAME).write_text(json.dumps(first, indent=1))
+    with opened(tmp_path) as journal:
+        assert journal.known(TARGET, "a") is not None
+        journal.add(TARGET, "b", "other.csv", ["c-2"])
+    assert known(tmp_path, "a", "b") == [True, True]
+
+
+def test_a_journal_that_was_deleted_meanwhile_is_written_again(tmp_path: Path) -> None:
+    with opened(tmp_path) as journal:
+        journal.add(TARGET, "a", "file.csv", ["c-1"])
+        (tmp_path / NAME).unlink()
+        journal.add(TARGET, "b", "file.csv", ["c-1"])
+    assert known(tmp_path, "a", "b") == [True, True]
+
+
+@pytest.mark.parametrize("text", ["", "{", '{"schema": "watch/3"}\n', '{"schema": "watch/2"}\n{"sha256": 1}\n'])
+def test_a_journal_that_cannot_be_understood_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / NAME).write_text(text)
+    with pytest.raises(UnderskinError, match=r"cannot be read: .*move it away"):
+        Journal(tmp_path)
+
+
+def test_what_was_added_is_on_the_disk_with_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    synced: list[Path] = []
+    sync = os.fsync
+
+    def noted(descriptor: int) -> None:
+        synced.append(Path(f"/proc/self/fd/{descriptor}").readlink())
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", noted)
+    with opened(tmp_path) as journal:
+        journal.add(TARGET, "a", "file.csv", ["c-1"])
+        assert synced == [tmp_path / f"{NAME}.part", tmp_path]
+        journal.add(TARGET, "b", "file.csv", ["c-1"])
+        assert synced[2:] == [tmp_path / NAME]
