@@ -74,21 +74,6 @@ def listed(ids: Sequence[str], noun: str) -> str:
     return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
 
 
-def sensor_alone(sensor: str, share: float, recordings: int) -> str:
-    """A sensor at another level than all others, which are alike."""
-    return (
-        f"sensor {sensor!r} responds with {share:.2f} of the others' charge, and they are alike: its own d33 or its "
-        f"cable; taken to their level by this factor ({recordings} recordings)"
-    )
-
-
-def cables_exchanged(first: str, second: str, since: str, recordings: int, put_right: bool) -> str:
-    """Two sensors' cables exchanged from some recording on."""
-    done = "put right" if put_right else "left out"
-    text = f"from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} answer as each other"
-    return f"{text}: their cables look exchanged; {done} ({recordings} recordings)"
-
-
 def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:
     """Some recordings a fixed factor beside the others."""
     untold = f"; {left_out} that do not tell were left out" if left_out else ""
