@@ -97,6 +97,18 @@ def test_labels_that_no_permutation_explains_are_left_out(table: SigmaTable) -> 
     assert {entry.sensor for entry in frf_recordings(inspected.campaign)} == {"s3"}
 
 
+def test_an_exchange_with_a_sensor_that_has_no_recording_of_its_own_is_put_right(
+    good: Campaign, table: SigmaTable
+) -> None:
+    """The recordings at s2 are labelled s0, and none is labelled s2."""
+    once = replace(good, recordings=good.recordings[:24])
+    inspected = inspect(changed(once, lambda entry, n: replace(entry, sensor="s0") if n >= 16 else entry), table)
+    assert named(inspected) == [Reason.CABLES_EXCHANGED]
+    assert [entry.sensor for entry in frf_recordings(inspected.campaign)] == [
+        entry.sensor for entry in frf_recordings(once)
+    ]
+
+
 def unheard(silent: Collection[str], since: int) -> Change:
     """No response of these sensors from a recording on, pressed where they are."""
     random = np.random.default_rng(6)

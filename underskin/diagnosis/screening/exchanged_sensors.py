@@ -70,28 +70,27 @@ def without_exchanges(
     evidence = ExchangeEvidence(campaign.skin, known, level[tells] / (usual * largest), largest, table)
     links = _links(campaign, [entry for entry, odd in zip(known, unasked[tells], strict=True) if odd])
     right, findings = list[FrfRecording | None](entries), list[Finding]()
-    exchanges, contradicting = _explained(known, links, evidence)
+    mute = set(own) - {entry.sensor for entry in known}
+    exchanges, contradicting = _explained(known, links, evidence, mute)
     for found in exchanges:
         findings.append(_finding(found, known))
         for number in found.since:
             right[tells[number]] = _at_place(campaign, known[number], found.place)
     if contradicting:
-        sensors = sorted({known[number].sensor for number in contradicting})
-        arguments = {"sensors": sensors, "recordings": len(contradicting)}
-        findings.append(Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments))
+        findings.append(_contradiction([known[number] for number in contradicting]))
         for number in contradicting:
             right[tells[number]] = None
     return [entry for entry in right if entry is not None], findings
 
 
 def _explained(
-    entries: Sequence[FrfRecording], links: Sequence[tuple[str, str]], evidence: ExchangeEvidence
+    entries: Sequence[FrfRecording], links: Sequence[tuple[str, str]], evidence: ExchangeEvidence, mute: set[str]
 ) -> tuple[list[_Exchange], list[int]]:
-    """The exchanges by which every sensor gains, each sensor in one of them at most, and the recordings of other
-    sensors that gain alone."""
+    """The exchanges by which every sensor gains, each sensor in one of them at most and none of the `mute`, whose
+    recordings tell nothing; and the recordings of other sensors that gain alone."""
     moves = _weighed(entries, [{name: place} for name, place in links], evidence)
     best = {name: place for one in reversed(moves) for name, place in one.place.items()}
-    chosen, settled = list[_Exchange](), set[str]()
+    chosen, settled = list[_Exchange](), set(mute)
     for one in _weighed(entries, _permutations(links, best), evidence):
         consistent = all(best.get(name, place) == place for name, place in one.place.items())
         if consistent and one.least > _EACH and not settled & set(one.place):
@@ -108,8 +107,6 @@ def _weighed(
     found = []
     for place in tried:
         own = sorted((n for n, entry in enumerate(entries) if entry.sensor in place), key=lambda n: order[n])
-        if {entries[number].sensor for number in own} != set(place):
-            continue  # one of them tells nothing
         start = evidence.exchange(np.array(own), [place[entries[number].sensor] for number in own])
         gain = start.gain - log(len(tried))
         if gain > _GAIN:
@@ -154,6 +151,11 @@ def _finding(found: _Exchange, entries: Sequence[FrfRecording]) -> Finding:
         return Finding(Reason.LABELS_EXCHANGED, "", "sensor", {"first": first, "second": second})
     arguments = {"first": first, "second": second, "since": since, "recordings": len(found.since)}
     return Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
+
+
+def _contradiction(entries: Sequence[FrfRecording]) -> Finding:
+    arguments = {"sensors": sorted({entry.sensor for entry in entries}), "recordings": len(entries)}
+    return Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments)
 
 
 def _usual(level: Floats, shape: Floats) -> float | None:
