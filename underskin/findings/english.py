@@ -143,8 +143,7 @@ ENGLISH: Mapping[Reason, Words] = {
         f"the sign of {len(reversed_recordings)} of {recordings} recordings is the opposite of the others', with no "
         f"order in it: reversed ({sentences.listed(reversed_recordings, 'recordings')})"
     ),
-    Reason.ALL_CONJUGATED: "the phase over frequency is one that no sensor or amplifier can have unless it is turned: "
-    "the FRFs look conjugated, in the convention e^(-iωt); all were conjugated back (if not, the force channel lags)",
+    Reason.ALL_CONJUGATED: sentences.all_conjugated,
     Reason.RECORDINGS_CONJUGATED: lambda conjugated, recordings: (
         f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
         f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"

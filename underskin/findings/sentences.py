@@ -74,6 +74,19 @@ def listed(ids: Sequence[str], noun: str) -> str:
     return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
 
 
+def all_conjugated(lag_us: float | None) -> str:
+    """All FRFs in the other sign convention, or a force channel that lags."""
+    if lag_us is not None:
+        return (
+            "the phase over frequency leads: either the FRFs are conjugated, in the convention e^(-iωt), or the force "
+            f"channel lags by {lag_us:.2g} µs; these recordings cannot tell which, and nothing was changed"
+        )
+    return (
+        "the phase over frequency is one that no sensor or amplifier can have unless it is turned: the FRFs look "
+        "conjugated, in the convention e^(-iωt); all were conjugated back"
+    )
+
+
 def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:
     """Some recordings a fixed factor beside the others."""
     untold = f"; {left_out} that do not tell were left out" if left_out else ""
