@@ -80,6 +80,17 @@ def test_four_sensors_shifted_by_one_are_put_right_and_no_pair_of_them_is(table:
     ]
 
 
+def test_a_rotation_is_put_right_where_not_every_sensor_would_show_it_alone(table: SigmaTable) -> None:
+    """The rig's contacts lie between the sensors: those of s05, labelled s09, might be of its neighbours."""
+    made, _ = from_dict(recorded_campaign(record(drawn(944001, 49, "single"))))
+    label = {"s05": "s09", "s09": "s04", "s04": "s05"}
+    wrong = changed(made, lambda entry, _: replace(entry, sensor=label.get(entry.sensor, entry.sensor)))
+    inspected = inspect(wrong, table)
+    assert named(inspected) == [Reason.LABELS_PERMUTED]
+    right = {entry.id: entry.sensor for entry in frf_recordings(made)}
+    assert all(right[entry.id] == entry.sensor for entry in frf_recordings(inspected.campaign))
+
+
 def test_labels_that_no_permutation_explains_are_left_out(table: SigmaTable) -> None:
     """The channel of s0 has the charge of s1, that of s1 the charge of s2, that of s2 none; s3 is right."""
     random = np.random.default_rng(6)

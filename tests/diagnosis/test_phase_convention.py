@@ -90,7 +90,7 @@ def test_a_pure_lead_is_either_conjugated_or_a_lag_of_the_force_channel(microsec
 
 def test_a_filter_on_the_force_channel_alone_is_a_lag() -> None:
     """Of second order at 10 kHz, critically damped: 2/ω0 late, 32 µs, far below its corner."""
-    filtered = recordings([(1 + 1j * FREQUENCY / 10e3) ** 2] * 24, 0.01)
+    filtered = recordings([np.asarray((1 + 1j * FREQUENCY / 10e3) ** 2, dtype=np.complex128)] * 24, 0.01)
     (finding,) = in_one_convention(filtered)[1]
     assert finding.arguments["lag_us"] == pytest.approx(32.0, rel=0.1)
     assert as_given(filtered)

@@ -121,14 +121,15 @@ def _links(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[st
 
 
 def _permutations(links: Sequence[tuple[str, str]], best: Mapping[str, str]) -> list[dict[str, str]]:
-    """The exchange of each link, and the cycles of three sensors or more that the `best` place of each makes."""
+    """The exchange of each link, and the cycles of three sensors or more that the `best` places make; the last sensor
+    of a chain, of which no place is plain, may close it."""
     tried = [{first: second, second: first} for first, second in sorted({(min(link), max(link)) for link in links})]
     for start in sorted(best):
         cycle = [start]
         while (following := best.get(cycle[-1])) is not None and following not in cycle:
             cycle.append(following)
-        if following == start == min(cycle) and len(cycle) > 2:
-            tried.append({name: best[name] for name in cycle})
+        if len(cycle) > 2 and (following is None or following == start == min(cycle)):
+            tried.append(dict(zip(cycle, [*cycle[1:], start], strict=True)))
     return tried
 
 
