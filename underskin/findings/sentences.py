@@ -79,7 +79,8 @@ def all_conjugated(lag_us: float | None) -> str:
     if lag_us is not None:
         return (
             "the phase over frequency leads: either the FRFs are conjugated, in the convention e^(-iωt), or the force "
-            f"channel lags by {lag_us:.2g} µs; these recordings cannot tell which, and nothing was changed"
+            f"channel lags by {float(f'{lag_us:.2g}'):g} µs; these recordings cannot tell which, and nothing was "
+            "changed"
         )
     return (
         "the phase over frequency is one that no sensor or amplifier can have unless it is turned: the FRFs look "
