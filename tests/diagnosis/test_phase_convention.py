@@ -30,6 +30,11 @@ def reasons(entries: list[FrfRecording]) -> list[Reason]:
     return [finding.reason for finding in in_one_convention(entries)[1]]
 
 
+def as_given(entries: list[FrfRecording]) -> bool:
+    """Whether nothing is changed."""
+    return all(one is other for one, other in zip(in_one_convention(entries)[0], entries, strict=True))
+
+
 def delayed(microseconds: float) -> Complexes:
     return np.asarray(np.exp(-2e-6j * np.pi * FREQUENCY * microseconds))
 
@@ -68,6 +73,37 @@ def test_a_small_phase_that_no_listed_mechanism_has_is_conjugated(
     assert reasons(given) == []
     conjugated = recordings([law(strength).conj()] * 24, 0.01)
     assert reasons(conjugated) == [Reason.ALL_CONJUGATED]
+    assert as_given(conjugated) == (law is delayed)
+
+
+@pytest.mark.parametrize("microseconds", [20.0, 50.0, 500.0])
+def test_a_pure_lead_is_either_conjugated_or_a_lag_of_the_force_channel(microseconds: float) -> None:
+    """A conjugated delay is a force channel that lags, to the last digit: both are said, and nothing is changed."""
+    leading = recordings([delayed(-microseconds)] * 24, 0.01)
+    (finding,) = in_one_convention(leading)[1]
+    assert finding.reason == Reason.ALL_CONJUGATED
+    assert finding.arguments["lag_us"] == pytest.approx(microseconds, rel=0.1)
+    assert "either the FRFs are conjugated" in finding.statement
+    assert "nothing was changed" in finding.statement
+    assert "e+" not in finding.statement
+    assert as_given(leading)
+
+
+def test_a_filter_on_the_force_channel_alone_is_a_lag() -> None:
+    """Of second order at 10 kHz, critically damped: 2/ω0 late, 32 µs, far below its corner."""
+    filtered = recordings([np.asarray((1 + 1j * FREQUENCY / 10e3) ** 2, dtype=np.complex128)] * 24, 0.01)
+    (finding,) = in_one_convention(filtered)[1]
+    assert finding.arguments["lag_us"] == pytest.approx(32.0, rel=0.1)
+    assert as_given(filtered)
+
+
+def test_a_lag_of_the_force_channel_beside_a_high_pass_is_no_other_convention() -> None:
+    """The high pass tells that the phase is as it should be; conjugated, it tells that it is not."""
+    lagging = high_passed(0.5) * delayed(-100.0)
+    assert reasons(recordings([lagging] * 24, 0.01)) == []
+    turned = recordings([(high_passed(0.5) * delayed(100.0)).conj()] * 24, 0.01)
+    assert reasons(turned) == [Reason.ALL_CONJUGATED]
+    assert not as_given(turned)
 
 
 def _resonance(natural_hz: Floats, damping: float) -> list[Complexes]:
@@ -81,10 +117,25 @@ def test_a_resonance_inside_the_band_is_not_conjugated_where_its_turn_cannot_be_
         assert reasons(recordings(_resonance(np.geomspace(120, 150, 20), 0.01), 0.03, seed)) == []
 
 
-def test_a_resonance_above_the_band_tells_the_convention() -> None:
+def test_a_resonance_at_the_top_of_the_band_tells_the_convention() -> None:
+    natural = np.geomspace(900.0, 1100.0, 20)
+    assert reasons(recordings(_resonance(natural, 0.1), 0.005)) == []
+    conjugated = recordings([one.conj() for one in _resonance(natural, 0.1)], 0.005)
+    assert reasons(conjugated) == [Reason.ALL_CONJUGATED]
+    assert not as_given(conjugated)
+
+
+def test_a_conjugated_resonance_far_above_the_band_may_be_one_beside_a_lag_of_the_force_channel() -> None:
+    """Its damping delays the charge by 2ζ/ω0, whatever the frequency."""
     natural = np.geomspace(1200.0, 2000.0, 20)
     assert reasons(recordings(_resonance(natural, 0.02), 0.005)) == []
-    assert reasons(recordings([one.conj() for one in _resonance(natural, 0.02)], 0.005)) == [Reason.ALL_CONJUGATED]
+    for either in (
+        [one.conj() for one in _resonance(natural, 0.02)],
+        [one * delayed(-20.0) for one in _resonance(natural, 0.02)],
+    ):
+        entries = recordings(either, 0.005)
+        assert reasons(entries) == [Reason.ALL_CONJUGATED]
+        assert as_given(entries)
 
 
 @pytest.mark.parametrize("amplitude", [0.03, 0.3])

@@ -246,3 +246,14 @@ def test_unusable_series_are_refused_by_name(force: Floats, charge: Floats, fiel
     with pytest.raises(InvalidInput) as refusal:
         estimate(force, charge, RATE)
     assert refusal.value.field == field
+
+
+def test_a_resonance_is_read_from_the_finite_lines() -> None:
+    frequency = np.linspace(100.0, 1000.0, 200)
+    ratio = frequency / 500.0
+    values = np.asarray(1 / (1 - ratio**2 + 0.1j * ratio), dtype=np.complex128)
+    values[[3, 85, 95]] = np.nan, np.inf, complex(np.nan, 1.0)
+    found = resonance(Frf(frequency, values, None))
+    assert found is not None
+    assert found == pytest.approx((500.0, 0.05), rel=1e-6)
+    assert resonance(Frf(frequency, np.full(200, np.nan, dtype=np.complex128), None)) is None

@@ -6,7 +6,7 @@ This table and `sentences` are the one place that knows them; another language i
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from underskin.findings import sentences
+from underskin.findings import sensor_sentences, sentences
 from underskin.findings.codes import Reason
 from underskin.findings.lacking import Lack, Lacking
 
@@ -143,15 +143,17 @@ ENGLISH: Mapping[Reason, Words] = {
         f"the sign of {len(reversed_recordings)} of {recordings} recordings is the opposite of the others', with no "
         f"order in it: reversed ({sentences.listed(reversed_recordings, 'recordings')})"
     ),
-    Reason.ALL_CONJUGATED: "the phase over frequency is one that no sensor or amplifier can have unless it is turned: "
-    "the FRFs look conjugated, in the convention e^(-iωt); all were conjugated back (if not, the force channel lags)",
+    Reason.ALL_CONJUGATED: sentences.all_conjugated,
     Reason.RECORDINGS_CONJUGATED: lambda conjugated, recordings: (
         f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
         f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"
     ),
     Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
     "or their places, look exchanged; put right",
-    Reason.CABLES_EXCHANGED: sentences.cables_exchanged,
+    Reason.CABLES_EXCHANGED: sensor_sentences.cables_exchanged,
+    Reason.LABELS_PERMUTED: sensor_sentences.labels_permuted,
+    Reason.LABELS_CONTRADICT_PLACES: sensor_sentences.labels_contradict_places,
+    Reason.SILENT_TOGETHER: sensor_sentences.silent_together,
     Reason.AMPLITUDE_FACTOR: sentences.amplitude_factor,
     Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
@@ -210,8 +212,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WEAK: f"weak: {_OF_ARRAY}",
     Reason.WEAK_SENSOR: "sensor {sensor!r} answers with {share:.2g} of the others' level: a fault of this sensor, its "
     "cable or its range, beyond any spread; left out ({recordings} recordings)",
-    Reason.SENSOR_WEAKER: sentences.sensor_alone,
-    Reason.SENSOR_STRONGER: sentences.sensor_alone,
+    Reason.SENSOR_WEAKER: sensor_sentences.sensor_alone,
+    Reason.SENSOR_STRONGER: sensor_sentences.sensor_alone,
     Reason.STRONG: f"strong: {_OF_ARRAY}",
     Reason.NOISY_LINES: "noisy: its lines scatter {times:.1f} times as much as those of the others",
     Reason.NOISY_RECORDINGS: "noisy: its recordings scatter {times:.1f} times as much as expected",

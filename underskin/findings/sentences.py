@@ -74,19 +74,18 @@ def listed(ids: Sequence[str], noun: str) -> str:
     return f"{noun if len(ids) > 1 else noun.removesuffix('s')} {', '.join(ids)}"
 
 
-def sensor_alone(sensor: str, share: float, recordings: int) -> str:
-    """A sensor at another level than all others, which are alike."""
+def all_conjugated(lag_us: float | None) -> str:
+    """All FRFs in the other sign convention, or a force channel that lags."""
+    if lag_us is not None:
+        return (
+            "the phase over frequency leads: either the FRFs are conjugated, in the convention e^(-iωt), or the force "
+            f"channel lags by {float(f'{lag_us:.2g}'):g} µs; these recordings cannot tell which, and nothing was "
+            "changed"
+        )
     return (
-        f"sensor {sensor!r} responds with {share:.2f} of the others' charge, and they are alike: its own d33 or its "
-        f"cable; taken to their level by this factor ({recordings} recordings)"
+        "the phase over frequency is one that no sensor or amplifier can have unless it is turned: the FRFs look "
+        "conjugated, in the convention e^(-iωt); all were conjugated back"
     )
-
-
-def cables_exchanged(first: str, second: str, since: str, recordings: int, put_right: bool) -> str:
-    """Two sensors' cables exchanged from some recording on."""
-    done = "put right" if put_right else "left out"
-    text = f"from recording {since!r} on, in the order of time, sensors {first!r} and {second!r} answer as each other"
-    return f"{text}: their cables look exchanged; {done} ({recordings} recordings)"
 
 
 def amplitude_factor(factor: float, meant: str, of: Sequence[str], recordings: int, left_out: int) -> str:

@@ -1,4 +1,4 @@
-"""How probable the levels of recordings are with two sensors exchanged from some recording on, and without.
+"""How probable the levels of recordings are with the labels of sensors exchanged from some recording on, and without.
 
 A recording's level is
     y_i = d S_i(e) + N(0, (s d S_i)² + (p d |∂S_i/∂place|)² + (f d max S)²),
@@ -7,6 +7,9 @@ places, s what sensors, scatter and unnamed physics make of a level, p the scatt
 sensor that is pressed nowhere near (its neighbours' charge). With probability ε a level is anything up to twice the
 largest. The evidence is averaged over e, d, s, p and f, and over the recordings from which on the sensors may be
 exchanged: one half for all of them, the other half evenly over the later ones.
+
+ε bounds what a wrong label costs, so that the evidence of an exchange may be that of one sensor alone, while the other
+one stays as wrong as it was. Each sensor's own gain, with the others exchanged, tells.
 """
 
 from collections.abc import Sequence
@@ -32,10 +35,12 @@ _FREE = np.array(  # d over the usual one, s, p [mm], f
 
 @dataclass(frozen=True)
 class Start:
-    """From which of the pair's recordings on, in time, two sensors are exchanged, and by how much ln evidence gains."""
+    """From which of the sensors' recordings on, in time, they are exchanged, and by how much ln evidence gains: by all,
+    and at least by each of them with the others exchanged."""
 
     first: int
     gain: float
+    least: float
 
 
 class ExchangeEvidence:
@@ -55,19 +60,23 @@ class ExchangeEvidence:
         self._total += self._prior[:, None]
 
     def exchange(self, own: Indices, others: Sequence[str]) -> Start:
-        """The most probable start of an exchange; `own` are the pair's recordings in time, `others` the other sensor of
-        each."""
+        """The most probable start of an exchange; `own` are the sensors' recordings in time, `others` the sensor that
+        each is of."""
         turned = self._response([self._entries[number] for number in own], others)
         given = DisplacedResponse(self._own.value[:, own], self._own.slope[:, own])
-        level, evidence = self._level[own], np.full(len(own), -np.inf)
-        for at, total in enumerate(self._total):
-            change = self._density(turned, level, at) - self._density(given, level, at)
-            since = np.cumsum(change[:, ::-1], axis=1)[:, ::-1]
-            evidence = np.logaddexp(evidence, logsumexp(total[:, None] + since, axis=0))
+        level, places = self._level[own], range(len(self._miss_mm))
+        change = np.stack([self._density(turned, level, at) - self._density(given, level, at) for at in places])
+        since = np.cumsum(change[..., ::-1], axis=-1)[..., ::-1]
+        evidence = logsumexp(self._total[..., None] + since, axis=(0, 1))
         prior = np.full(len(own), -log(2 * max(len(own) - 1, 1)))
         prior[0] = -log(2)
         weighed = evidence - logsumexp(self._total) + prior
-        return Start(int(np.argmax(weighed)), float(logsumexp(weighed)))
+        first = int(np.argmax(weighed))
+        sensor = np.array([self._entries[number].sensor for number in own[first:]])
+        without = [
+            logsumexp(self._total + change[..., first:][..., sensor != name].sum(axis=-1)) for name in set(sensor)
+        ]
+        return Start(first, float(logsumexp(weighed)), float(evidence[first] - max(without)))
 
     @property
     def _prior(self) -> Floats:

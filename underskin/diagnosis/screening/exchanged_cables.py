@@ -67,7 +67,7 @@ def with_right_sensors(
         entry = entries[number]
         there = second if entry.sensor == first else first
         right[number] = replace(entry, sensor=there, position_mm=_moved(entry, places[entry.sensor], places[there]))
-    return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", {**arguments, "put_right": True})
+    return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
 
 
 def _moved(entry: FrfRecording, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float] | None:

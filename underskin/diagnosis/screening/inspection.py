@@ -17,6 +17,7 @@ from underskin.diagnosis.screening.level_slips import without_level_slips
 from underskin.diagnosis.screening.model_consistency import against_model
 from underskin.diagnosis.screening.phase_convention import in_one_convention
 from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
+from underskin.diagnosis.screening.silent_together import without_silent_pair
 from underskin.diagnosis.screening.time_series import as_given, as_lines
 from underskin.diagnosis.screening.unit_errors import faint_oscillation, loose_sphere, single_unit_errors
 from underskin.findings.codes import Reason
@@ -68,8 +69,9 @@ def _inspect_lines(
     findings += [*_constant_axes(entries), *faint_oscillation(entries)]
     entries, of_phase = in_one_convention(entries)
     entries, of_sensors = without_exchanges(campaign, entries, table)
+    entries, silent = without_silent_pair(entries)
     consistent = against_model(campaign, entries, table, kept)
-    findings += [*of_phase, *of_sensors, *consistent.findings]
+    findings += [*of_phase, *of_sensors, *silent, *consistent.findings]
     if consistent.lacking is not None:
         return _inspected(campaign, consistent.entries, findings, consistent.lacking)
     entries, of_levels = without_level_slips(campaign, consistent.entries, table)

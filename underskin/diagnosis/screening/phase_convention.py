@@ -3,7 +3,8 @@
 Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
 best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
 phases must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain
-the conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is.
+the conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is. Where a lag of the
+force channel explains the course as well, both readings are stated and nothing is changed.
 """
 
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from scipy.special import log_ndtr
 from scipy.stats import norm
 
 from underskin.diagnosis.screening.phase_course import PhaseCourses, phase_courses
-from underskin.diagnosis.screening.phase_laws import Course, misfit, unlisted_misfit
+from underskin.diagnosis.screening.phase_laws import Course, leading, misfit, unlisted_misfit
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -43,20 +44,24 @@ def in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecordin
     if not courses.telling.any():
         return list(entries), []
     signs = _aligned(courses)
-    orientation = _orientation(entries, courses, signs)
+    orientation, lag_us = _orientation(entries, courses, signs)
+    findings = list[Finding]()
     if orientation == 0:  # both may be: most recordings decide
         orientation = 1 if (signs < 0).sum() <= (signs > 0).sum() else -1
+        if lag_us is not None and orientation == 1:
+            findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": lag_us}))
     turned = orientation * signs < 0
     if not turned.any():
-        return list(entries), []
+        return list(entries), findings
     ids = [entry.id for entry, wrong in zip(entries, turned, strict=True) if wrong]
     if turned[courses.telling].all():
         turned = np.ones(len(entries), dtype=bool)
-        finding = Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n")
+        findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": None}))
     else:
         arguments = {"conjugated": ids, "recordings": len(entries)}
-        finding = Finding(Reason.RECORDINGS_CONJUGATED, ids[0] if len(ids) == 1 else "", "frf_im_pc_per_n", arguments)
-    return [_conjugated(entry) if wrong else entry for entry, wrong in zip(entries, turned, strict=True)], [finding]
+        about = ids[0] if len(ids) == 1 else ""
+        findings.append(Finding(Reason.RECORDINGS_CONJUGATED, about, "frf_im_pc_per_n", arguments))
+    return [_conjugated(entry) if wrong else entry for entry, wrong in zip(entries, turned, strict=True)], findings
 
 
 def _aligned(courses: PhaseCourses) -> Floats:
@@ -140,17 +145,23 @@ def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
     return np.asarray(ratio**2 / 2 - amplitude / size - np.log(size) + log_ndtr(amplitude / spread - ratio))
 
 
-def _orientation(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> int:
+def _orientation(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> tuple[int, float | None]:
     """1 where the listed mechanisms explain the aligned course and not its conjugate, −1 where they explain that and
-    no unlisted part explains the course itself, 0 where both may be."""
+    neither an unlisted part nor a lag of the force channel explains the course itself, 0 where both may be; and that
+    lag [µs] where it is the other explanation."""
     course = _mean_course(entries, courses, signs)
     phase = course.value.imag / np.hypot(course.deviation.imag, _STILL)
     if phase @ phase < len(phase) + _PLAIN:
-        return 0
+        return 0, None
     given, turned = misfit(course), misfit(course.conjugated)
     if turned - given > _PLAIN:
-        return 1
-    return -1 if given - turned > _PLAIN and turned - unlisted_misfit(course) < _RARER else 0
+        return 1, None
+    if given - turned <= _PLAIN or turned - unlisted_misfit(course) >= _RARER:
+        return 0, None
+    lead = leading(course)
+    if turned - lead.misfit > _PLAIN:
+        return 1, None
+    return (-1, None) if lead.misfit - turned > _PLAIN else (0, lead.lag_us)
 
 
 def _mean_course(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> Course:

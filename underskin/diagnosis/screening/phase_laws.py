@@ -7,8 +7,9 @@ below the band, of a size that nothing has, stands for a conjugated high pass; a
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -50,6 +51,10 @@ def _delay(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
     return -2e-6j * np.pi * frequency * np.abs(fit[0])
 
 
+def _lead(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -_delay(frequency, fit, _)
+
+
 def _resonance(frequency: Floats, fit: Floats, spread: Floats) -> Complexes:
     ratio = frequency[:, None] / (_exp(fit[0]) * spread)
     return -np.log(1 - ratio**2 + 2j * _exp(fit[1]) * ratio).mean(axis=1)
@@ -60,6 +65,8 @@ def _loose_part(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
     return np.log(1 + (fit[2] * turn**2 + fit[3] * turn) / (turn**2 + 2 * _exp(fit[1]) * turn + 1))
 
 
+_DELAY = _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,))
+_LEAD = replace(_DELAY, value=_lead)
 # As the mechanisms' own files have them: corner 0.5 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05. Where a tip resonates
 # depends on contact and mass, 1 kHz within a factor of 10.
 _LAWS: Mapping[str, _Law] = {
@@ -72,7 +79,7 @@ _LAWS: Mapping[str, _Law] = {
         (0.0, 0.0, 3.0),
         (0.08, 0.4, 1.5),
     ),
-    "timing_delay": _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,)),
+    "timing_delay": _DELAY,
     "contact_resonance": _Law(
         _resonance,
         lambda f: tuple((np.log(times * f[-1]), -3.0) for times in (0.5, 1.3, 4.0)),
@@ -107,20 +114,35 @@ class Course:
         return Course(self.frequency, self.value.conj(), self.deviation, self.spread)
 
 
+class Lead(NamedTuple):
+    """χ² of the nearest course with a lag of the force channel, as `misfit`, and that lag [µs]."""
+
+    misfit: float
+    lag_us: float
+
+
 def misfit(course: Course) -> float:
     """χ² of the nearest course that at most two mechanisms give, with what their priors and their number cost."""
-    alone = {name: _nearest(course, (law,)) for name, law in _LAWS.items()}
+    alone = {name: _nearest(course, (law,))[0] for name, law in _LAWS.items()}
     first = min(alone, key=lambda name: alone[name])
-    pairs = [_nearest(course, (_LAWS[first], law)) for name, law in _LAWS.items() if name != first]
-    return min(_nearest(course, ()), alone[first], *pairs)
+    pairs = [_nearest(course, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
+    return min(_nearest(course, ())[0], alone[first], *pairs)
+
+
+def leading(course: Course) -> Lead:
+    """The nearest course of a lag of the force channel, alone or beside one mechanism."""
+    beside = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
+    chi2, fit = min((_nearest(course, (_LEAD, *laws)) for laws in beside), key=lambda one: one[0])
+    return Lead(chi2, abs(float(fit[0])))
 
 
 def unlisted_misfit(course: Course) -> float:
     """χ² of the nearest course that a vibrating part or a notch gives, with the same costs."""
-    return _nearest(course, (_UNLISTED,))
+    return _nearest(course, (_UNLISTED,))[0]
 
 
-def _nearest(course: Course, laws: tuple[_Law, ...]) -> float:
+def _nearest(course: Course, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
+    """χ² with its costs, and the parameters of the laws."""
     ends = np.cumsum([0, *(len(law.centre) for law in laws)])
     centre = np.concatenate([[], *(law.centre for law in laws)])
     deviation = np.concatenate([[], *(law.deviation for law in laws)])
@@ -137,7 +159,8 @@ def _nearest(course: Course, laws: tuple[_Law, ...]) -> float:
         return np.concatenate(parts)
 
     if not laws:
-        return float((residual(np.zeros(0)) ** 2).sum())
+        return float((residual(np.zeros(0)) ** 2).sum()), np.zeros(0)
     starts = [np.concatenate(start) for start in product(*(law.starts(course.frequency) for law in laws))]
     fitted = (least_squares(residual, start, method="lm", ftol=_TOLERANCE, xtol=_TOLERANCE) for start in starts)
-    return min(float(2 * one.cost) for one in fitted) + _COST * len(laws)
+    best = min(fitted, key=lambda one: float(one.cost))
+    return float(2 * best.cost) + _COST * len(laws), best.x

@@ -24,8 +24,11 @@ class Resonance(NamedTuple):
 
 
 def resonance(frf: Frf) -> Resonance | None:
-    """That of the highest line, where one stands out within the band; None where none does."""
-    frequency, size = frf.frequency, np.abs(frf.values)
+    """That of the highest finite line, where one stands out within the band; None where none does."""
+    finite = np.isfinite(frf.values)
+    if not finite.any():
+        return None
+    frequency, size = frf.frequency[finite], np.abs(frf.values[finite])
     peak = int(np.argmax(size))
     if not 0 < peak < len(size) - 1 or size[peak] < _STANDS_OUT * np.median(size):
         return None

@@ -1,0 +1,46 @@
+"""Two sensors that fall silent together while others answer.
+
+Their cables may be exchanged, so that each was recorded while the other one was pressed. A connector or an amplifier
+that they share may as well have failed: they answer nothing, so that nothing tells which.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from underskin.diagnosis.screening.no_response import no_response
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.recordings.campaign import FrfRecording
+
+_FEWEST = 2  # silent recordings of each of them
+
+
+def without_silent_pair(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+    """The recordings without those since two sensors show no response, and the finding on it."""
+    since = _silent_since(entries)
+    if not since:
+        return list(entries), []
+    first, second = sorted({entries[number].sensor for number in since})
+    arguments = {"first": first, "second": second, "since": entries[since[0]].id, "recordings": len(since)}
+    left = [entry for number, entry in enumerate(entries) if number not in since]
+    return left, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
+
+
+def _silent_since(entries: Sequence[FrfRecording]) -> list[int]:
+    """The recordings, in time, of the two sensors that answer until some recording and never since, where others do;
+    none where not two do so."""
+    silent, _ = no_response(entries)
+    order = np.argsort(recording_order(entries), kind="stable").tolist()
+    falling = set[str]()
+    for name in {entry.sensor for entry in entries}:
+        answers = [bool(~silent[number]) for number in order if entries[number].sensor == name]
+        if answers[0] and not any(answers[-_FEWEST:]) and answers == sorted(answers, reverse=True):
+            falling.add(name)
+    if len(falling) != 2:
+        return []
+    own = [number for number in order if entries[number].sensor in falling]
+    since = own[int((~silent[own]).sum()) :]
+    others = [number for number in order[order.index(since[0]) :] if number not in own]
+    return since if silent[since].all() and others and not silent[others].any() else []
