@@ -9,7 +9,7 @@ from service.cli.shared import read_settings, use_folder_of_lab
 from service.jobs import WorkerProcesses
 from service.jobs.process import Given
 from service.settings import Settings
-from service.usecases.checkup import Finding, Level, examine
+from service.usecases.checkup import Level, Observation, examine
 from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
@@ -67,10 +67,10 @@ def doctor(
     raise typer.Exit(max(one.level for one in findings))
 
 
-def _of_workers(settings: Settings) -> Finding:
+def _of_workers(settings: Settings) -> Observation:
     """A small campaign, diagnosed in a process of its own as a server does it."""
     if settings.diagnosis_workers == 0:
-        return Finding("workers", Level.OK, "this server runs no diagnoses")
+        return Observation("workers", Level.OK, "this server runs no diagnoses")
     path = settings.tables / SIGMA_TABLE
     try:
         processes = WorkerProcesses(
@@ -85,5 +85,5 @@ def _of_workers(settings: Settings) -> Finding:
         failure = str(error)
     if failure:
         advice = "see the memory that is free, and UNDERSKIN_DIAGNOSIS_MEMORY_MB"
-        return Finding("workers", Level.CRITICAL, f"a trial diagnosis failed: {failure}", advice)
-    return Finding("workers", Level.OK, f"a trial diagnosis ended; at most {settings.diagnosis_workers} at once")
+        return Observation("workers", Level.CRITICAL, f"a trial diagnosis failed: {failure}", advice)
+    return Observation("workers", Level.OK, f"a trial diagnosis ended; at most {settings.diagnosis_workers} at once")

@@ -42,7 +42,7 @@ class Level(IntEnum):
 
 
 @dataclass(frozen=True)
-class Finding:
+class Observation:
     """What a check found, in words, and what to do where that is anything."""
 
     check: str
@@ -51,7 +51,7 @@ class Finding:
     advice: str = ""
 
 
-def examine(settings: Settings) -> Iterator[Finding]:
+def examine(settings: Settings) -> Iterator[Observation]:
     """One finding or more of every check; a check that cannot be carried out says so."""
     yield from _of_folder(settings.data)
     yield from _of_disk(settings)
@@ -59,7 +59,7 @@ def examine(settings: Settings) -> Iterator[Finding]:
     try:
         store = database(settings.database_url, settings.data)
     except StoreError as error:
-        yield Finding("store", Level.CRITICAL, str(error), "set UNDERSKIN_DATABASE_URL right")
+        yield Observation("store", Level.CRITICAL, str(error), "set UNDERSKIN_DATABASE_URL right")
         return
     with closing(store):
         answers = _of_store(store, settings.data)
@@ -73,13 +73,13 @@ def examine(settings: Settings) -> Iterator[Finding]:
                 for look in (_of_clock, _of_queue):
                     yield store.read(look)
         except (DBAPIError, StoreMoved, OSError) as error:
-            yield Finding("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
+            yield Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
         yield from _of_keys(KeyStore(settings.data), needed=needed, made=store.is_made())
 
 
-def _of_folder(folder: Path) -> Iterator[Finding]:
+def _of_folder(folder: Path) -> Iterator[Observation]:
     if not folder.is_dir():
-        yield Finding(
+        yield Observation(
             "data folder", Level.CRITICAL, f"{folder} is not there",
             "set UNDERSKIN_DATA to the server's folder, or mount its disk",
         )  # fmt: skip
@@ -87,59 +87,59 @@ def _of_folder(folder: Path) -> Iterator[Finding]:
     mode = stat.S_IMODE(folder.stat().st_mode)
     if not os.access(folder, os.W_OK | os.X_OK):
         who = f"chown it to the user that runs the server (this one has the number {os.geteuid()})"
-        yield Finding("data folder", Level.CRITICAL, f"{folder} cannot be written to (mode {mode:o})", who)
+        yield Observation("data folder", Level.CRITICAL, f"{folder} cannot be written to (mode {mode:o})", who)
     elif mode & 0o007:
-        yield Finding("data folder", Level.WARNING, f"everybody may enter {folder} (mode {mode:o})", "chmod 700 it")
+        yield Observation("data folder", Level.WARNING, f"everybody may enter {folder} (mode {mode:o})", "chmod 700 it")
     else:
-        yield Finding("data folder", Level.OK, f"{folder}, mode {mode:o}")
+        yield Observation("data folder", Level.OK, f"{folder}, mode {mode:o}")
     open_to_all = [
         path.name for path in sorted(folder.glob("*")) if path.is_file() and stat.S_IMODE(path.stat().st_mode) & 0o007
     ]
     if open_to_all:
         named = ", ".join(open_to_all[:5])
-        yield Finding("data folder", Level.WARNING, f"everybody may read {named}", "chmod 600 these files")
+        yield Observation("data folder", Level.WARNING, f"everybody may read {named}", "chmod 600 these files")
 
 
-def _of_disk(settings: Settings) -> Iterator[Finding]:
+def _of_disk(settings: Settings) -> Iterator[Observation]:
     for name, folder in (("disk", settings.data), ("disk of the backups", settings.backup_to)):
         if folder is None or not folder.is_dir():
             continue
         free = shutil.disk_usage(folder).free / 1e6
         level = Level.CRITICAL if free < _TOO_LITTLE_MB else Level.WARNING if free < _LITTLE_MB else Level.OK
         advice = "" if level is Level.OK else f"make room: below {_TOO_LITTLE_MB} MB nothing more may be kept"
-        yield Finding(name, level, f"{free:,.0f} MB free in {folder}", advice)
+        yield Observation(name, level, f"{free:,.0f} MB free in {folder}", advice)
 
 
-def _of_tables(folder: Path) -> Finding:
+def _of_tables(folder: Path) -> Observation:
     try:
         table = load_table(folder / SIGMA_TABLE)
     except (TableError, OSError) as error:
-        return Finding("tables", Level.CRITICAL, str(error), "set UNDERSKIN_TABLES, or install underskin again")
-    return Finding("tables", Level.OK, f"{folder / SIGMA_TABLE}, SHA-256 {table.sha256[:12]}…")
+        return Observation("tables", Level.CRITICAL, str(error), "set UNDERSKIN_TABLES, or install underskin again")
+    return Observation("tables", Level.OK, f"{folder / SIGMA_TABLE}, SHA-256 {table.sha256[:12]}…")
 
 
-def _of_store(store: Database, folder: Path) -> Finding:
+def _of_store(store: Database, folder: Path) -> Observation:
     if not store.is_made():
-        return Finding("store", Level.WARNING, f"there is none in {folder} yet", "start the server once, or set "
+        return Observation("store", Level.WARNING, f"there is none in {folder} yet", "start the server once, or set "
                        "UNDERSKIN_DATA to its folder")  # fmt: skip
     try:
         version = migrate.version(store)
         if version is None:
-            return Finding("store", Level.WARNING, "it is empty", "start the server once")
+            return Observation("store", Level.WARNING, "it is empty", "start the server once")
         migrate.require_known(version)
         count = store.read(_count_campaigns)
         damage = _damage(store)
     except (StoreError, StoreMoved) as error:
-        return Finding("store", Level.CRITICAL, str(error), "see docs/store.md")
+        return Observation("store", Level.CRITICAL, str(error), "see docs/store.md")
     except (DBAPIError, OSError) as error:
-        return Finding("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}",
+        return Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}",
                        _DATABASE)  # fmt: skip
     if damage:
-        return Finding("store", Level.CRITICAL, f"it is damaged: {damage}", "stop the server and restore a backup")
+        return Observation("store", Level.CRITICAL, f"it is damaged: {damage}", "stop the server and restore a backup")
     if version != migrate.VERSIONS[-1]:
-        return Finding("store", Level.WARNING, f"its schema is {version}, the newest {migrate.VERSIONS[-1]}",
+        return Observation("store", Level.WARNING, f"its schema is {version}, the newest {migrate.VERSIONS[-1]}",
                        "start this server: it backs the store up and brings it up to date")  # fmt: skip
-    return Finding("store", Level.OK, f"{count:,} campaigns, schema {version}")
+    return Observation("store", Level.OK, f"{count:,} campaigns, schema {version}")
 
 
 def _count_campaigns(connection: Connection) -> int:
@@ -156,68 +156,68 @@ def _damage(store: Database) -> str:
     return "" if found == "ok" else found
 
 
-def _of_keys(keys: KeyStore, *, needed: bool | None, made: bool) -> Iterator[Finding]:
+def _of_keys(keys: KeyStore, *, needed: bool | None, made: bool) -> Iterator[Observation]:
     """`needed`: None where the store could not be asked; `made`: whether there is a store."""
     if not keys.file_exists():
         if needed is None and made:
-            yield Finding("keys", Level.WARNING, f"{keys.path} is missing, and whether keys are needed cannot be told",
+            yield Observation("keys", Level.WARNING, f"{keys.path} is missing; whether keys are needed cannot be told",
                           "see to the store first")  # fmt: skip
         elif needed:
-            yield Finding("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",
+            yield Observation("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",
                           "put it back, or make a key with `underskin key create NAME`")  # fmt: skip
         else:
-            yield Finding("keys", Level.OK, "none: the server answers on this machine only")
+            yield Observation("keys", Level.OK, "none: the server answers on this machine only")
         return
     try:
         known = keys.entries()
     except KeysUnreadable as error:
-        yield Finding("keys", Level.CRITICAL, str(error), "put a copy back, or remove the file and make keys anew")
+        yield Observation("keys", Level.CRITICAL, str(error), "put a copy back, or remove the file and make keys anew")
         return
     level, advice = (Level.OK, "") if known else (Level.WARNING, "make one with `underskin key create NAME`")
-    yield Finding("keys", level, f"{len(known)} in {keys.path}", advice)
+    yield Observation("keys", level, f"{len(known)} in {keys.path}", advice)
 
 
-def _of_backups(settings: Settings, store: Database) -> Iterator[Finding]:
+def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
     if settings.backup_to is None:
-        yield Finding("backups", Level.WARNING, "the server makes none by itself",
+        yield Observation("backups", Level.WARNING, "the server makes none by itself",
                       "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
         return
     ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -_SKEW_S]
     if ahead:
-        yield Finding("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
+        yield Observation("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
                       "set the clock, and rename or delete what a wrong one dated")  # fmt: skip
     last = newest(settings.backup_to)
     if last is None:
-        yield Finding("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
+        yield Observation("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
                       "start the server; its log says why none can be made")  # fmt: skip
         return
     hours = last.age_s / 3600
     if hours > 2 * settings.backup_every:
-        yield Finding("backups", Level.CRITICAL, f"the newest, {last.path.name}, is {hours:.0f} hours old",
+        yield Observation("backups", Level.CRITICAL, f"the newest, {last.path.name}, is {hours:.0f} hours old",
                       "see that the server runs; its log says why none can be made")  # fmt: skip
         return
     try:
         backup.verify(store, last.path)
     except (StoreError, OSError) as error:
-        yield Finding("backups", Level.CRITICAL, str(error), "look at the disk, and make one: `underskin backup FILE`")
+        yield Observation("backups", Level.CRITICAL, str(error), "see to the disk, then `underskin backup FILE`")
         return
-    yield Finding("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole")
+    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole")
 
 
-def _of_clock(connection: Connection) -> Finding:
+def _of_clock(connection: Connection) -> Observation:
     ahead = diagnoses.clock(connection) - time.time()
     if abs(ahead) > _SKEW_S:
-        return Finding("clock", Level.WARNING, f"the database's clock is {ahead:+.0f} s from this machine's",
+        return Observation("clock", Level.WARNING, f"the database's clock is {ahead:+.0f} s from this machine's",
                       "have both follow a time server")  # fmt: skip
     last = connection.execute(select(func.max(campaigns.c.received_at))).scalar()
     now = datetime.now(UTC)
     if last is not None and (datetime.fromisoformat(last) - now).total_seconds() > _SKEW_S:
-        return Finding("clock", Level.WARNING, f"a campaign came in at {last}; now it is {now:%Y-%m-%d %H:%M} UTC",
+        return Observation("clock", Level.WARNING, f"a campaign came in at {last}; now it is {now:%Y-%m-%d %H:%M} UTC",
                       "set this machine's clock, and have it follow a time server")  # fmt: skip
-    return Finding("clock", Level.OK, f"{now:%Y-%m-%d %H:%M:%S} UTC")
+    return Observation("clock", Level.OK, f"{now:%Y-%m-%d %H:%M:%S} UTC")
 
 
-def _of_queue(connection: Connection) -> Finding:
+def _of_queue(connection: Connection) -> Observation:
     silent = diagnoses.clock(connection) - diagnoses.HEARTBEAT_TIMEOUT_S
     is_running = queue.c.state == "running"
     running = _count(connection, is_running, queue.c.alive_at >= silent)
@@ -227,9 +227,9 @@ def _of_queue(connection: Connection) -> Finding:
     waits = 0.0 if oldest is None else (datetime.now(UTC) - datetime.fromisoformat(oldest)).total_seconds()
     said = f"{running} running, {waiting} waiting"
     if left or (waits > _WAITS_S and not running):
-        return Finding("diagnoses", Level.WARNING, f"{said}, {left} left by a server that ended",
+        return Observation("diagnoses", Level.WARNING, f"{said}, {left} left by a server that ended",
                       "see that a server with UNDERSKIN_DIAGNOSIS_WORKERS above 0 runs")  # fmt: skip
-    return Finding("diagnoses", Level.OK, said)
+    return Observation("diagnoses", Level.OK, said)
 
 
 def _count(connection: Connection, *conditions: ColumnElement[bool]) -> int:
