@@ -135,18 +135,24 @@ class _Sets:
                 self.explain(self._larger(size))
 
     def _larger(self, size: int) -> list[Request]:
-        """The best sets with one mechanism less, each with one more; of two that move one and the same resonance, where
-        that leads nowhere, from starts over both: the mass that was found on other contacts is not theirs."""
+        """The best sets with one mechanism less, each with one more.
+
+        Where that leads nowhere, from starts over both: of the best single with any other, and of two that shape the
+        response over frequency, since the one bends to the other as long as it is alone; of two that move one and the
+        same resonance, since the mass that was found on other contacts is not theirs.
+        """
         known, catalogue = self.problem.lines.mechanisms, self.problem.lines.mechanisms.named
         requests, over_both = [], []
-        for parent in _parents(self.search, size, self.asked_for):
+        parents = _parents(self.search, size, self.asked_for)
+        for parent in parents:
             rings = any(known[name].needs_stiffness for name in parent.names)
             for name in self.names:
                 if name in parent.names:
                     continue
                 names = tuple(entry for entry in catalogue if entry in {*parent.names, name})
                 requests.append(Request(names, parent, self.explanations.get(frozenset([name]))))
-                if size == 2 and rings and known[name].stage in _OF_CONTACTS:
+                shape = all("frequency_hz" in known[one].axes for one in names)
+                if size == 2 and (shape or parent is parents[0] or (rings and known[name].stage in _OF_CONTACTS)):
                     over_both.append(Request(names))
         return [*requests, *over_both]
 
