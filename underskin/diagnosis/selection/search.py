@@ -151,8 +151,13 @@ class _Sets:
                     continue
                 names = tuple(entry for entry in catalogue if entry in {*parent.names, name})
                 requests.append(Request(names, parent, self.explanations.get(frozenset([name]))))
+                moves = all(known[one].stage is not Stage.ADDED_CHARGE for one in names)  # the mean, not the covariance
                 shape = all("frequency_hz" in known[one].axes for one in names)
-                if size == 2 and (shape or parent is parents[0] or (rings and known[name].stage in _OF_CONTACTS)):
+                if (
+                    size == 2
+                    and moves
+                    and (shape or parent is parents[0] or (rings and known[name].stage in _OF_CONTACTS))
+                ):
                     over_both.append(Request(names))
         return [*requests, *over_both]
 
