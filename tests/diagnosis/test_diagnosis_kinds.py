@@ -1,7 +1,6 @@
 """FRFs, a compressed block and indentations of one campaign: one data set, of one material, unless they contradict."""
 
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
@@ -9,87 +8,15 @@ import numpy as np
 import pytest
 
 from rig.description import parse as experiment
-from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
-from underskin.diagnosis.pipeline import diagnosis_report
+from tests.support.kinds_campaigns import BLOCK, LINES, SPHERE, Effects, curves, lines, modulus_of, named, report
 from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
 from underskin.diagnosis.selection.search import search
 from underskin.mechanisms.parameter import HeavyTailed
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
-
-SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
-LINES: dict[str, Any] = {
-    "schema": "experiment/1",
-    "name": "together",
-    "kind": "frf",
-    "skin": {**SKIN, "array": {"columns": 4, "rows": 2, "pitch_mm": 8}},
-    "design": {"indenters_mm": [4, 10], "preloads_n": [0.5, 1, 2, 3, 5], "dynamic_forces_n": [0.09]},
-    "lines": {"low_hz": 1, "high_hz": 130, "count": 20},
-    "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
-}
-BLOCK: dict[str, Any] = {
-    "heights_mm": [12],
-    "diameters_mm": [20],
-    "largest_displacement_mm": 1.0,
-    "speeds_mm_per_s": [0.1],
-    "force_noise_n": 0.05,
-}
-SPHERE: dict[str, Any] = {
-    "indenters_mm": [4],
-    "largest_displacement_mm": 0.25,
-    "speeds_mm_per_s": [0.05],
-    "samples": 300,
-    "force_noise_n": 0.002,
-}
-Effects = Mapping[str, Mapping[str, float | str]]
-
-
-def lines(modulus: float = 16.0, effects: Effects | None = None, seed: int = 5) -> dict[str, Any]:
-    """FRFs of a skin of this modulus [MPa], declared to have 16."""
-    described = {
-        **LINES,
-        "seed": seed,
-        "skin": {**LINES["skin"], "youngs_modulus_mpa": modulus},
-        "effects": effects or {},
-    }
-    document = campaign_of_lines(record_lines(experiment(described)))
-    document["skin"]["youngs_modulus_mpa"] = 16.0
-    return document
-
-
-def curves(
-    kind: str,
-    design: Mapping[str, Any],
-    modulus: float = 16.0,
-    effects: Effects | None = None,
-    thickness: float = SKIN["thickness_mm"],
-) -> list[Any]:
-    """Curves of an elastomer of this modulus [MPa], or of a skin of it of this thickness [mm]."""
-    skin = {**LINES["skin"], "youngs_modulus_mpa": modulus, "thickness_mm": thickness}
-    described = {"schema": "experiment/1", "name": "c", "seed": 6, "kind": kind, "skin": skin, "curves": dict(design)}
-    made = experiment({**described, "effects": effects or {}})
-    recordings = campaign_of_curves(made, record_curves(made))["recordings"]
-    return [{**entry, "id": f"{kind}-{number}"} for number, entry in enumerate(recordings)]
-
-
-def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable) -> dict[str, Any]:
-    whole = deepcopy(dict(document))
-    whole["recordings"] = [*whole["recordings"], *further]
-    return diagnosis_report(parse(whole), table)
-
-
-def named(document: Mapping[str, Any]) -> list[str]:
-    return [entry["name"] for entry in document["mechanisms"]]
-
-
-def modulus_of(document: Mapping[str, Any], kind: str) -> dict[str, Any]:
-    (entry,) = [
-        entry for entry in document["by_kind"] if (entry["kind"], entry["parameter"]) == (kind, "youngs_modulus")
-    ]
-    return dict(entry)
 
 
 @pytest.mark.parametrize(("kind", "design", "width"), [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
@@ -264,69 +191,3 @@ def test_the_likelihood_of_the_curves_counts_heavy_tailed_priors_once(scales: fl
             log_density[row, column] = hypothesis.knowledge.log_density(fit) + of_modulus + prior.log_prior(work)
     volume = (log_e[1] - log_e[0]) * (log_w[1] - log_w[0])
     assert np.logaddexp.reduce(log_density, axis=None) + np.log(volume) == pytest.approx(told.log_weight, abs=0.1)
-
-
-def test_the_modulus_that_is_stated_of_a_block_is_the_true_one_not_the_declared_one(table: SigmaTable) -> None:
-    document = {"schema": "campaign/1", "name": "block", "skin": lines()["skin"], "recordings": []}
-    found = report(document, curves("compression", BLOCK, 9.0), table)
-    assert named(found) == ["modulus_error"]
-    modulus = found["fit"]["after"]["youngs_modulus"]
-    assert modulus["low"] < 9.0 < modulus["high"]
-    assert modulus["high"] / modulus["low"] < 1.15 * 1.32  # scatter, and friction that one shape hides
-    assert f"{modulus['value']:.3g} MPa" in found["statement"]
-
-
-def test_relaxation_that_short_curves_tell_as_a_rate_alone_is_the_skins(table: SigmaTable) -> None:
-    """Curves of two seconds tell g/τ of a relaxation that takes a minute, and neither g nor τ."""
-    creep: Effects = {"contact_creep": {"fraction": 0.45, "time_s": 60.0}}
-    dwells = {**LINES["design"], "dwells_s": [5.0, 60.0, 400.0]}
-    described = {**LINES, "design": dwells, "noise": {**LINES["noise"], "gain": 0.01}, "seed": 4, "effects": creep}
-    measured = campaign_of_lines(record_lines(experiment(described)))
-    brief = {**SPHERE, "speeds_mm_per_s": [0.25], "retract": True, "repeats": 3, "force_noise_n": 1e-3}
-    document = report(measured, curves("indentation", brief, effects=creep), table)
-    assert document["contradictions"] == []
-    assert (document["verdict"], named(document)) == ("explained", ["contact_creep"])
-    fraction, time = document["mechanisms"][0]["parameters"]
-    assert fraction["low"] < 0.45 < fraction["high"]
-    assert time["low"] < 60.0 < time["high"]
-
-
-def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wrongly(table: SigmaTable) -> None:
-    """E of such curves holds although the declared thickness is 15 % too large."""
-    both: Effects = {"layered_contact": {}, "thickness_error": {"factor": 0.87}}
-    deep = {**SPHERE, "largest_displacement_mm": 0.8, "indenters_mm": [3]}
-    measured = lines(effects=both)
-    pressed = curves("indentation", deep, effects={"layered_contact": {}}, thickness=0.87 * SKIN["thickness_mm"])
-    document = report(measured, pressed, table)
-    assert document["contradictions"] == []
-    assert {"layered_contact", "thickness_error"} <= set(named(document))
-    told = modulus_of(document, "indentation")
-    assert told["low"] < 16.0 < told["high"]
-    (factor,) = [entry for entry in document["by_kind"] if entry["parameter"] == "thickness_factor"]
-    assert factor["low"] < 0.87 < factor["high"]
-
-
-@pytest.mark.parametrize(("law", "coefficient"), [("linear", 7.0), ("limited", 2.8)])
-def test_the_modulus_of_a_block_that_stiffens_strongly_holds(law: str, coefficient: float, table: SigmaTable) -> None:
-    """A modulus that grows with the strain itself, far beyond a silicone's: half as stiff again at 7 % and at 12 %."""
-    stiff: Effects = {"strain_stiffening": {"law": law, "coefficient": coefficient}}
-    deep = {**BLOCK, "largest_displacement_mm": 2.5}
-    document = report(lines(effects=stiff), curves("compression", deep, effects=stiff), table)
-    assert "strain_stiffening" in named(document)
-    told = modulus_of(document, "compression")
-    assert told["low"] < 16.0 < told["high"]
-    assert told["high"] / told["low"] < 2.0
-
-
-def test_a_wrong_modulus_and_a_wrong_thickness_are_both_told_beside_a_resonance(table: SigmaTable) -> None:
-    wrong: Effects = {"thickness_error": {"factor": 1.16}, "contact_resonance": {"tip_mass_g": 6.0, "damping": 0.04}}
-    described = {**LINES, "lines": {"low_hz": 10, "high_hz": 1000, "count": 30}, "noise": {"gain": 0.01, "line": 0.01}}
-    described |= {"design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}
-    described |= {"seed": 9, "effects": wrong, "skin": {**LINES["skin"], "youngs_modulus_mpa": 9.0}}
-    measured = campaign_of_lines(record_lines(experiment({**described, "schema": "experiment/1"})))
-    measured["skin"]["youngs_modulus_mpa"] = 16.0
-    document = report(measured, curves("compression", BLOCK, 9.0), table)
-    assert {"modulus_error", "thickness_error", "contact_resonance"} <= set(named(document))
-    told = {mechanism["name"]: mechanism["parameters"][0] for mechanism in document["mechanisms"]}
-    assert told["modulus_error"]["low"] < 9 / 16 < told["modulus_error"]["high"]
-    assert told["thickness_error"]["low"] < 1.16 < told["thickness_error"]["high"]

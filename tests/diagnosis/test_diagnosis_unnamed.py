@@ -1,7 +1,5 @@
 """What no mechanism describes, from recording to recording: found, described, and not seen where it is not."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.special import logsumexp
@@ -10,6 +8,7 @@ from scipy.stats import multivariate_normal
 from rig.draw import drawn, record
 from rig.recorded import campaign as recorded
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.rig_reports import rig_report
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
@@ -19,39 +18,15 @@ from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 
 
-def rig_report(table: SigmaTable, gain: float, position_mm: float, effects: dict[str, Any]) -> dict[str, Any]:
-    """The report on three sensors of the virtual rig, pressed at four places each, in any order."""
-    description = drawn(5, 0, "none")
-    description["skin"] = {
-        "thickness_mm": 2.0,
-        "youngs_modulus_mpa": 3.0,
-        "sensor_radius_mm": 1.0,
-        "d33_pc_per_n": 15.0,
-        "array": {"columns": 3, "rows": 1, "pitch_mm": 8.0},
-    }
-    description["design"] = {
-        "indenters_mm": [4.0],
-        "preloads_n": [0.4, 0.8, 1.6, 3.0],
-        "dynamic_forces_n": [0.05],
-        "offsets_mm": [[0.0, 0.0], [0.8, 0.0], [0.0, -1.2], [-1.5, 0.6]],
-        "shuffled": True,
-    }
-    description["noise"] |= {"gain": gain, "position_mm": position_mm}
-    description["effects"] = effects
-    found, refused = from_dict(recorded(record(description)))
-    assert not refused
-    return diagnosis_report(found, table)
-
-
 @pytest.mark.slow
 def test_what_scatters_as_no_rig_does_is_unexplained(table: SigmaTable) -> None:
-    assert rig_report(table, 0.25, 0.0, {})["verdict"] == "unexplained"
+    assert rig_report(table, {}, gain=0.25)["verdict"] == "unexplained"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("gain", "position_mm"), [(0.05, 0.0), (0.02, 0.28)])
 def test_the_scatter_of_an_ordinary_rig_is_nothing_missing(gain: float, position_mm: float, table: SigmaTable) -> None:
-    assert rig_report(table, gain, position_mm, {})["verdict"] == "no_mismatch"
+    assert rig_report(table, {}, gain=gain, position_mm=position_mm)["verdict"] == "no_mismatch"
 
 
 def test_the_evidence_of_a_process_is_that_of_the_whole_covariance(table: SigmaTable) -> None:

@@ -3,13 +3,11 @@
 import json
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from rig.draw import drawn, record
-from rig.recorded import campaign as recorded
+from tests.support.rig_reports import rig_report
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import SigmaTable
@@ -30,30 +28,6 @@ def test_a_place_that_runs_round_is_a_periodic_place(table: SigmaTable) -> None:
     assert (law["acts_on"], law["axis"], law["form"]) == ("position", "order", "periodic")
     period = next(entry for entry in law["parameters"] if entry["name"] == "period")
     assert period["value"] == pytest.approx(6.3, rel=0.02)
-
-
-def rig_report(table: SigmaTable, effects: dict[str, Any]) -> dict[str, Any]:
-    """The report on three sensors of the virtual rig, pressed at four places each, in any order."""
-    description = drawn(5, 0, "none")
-    description["skin"] = {
-        "thickness_mm": 2.0,
-        "youngs_modulus_mpa": 3.0,
-        "sensor_radius_mm": 1.0,
-        "d33_pc_per_n": 15.0,
-        "array": {"columns": 3, "rows": 1, "pitch_mm": 8.0},
-    }
-    description["design"] = {
-        "indenters_mm": [4.0],
-        "preloads_n": [0.4, 0.8, 1.6, 3.0],
-        "dynamic_forces_n": [0.05],
-        "offsets_mm": [[0.0, 0.0], [0.8, 0.0], [0.0, -1.2], [-1.5, 0.6]],
-        "shuffled": True,
-    }
-    description["noise"] |= {"gain": 0.02, "position_mm": 0.0}
-    description["effects"] = effects
-    found, refused = from_dict(recorded(record(description)))
-    assert not refused
-    return diagnosis_report(found, table)
 
 
 @pytest.mark.slow

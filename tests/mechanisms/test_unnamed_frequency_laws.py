@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.mechanisms.test_unnamed_laws import coordinates
+from underskin.autodiff import Differentiated
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.unnamed.frequency_laws import frequency_laws, phase_of_bump
@@ -68,9 +69,7 @@ def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
         assert kept.laws[0]({**short, "frequency_hz": frequency}) == pytest.approx(exact, abs=2e-3), law.name
 
 
-def differentiated(value: float):  # type: ignore[no-untyped-def]
-    from underskin.autodiff import Differentiated
-
+def differentiated(value: float) -> Differentiated:
     return Differentiated(np.array([[value]]), np.zeros((0, 1, 1)))
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import orjson
 import pytest
 
-from tests.diagnosis.test_diagnosis_kinds import BLOCK, curves, lines
 from tests.support.diagnosed import joint_reports, report, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.document_schemas import report_validator
+from tests.support.kinds_campaigns import BLOCK, curves, lines
 from tests.support.mechanism_campaigns import compression_campaign, indentation_campaign
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import Campaign, FrfRecording, parse

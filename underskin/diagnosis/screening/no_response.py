@@ -9,13 +9,12 @@ noise alone exceeds once in 8000 recordings), and its lines are no larger than n
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
-from underskin.units import Floats
+from underskin.units import Floats, Mask
 
 _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
@@ -23,17 +22,13 @@ _WEAK = 0.1  # of the level to be expected: what a sensor without response in mo
 _EXPECTED = 16.0  # of the response that the others let expect: only then is a recording without one left out
 _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near a crossing of zero, and may be none
 
-Mask = NDArray[np.bool_]
-
 
 def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
     """Which recordings show none, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
     unresponsive, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
     for number, entry in enumerate(entries):
-        measured = lines_of(entry)
-        order = np.argsort(measured.frequency, kind="stable")
-        lines = measured.values[order]
-        lines = lines[np.isfinite(lines)]
+        values = lines_of(entry).values
+        lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
         noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))

@@ -80,8 +80,7 @@ def _usable(measured: Frf) -> tuple[Floats, Complexes]:
     """Frequency and value of the lines that are not 0 and not beside mains, by frequency."""
     beside = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _BESIDE_MAINS_HZ
     kept = ~beside & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
-    order = np.argsort(measured.frequency[kept], kind="stable")
-    return measured.frequency[kept][order], measured.values[kept][order]
+    return measured.frequency[kept], measured.values[kept]
 
 
 def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:

@@ -47,7 +47,8 @@ def warming(levels: Levels) -> WarmUp | None:
     times = [time for time in _TIMES if 2 * time <= _MOST_SHARE * len(levels.value)]
     if len(levels.value) < _LEAST or not times:
         return None
-    base = levels.fit(levels.value).evidence
+    nothing = levels.fit(levels.value)
+    base = nothing.evidence
     fits = [levels.fit(levels.value, _AMPLITUDE * _drift(levels, time)[:, None]) for time in times]
     best = int(np.argmax([fit.evidence for fit in fits]))
     gain = fits[best].evidence - base
@@ -55,11 +56,12 @@ def warming(levels: Levels) -> WarmUp | None:
         return None
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
-    first, *steps = [*_steps(levels), *_sensor_steps(levels)]
+    first, *steps = _steps(levels)
     slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
     ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
     columns = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
     columns += [(one, _OVER_AGEING) for one in ageing]
+    columns += _sensor_step(levels, nothing)
     needed = [levels.fit(levels.value, _AMPLITUDE * column).evidence + over for column, over in columns]
     needed += [levels.fit(levels.value, smooth_along(axis)).evidence + _OVER_SMOOTH for axis in levels.axes]
     return WarmUp(times[best], amplitude, gain) if base + gain > max(needed) else None
@@ -85,16 +87,18 @@ def _steps(levels: Levels) -> list[Floats]:
     return [(levels.order < last).astype(float)[:, None] for last in range(1, _LONGEST_STEP + 1)]
 
 
-def _sensor_steps(levels: Levels) -> list[Floats]:
-    """1 in the later recordings of one of several sensors, from some on."""
+def _sensor_step(levels: Levels, nothing: LevelFit) -> list[tuple[Floats, float]]:
+    """1 in the later recordings of one of several sensors, from some on: of all these steps the best by C⁻¹ of
+    `nothing` moved, and by how much less ln evidence it is worth, since any of them might have been the best."""
     if levels.sensor.max() == 0:
         return []
     onsets = np.unique(np.quantile(levels.order, _ONSETS_OF_STEP).round())
-    return [
-        ((levels.sensor == sensor) & (levels.order >= onset)).astype(float)[:, None]
-        for sensor in range(int(levels.sensor.max()) + 1)
-        for onset in onsets
-    ]
+    late = levels.order >= onsets[:, None]
+    steps = np.concatenate([late & (levels.sensor == sensor) for sensor in np.unique(levels.sensor)]).astype(float)
+    weight = nothing.precision @ steps.T
+    size = (steps.T * weight).sum(axis=0)
+    gain = (levels.value @ weight) ** 2 / (size + _AMPLITUDE**-2) - np.log1p(_AMPLITUDE**2 * size)
+    return [(steps[int(np.argmax(gain))][:, None], -float(np.log(len(steps))))]
 
 
 def _drift(levels: Levels, time: float) -> Floats:

@@ -1,0 +1,84 @@
+"""FRFs of a skin and curves of its elastomer by the virtual rig, and what a report on them says."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+from rig.description import parse as experiment
+from rig.elastomer import campaign_of_curves, record_curves
+from rig.recorded import campaign as campaign_of_lines
+from rig.recorded import record_lines
+from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.recordings.campaign import parse
+from underskin.surrogate.sigma_table import SigmaTable
+
+SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
+LINES: dict[str, Any] = {
+    "schema": "experiment/1",
+    "name": "together",
+    "kind": "frf",
+    "skin": {**SKIN, "array": {"columns": 4, "rows": 2, "pitch_mm": 8}},
+    "design": {"indenters_mm": [4, 10], "preloads_n": [0.5, 1, 2, 3, 5], "dynamic_forces_n": [0.09]},
+    "lines": {"low_hz": 1, "high_hz": 130, "count": 20},
+    "noise": {"gain": 0.02, "line": 0.01, "coherence": True},
+}
+BLOCK: dict[str, Any] = {
+    "heights_mm": [12],
+    "diameters_mm": [20],
+    "largest_displacement_mm": 1.0,
+    "speeds_mm_per_s": [0.1],
+    "force_noise_n": 0.05,
+}
+SPHERE: dict[str, Any] = {
+    "indenters_mm": [4],
+    "largest_displacement_mm": 0.25,
+    "speeds_mm_per_s": [0.05],
+    "samples": 300,
+    "force_noise_n": 0.002,
+}
+Effects = Mapping[str, Mapping[str, float | str]]
+
+
+def lines(modulus: float = 16.0, effects: Effects | None = None, seed: int = 5) -> dict[str, Any]:
+    """FRFs of a skin of this modulus [MPa], declared to have 16."""
+    described = {
+        **LINES,
+        "seed": seed,
+        "skin": {**LINES["skin"], "youngs_modulus_mpa": modulus},
+        "effects": effects or {},
+    }
+    document = campaign_of_lines(record_lines(experiment(described)))
+    document["skin"]["youngs_modulus_mpa"] = 16.0
+    return document
+
+
+def curves(
+    kind: str,
+    design: Mapping[str, Any],
+    modulus: float = 16.0,
+    effects: Effects | None = None,
+    thickness: float = SKIN["thickness_mm"],
+) -> list[Any]:
+    """Curves of an elastomer of this modulus [MPa], or of a skin of it of this thickness [mm]."""
+    skin = {**LINES["skin"], "youngs_modulus_mpa": modulus, "thickness_mm": thickness}
+    described = {"schema": "experiment/1", "name": "c", "seed": 6, "kind": kind, "skin": skin, "curves": dict(design)}
+    made = experiment({**described, "effects": effects or {}})
+    recordings = campaign_of_curves(made, record_curves(made))["recordings"]
+    return [{**entry, "id": f"{kind}-{number}"} for number, entry in enumerate(recordings)]
+
+
+def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable) -> dict[str, Any]:
+    whole = deepcopy(dict(document))
+    whole["recordings"] = [*whole["recordings"], *further]
+    return diagnosis_report(parse(whole), table)
+
+
+def named(document: Mapping[str, Any]) -> list[str]:
+    return [entry["name"] for entry in document["mechanisms"]]
+
+
+def modulus_of(document: Mapping[str, Any], kind: str) -> dict[str, Any]:
+    (entry,) = [
+        entry for entry in document["by_kind"] if (entry["kind"], entry["parameter"]) == (kind, "youngs_modulus")
+    ]
+    return dict(entry)
