@@ -22,7 +22,10 @@ from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
 FAILED = "failed"
-_NOT_OF_ONE_CAMPAIGN = ("underskin.cli.", "underskin.client.", "underskin.diagnosis.several.")
+_NOT_OF_ONE_CAMPAIGN = (
+    "underskin.cli.", "underskin.client.", "underskin.figures.", "underskin.recordings.readers.",
+    "underskin.diagnosis.several.",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -208,6 +208,25 @@ def test_a_warm_up_is_told_beside_steps_of_its_first_recordings(table: SigmaTabl
     assert told >= 0.85 * seen
 
 
+def test_a_warm_up_is_told_of_ten_recordings_and_no_drift_of_a_few_percent(good: Campaign, table: SigmaTable) -> None:
+    ten = replace(good, recordings=tuple(shuffled(good).recordings[:10]))
+    order = recording_order(frf_recordings(ten))
+    assert named(inspect(changed(ten, partial(_warming, 1 - 0.3 * np.exp(-order / 2))), table)) == [Reason.WARM_UP]
+    order = recording_order(frf_recordings(shuffled(good)))
+    slight = changed(shuffled(good), partial(_warming, 1 - 0.03 * np.exp(-order / 2)))
+    assert named(inspect(slight, table)) == []
+
+
+def test_a_few_of_many_levels_that_are_an_rms_off_may_have_missed_their_place(
+    good: Campaign, table: SigmaTable
+) -> None:
+    """Two of the recordings at 1/√2 of their level are no slip of amplitudes, five are."""
+    number = np.random.default_rng(5).permutation(len(good.recordings))
+    for off, told in ((number[:2], []), (number[:5], [Reason.AMPLITUDE_FACTOR])):
+        factors = np.where(np.isin(np.arange(len(number)), off), 0.5**0.5, 1.0)
+        assert named(inspect(changed(good, partial(_warming, factors)), table)) == told
+
+
 def test_a_fall_that_load_cycles_explain_is_ageing(good: Campaign, table: SigmaTable) -> None:
     aged = changed(good, lambda entry, n: times(entry, 1 + 0.3 * float(np.exp(-n / 2))))
     assert named(inspect(aged, table)) == []

@@ -23,9 +23,10 @@ _MEANT = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
 _GAIN, _GAIN_ALONE, _COST = 7.5, 14.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
 _WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
-_MOST = 0.5
+_MOST, _FEW, _MANY = 0.5, 0.1, 12  # the first two of the recordings
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
-_PLAIN_SIZE, _PLAIN_WITHIN = 0.5, 0.03  # of ln c, where a law along an axis may be at work as well: twice is no law
+# Where a law along an axis may be at work as well: twice is no law, and √2 is a chance unless it is sharp.
+_PLAIN_SIZE, _PLAIN_WITHIN, _SHARP_WITHIN = 0.5, 0.06, 0.02  # of ln c
 _SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
 
 
@@ -49,10 +50,10 @@ def amplitude_step(levels: Levels) -> Step | None:
 
 
 def _least_gain(step: Step) -> float:
-    """A single recording that is √2 off may have missed its place."""
-    if step.off.sum() > 1:
-        return _GAIN
-    return _GAIN_ALONE if abs(log(step.factor)) > _PLAIN_SIZE else np.inf
+    """A few of many recordings that are √2 off may have missed their place."""
+    if len(step.off) > _MANY and step.off.mean() < _FEW and abs(log(step.factor)) < _PLAIN_SIZE:
+        return np.inf
+    return _GAIN if step.off.sum() > 1 else _GAIN_ALONE
 
 
 def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
@@ -85,7 +86,8 @@ def _step(levels: Levels, factor: float, base: float) -> Step | None:
         away, deviation = fit.amplitude(value, off.astype(float))
         exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
         if exact and follows_an_axis(off, levels.axes):
-            exact = abs(size) > _PLAIN_SIZE and abs(away) < _PLAIN_WITHIN
+            within = _PLAIN_WITHIN if abs(size) > _PLAIN_SIZE else _SHARP_WITHIN
+            exact = abs(away) + deviation < within
         if exact and (np.abs(fit.residual(value)) < 0.35 * abs(size)).mean() > _WELL:
             cost = _COST * log(comb(len(off), int(off.sum())))
             found.append(Step(factor, off, fit.evidence - base - cost))

@@ -26,8 +26,8 @@ from underskin.units import Floats
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more
 _RELAXATIONS, _COEFFICIENT = 4, 0.1  # of a smooth course, and the prior standard deviation of its terms [rad]
-_PLAIN_SIGNS = 5.0  # of ln likelihood: about one campaign in a hundred has conjugated recordings
-_OVER_CHANNELS = 3.0  # of ln likelihood: that of channels is ten times as frequent
+_PLAIN_SIGNS = 9.0  # of ln likelihood: about one campaign in a hundred has conjugated recordings
+_OVER_CHANNELS = 6.0  # of ln likelihood: that of channels is ten times as frequent
 _CHANNEL = tuple(np.array([0.0, 0.5, 1, 2, 4, 8, 16]) * 1e-3)  # rad, a channel's own phase
 _USUAL_CHANNEL = 3e-3
 _VARIED = (0.0, 0.2, 0.5, 1.0)  # of the mean course: what contacts differ by

@@ -18,17 +18,18 @@ from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
-_LEAST = 10
+_LEAST = 8
 _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
-_MOST_SHARE = 0.35  # of the recordings: τ is a few of them
+_LONGEST = 0.3  # of the recordings: τ at most
+_MOST_SHARE = 0.4  # of the recordings are left out at most
 _SLOWER = (2.0, 4.0, 8.0)  # times the longest τ: a drift over the whole campaign
 _LONGEST_STEP = 6  # recordings at another level than the others: a step, and no drift
 _ONSETS_OF_STEP = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)  # quantiles of the order: of one sensor alone
 _AMPLITUDE = 0.5  # prior standard deviation of A
-_GAIN = 3.2  # of ln evidence
+_GAIN, _LEAST_AMPLITUDE = 3.2, 0.1  # of ln evidence; smaller drifts are within the scatter of gains
 # ln evidence by which it must exceed what else may do it, less where that is rarer: a drift over the whole campaign,
 # and a step after two recordings or more. A first recording that is off alone is common.
-_OVER_AGEING, _OVER_SMOOTH, _OVER_SLOWER, _OVER_FIRST, _OVER_STEP = 4.5, 1.5, -1.0, 0.5, -3.0
+_OVER_AGEING, _OVER_SMOOTH, _OVER_SLOWER, _OVER_FIRST, _OVER_STEP = 4.5, 1.5, -5.0, -1.5, -8.0
 _ONSETS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)  # of ageing, over the largest number of cycles
 _OVER = 0.01  # of the level: what is left of the drift in recordings that are used
 
@@ -44,7 +45,7 @@ class WarmUp:
 
 def warming(levels: Levels) -> WarmUp | None:
     """The drift within the first recordings, None where none is plain."""
-    times = [time for time in _TIMES if 2 * time <= _MOST_SHARE * len(levels.value)]
+    times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     if len(levels.value) < _LEAST or not times:
         return None
     nothing = levels.fit(levels.value)
@@ -56,6 +57,8 @@ def warming(levels: Levels) -> WarmUp | None:
         return None
     drift = _drift(levels, times[best])
     amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
+    if abs(amplitude) < _LEAST_AMPLITUDE:
+        return None
     first, *steps = _steps(levels)
     slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
     ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
