@@ -14,6 +14,7 @@ from service.app import create_app
 from service.auth.access_control import LOOPBACK_NAMES, AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
+from service.auth.sessions import Sessions
 from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
 from service.log import configure_logging
 from service.middleware.http_protocol import LimitedHttpProtocol
@@ -49,6 +50,8 @@ def serve(
         store = open_store(settings.database_url, settings.data)
         requirement = KeyRequirement(keys, store)
         requirement.look()
+        sessions = Sessions(store)
+        sessions.look()
         listener = _listen(host, port)
     except (TableError, ExtensionError, *STORE_ERRORS, OSError, ValueError) as error:
         fail(str(error))
@@ -58,6 +61,7 @@ def serve(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
         requirement=requirement,
+        sessions=sessions,
         keys_always=not private,
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,

@@ -16,8 +16,9 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.auth.access_control import AccessControl
+from service.log import KEY
 from service.middleware.error_handlers import ProblemPage, problem_response
-from service.middleware.request_log import KEY, Answered, record
+from service.middleware.request_log import Answered, record
 from service.problems import Refusal, unexpected
 
 logger = logging.getLogger("underskin")
