@@ -24,6 +24,7 @@ from service.problems import Refusal, unexpected
 logger = logging.getLogger("underskin")
 
 _NUMBERS = frozenset({int, float})
+_MOST_HOT_BYTES = 10_000  # of a body that a hot route looks at, on the event loop
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 
@@ -98,7 +99,7 @@ class AsgiMiddleware:
             await self._api(scope, limited, exchange.send)
             return
         body = b"" if method == "GET" else await Request(scope, limited).body()
-        content = hot(body or scope["query_string"])
+        content = hot(body or scope["query_string"]) if len(body) <= _MOST_HOT_BYTES else None
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
         else:
