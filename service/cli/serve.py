@@ -2,6 +2,7 @@
 
 import errno
 import ipaddress
+import resource
 import socket
 import tempfile
 from pathlib import Path
@@ -17,7 +18,8 @@ from service.auth.keys import KeyStore
 from service.auth.sessions import Sessions
 from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
 from service.log import configure_logging
-from service.middleware.http_protocol import LimitedHttpProtocol
+from service.middleware.connection_limits import ConnectionLimits
+from service.middleware.http_protocol import limited
 from service.settings import make_data_folder
 from service.store import open_store
 from underskin import ExtensionError, TableError
@@ -66,13 +68,15 @@ def serve(
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,
     )
+    limits = ConnectionLimits(1000 * settings.max_header_kb, settings.idle_seconds, settings.max_connections)
+    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     config = uvicorn.Config(
         create_app(settings, table, access, store),
         access_log=False,
         log_config=None,
         server_header=False,
         proxy_headers=False,
-        http=LimitedHttpProtocol,
+        http=limited(limits.within(descriptors)),
         timeout_graceful_shutdown=10,
     )
     uvicorn.Server(config).run(sockets=[listener])
