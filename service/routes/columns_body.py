@@ -22,6 +22,8 @@ except ImportError:  # where no wheel is to be had, all JSON is read as short bo
 else:
     _LONG = 10_000  # bytes, beyond which columns are read as arrays
 
+_MOST_PLAIN_BYTES = 10_000_000  # of columns that are read here: that takes some hundredths of a second
+
 CSV = "text/csv"
 
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
@@ -42,10 +44,12 @@ def parse(
             fields, labels = _from_csv(kind, body)
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
+        case "" | "application/json" if (
+            _LONG < len(body) <= _MOST_PLAIN_BYTES and (plain := _plain_json(kind, body)) is not None
+        ):
+            fields = plain
         case "" | "application/json" if len(body) > LONG_BYTES:
             fields = _long_json(kind, body)
-        case "" | "application/json" if len(body) > _LONG and (plain := _plain_json(kind, body)) is not None:
-            fields = plain
         case _:
             fields = json_document(body, content_type, f", {CSV} or {NPZ}")
     return validated(kind, fields), labels
