@@ -11,6 +11,7 @@ from pathlib import Path
 from bench import (
     accuracy,
     batch,
+    bodies,
     curves,
     diagnosis,
     fleet,
@@ -30,6 +31,7 @@ from bench.page import AGAINST, keep, markdown, write
 PARTS = {
     "requests": single_requests.measure,
     "batch": batch.measure,
+    "bodies": bodies.measure,
     "start": start.measure,
     "newton": newton_step.measure,
     "orderings": orderings.measure,

@@ -35,6 +35,7 @@ SECTIONS = {
     AGAINST: "A whole diagnosis beside an earlier revision",
     "fleet": "Ten skins as a fleet",
     "waits": "What a reader waits for",
+    "bodies": "Bodies of 62 MB",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
 }
@@ -46,6 +47,8 @@ independent finite-element code is compared in `tests/surrogate/test_felupe.py`.
 writes JSON by orjson and calls SciPy's `NdBSpline` on the same table (`bench/peers/plain_sigma.py`).""",
     "requests": """8 connections, the server on one core and the load on the other, against the `umbridge` package's own
 server and Tesseract Core's runtime, each serving the same spline.""",
+    "bodies": """One body of JSON after another, answered or refused, the server and the processes that it starts on one core;
+every 10 ms `/health` is asked. Memory is what the server and these processes take beyond what the server had before.""",
     "start": "From starting the process to the first answer of `/ready`; resident memory after load.",
     "newton": "One Newton step at equal unknowns, on one core.",
     "orderings": "Factors of one step's matrix, on one core.",

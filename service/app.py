@@ -52,11 +52,13 @@ async def _lifespan(api: FastAPI) -> AsyncIterator[None]:
     state.pending_uploads = PendingUploads(state.uploads.path, state.settings.max_upload_bytes)
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     state.access.requirement.start()
+    state.access.sessions.start()
     state.runner.start()
     if state.backups is not None:
         state.backups.start()
     yield
     await run_in_threadpool(state.access.requirement.stop)
+    await run_in_threadpool(state.access.sessions.stop)
     await run_in_threadpool(state.runner.stop)
     await run_in_threadpool(state.planner.stop)
     if state.backups is not None:

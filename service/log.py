@@ -1,12 +1,20 @@
-"""The log: one JSON object a line on stderr."""
+"""The log: one JSON object a line on stderr, in which no API key is readable."""
 
 import logging
+import re
 import sys
 import threading
 from datetime import UTC, datetime
 from typing import Any
 
 import orjson
+
+KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
+
+
+def without_keys(text: str) -> str:
+    """A text in which nothing looks like an API key."""
+    return KEY.sub("us_…", text)
 
 
 class JsonFormatter(logging.Formatter):
@@ -23,7 +31,7 @@ class JsonFormatter(logging.Formatter):
         }
         if record.exc_info:
             fields["exception"] = self.formatException(record.exc_info)
-        return orjson.dumps(fields).decode()
+        return without_keys(orjson.dumps(fields).decode())
 
 
 def configure_logging() -> None:

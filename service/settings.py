@@ -36,6 +36,23 @@ class Settings(BaseSettings):
         le=1e6,
         description="Largest upload of files in MB (10^6 bytes), counted as it streams in; JSON has max_body_mb.",
     )
+    max_header_kb: int = Field(
+        default=64, ge=4, le=1024, description="Longest request line with all headers, in kB (10^3 bytes)."
+    )
+    idle_seconds: float = Field(
+        default=30.0,
+        ge=1,
+        le=3600,
+        description="After how many seconds a client is disconnected that does not end its headers, sends no more of "
+        "its body, or takes no more of its answer.",
+    )
+    max_connections: int = Field(
+        default=1000,
+        ge=8,
+        le=100_000,
+        description="How many connections are open at once; beyond it new ones take the place of idle ones, and where "
+        "none is idle only /health and /ready are answered on them.",
+    )
     database_url: str = Field(
         default="",
         description="Where campaigns are kept: postgresql://user:password@host/database. Left out: SQLite in the data "

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from service.auth import session
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import Key, KeyStore, KeysUnreadable
+from service.auth.sessions import Sessions
 from service.problems import RETRY_LATER, Refusal, is_browsing
 
 logger = logging.getLogger("underskin")
@@ -32,6 +33,7 @@ class AccessControl:
     host_names: frozenset[str]
     keys: KeyStore
     requirement: KeyRequirement
+    sessions: Sessions
     keys_always: bool
     max_body_bytes: int
     max_upload_bytes: int
@@ -121,7 +123,9 @@ class AccessControl:
         """A browser sends its cookie by itself, so a request that changes something must say whose page it is of."""
         if method not in SAFE and b"origin" not in headers:
             return None
-        return session.key_of(session.cookie_in(headers), self.keys)
+        cookie = session.cookie_in(headers)
+        key = session.key_of(cookie, self.keys)
+        return None if key is None or self.sessions.has_ended(cookie) else key
 
 
 def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:

@@ -1,7 +1,8 @@
 """The browser's session: a cookie that says which key was logged in with, and the token that its forms must carry.
 
-A session is signed with the kept digest of its key, so that nothing is stored, a restart ends none, and a revoked key
-ends all of its own. Before a login, or where no key is needed, the cookie is a random text that binds the forms alone.
+A session is signed with the kept digest of its key, so that the cookie is stored nowhere, a restart ends none, and a
+revoked key ends all of its own; one alone is ended by its id (sessions.py). Before a login, or where no key is needed,
+the cookie is a random text that binds the forms alone.
 """
 
 import base64
@@ -9,6 +10,7 @@ import hmac
 import secrets
 import time
 from collections.abc import Mapping
+from hashlib import sha256
 
 from service.auth.keys import Key, KeyStore
 
@@ -26,6 +28,16 @@ def logged_in(key: Key) -> str:
     """A cookie for who has shown a key."""
     body = f"{anonymous()}.{key.sha256[:_ID_DIGITS]}.{int(time.time()) + LASTS_S}"
     return f"{body}.{_signature(key, body)}"
+
+
+def id_of(cookie: str) -> str:
+    """What a session is called in lists: it tells nothing of the cookie."""
+    return sha256(cookie.encode("utf-8", "replace")).hexdigest()[:_ID_DIGITS]
+
+
+def expires(cookie: str) -> int:
+    """When a session that `logged_in` made expires, in seconds since 1970."""
+    return int(cookie.split(".")[2])
 
 
 def key_of(cookie: str, keys: KeyStore) -> Key | None:

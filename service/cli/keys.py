@@ -1,4 +1,4 @@
-"""Commands on API keys: create, list, revoke, and do without."""
+"""Commands on API keys: create, list, revoke, the sessions of browsers that logged in with them, and do without."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -10,10 +10,10 @@ from sqlalchemy import Connection
 from service.auth.keys import KeyStore, Scope, keys_missing
 from service.cli.shared import STORE_ERRORS, fail, read_settings
 from service.settings import Settings
-from service.store import database, key_requirement
+from service.store import Missing, StoreError, database, key_requirement, sessions
 from underskin import UnderskinError
 
-key = typer.Typer(help="API keys: create, list, revoke; open: do without.", no_args_is_help=True)
+key = typer.Typer(help="API keys: create, list, revoke; their sessions; open: do without.", no_args_is_help=True)
 
 
 @key.command("create")
@@ -53,6 +53,33 @@ def revoke_key(name: Annotated[str, typer.Argument(help="As it was created.")]) 
     try:
         KeyStore(read_settings().data).revoke(name)
     except (UnderskinError, OSError, ValueError) as error:
+        fail(str(error))
+
+
+@key.command("sessions")
+def list_sessions() -> None:
+    """Browsers that are logged in: id, key, since when, until when, address, browser."""
+    settings = read_settings()
+    try:
+        with closing(database(settings.database_url, settings.data)) as store:
+            known = store.is_made() and store.read(sessions.is_known)
+            for row in store.read(sessions.listed) if known else ():
+                entry = (row.id, row.key_name, row.started_at, row.expires_at, row.address, row.browser)
+                typer.echo("\t".join(entry))
+    except (*STORE_ERRORS, OSError) as error:
+        fail(str(error))
+
+
+@key.command("end-session")
+def end_session(session_id: Annotated[str, typer.Argument(help="As `underskin key sessions` lists it.")]) -> None:
+    """End one; a running server asks that browser for a key within a second."""
+    settings = read_settings()
+    try:
+        with closing(database(settings.database_url, settings.data)) as store:
+            if not store.is_made() or not store.read(sessions.is_known):
+                raise StoreError("the store has no sessions yet")
+            store.write(sessions.end, session_id)
+    except (*STORE_ERRORS, Missing, OSError) as error:
         fail(str(error))
 
 

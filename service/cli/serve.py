@@ -2,6 +2,7 @@
 
 import errno
 import ipaddress
+import resource
 import socket
 import tempfile
 from pathlib import Path
@@ -14,9 +15,11 @@ from service.app import create_app
 from service.auth.access_control import LOOPBACK_NAMES, AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
+from service.auth.sessions import Sessions
 from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_lab
 from service.log import configure_logging
-from service.middleware.http_protocol import LimitedHttpProtocol
+from service.middleware.connection_limits import ConnectionLimits
+from service.middleware.http_protocol import limited
 from service.settings import make_data_folder
 from service.store import open_store
 from underskin import ExtensionError, TableError
@@ -49,6 +52,8 @@ def serve(
         store = open_store(settings.database_url, settings.data)
         requirement = KeyRequirement(keys, store)
         requirement.look()
+        sessions = Sessions(store)
+        sessions.look()
         listener = _listen(host, port)
     except (TableError, ExtensionError, *STORE_ERRORS, OSError, ValueError) as error:
         fail(str(error))
@@ -58,17 +63,20 @@ def serve(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,
         requirement=requirement,
+        sessions=sessions,
         keys_always=not private,
         max_body_bytes=settings.max_body_bytes,
         max_upload_bytes=settings.max_upload_bytes,
     )
+    limits = ConnectionLimits(1000 * settings.max_header_kb, settings.idle_seconds, settings.max_connections)
+    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     config = uvicorn.Config(
         create_app(settings, table, access, store),
         access_log=False,
         log_config=None,
         server_header=False,
         proxy_headers=False,
-        http=LimitedHttpProtocol,
+        http=limited(limits.within(descriptors)),
         timeout_graceful_shutdown=10,
     )
     uvicorn.Server(config).run(sockets=[listener])

@@ -104,7 +104,10 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
 
 def sent_rig(upload: Upload) -> RigDescription:
     """The rig description in an uploaded file; raises FileError, InvalidInput."""
-    return parse_rig(upload.start(LARGEST_BYTES + 1), upload.label or RIG)
+    size = upload.path.stat().st_size
+    if size > LARGEST_BYTES:
+        raise FileError(upload.label or RIG, "", f"has {size} bytes; a rig description may have up to {LARGEST_BYTES}")
+    return parse_rig(upload.start(LARGEST_BYTES), upload.label or RIG)
 
 
 def kept_rig(connection: Connection, skin_id: str) -> RigDescription | None:

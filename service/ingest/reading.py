@@ -8,6 +8,7 @@ from typing import Any
 import orjson
 
 from service.ingest.uploads import Upload
+from service.middleware import long_json
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal
 from service.store import skins
@@ -151,20 +152,20 @@ def _require_usable(campaign: Campaign) -> None:
 
 
 def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
-    if upload.path.stat().st_size > most_bytes:
+    size = upload.path.stat().st_size
+    if size > most_bytes:
         limit = f"{most_bytes / 1e6:g} MB (UNDERSKIN_MAX_BODY_MB)"
         raise Refusal(413, f"JSON may have up to {limit}; send more in several requests, or as HDF5.")
-    content = upload.path.read_bytes().removeprefix(_BOM)
     try:
-        document = orjson.loads(content)
-        require_unique_keys(content)
-    except orjson.JSONDecodeError as error:
-        wrong = f"line {error.lineno}, column {error.colno}: {error.msg}"
+        document = _long_document(upload) if size > long_json.LONG_BYTES else _document(upload)
+    except long_json.NotJson as wrong:
         if not upload.in_form:
             raise Refusal(400, f"The body is not JSON: {wrong}.") from None
         entry = error_entry("file", upload.label, f"must be JSON; {wrong}", ErrorCode.UNREADABLE_FILE)
         return [ReadCampaign(upload.label, errors=[entry])]
     except Refusal as twice:
+        if not twice.errors:
+            raise
         errors = [{name: error[name] for name in _LISTED} for error in twice.errors]
         return [ReadCampaign(upload.label, errors=errors)]
     if not isinstance(document, list):
@@ -172,6 +173,21 @@ def _read_json(upload: Upload, most_bytes: int) -> list[ReadCampaign]:
         return [_checked(upload.label, document)]
     require_few(len(document), sum(map(_recordings_in, document)))
     return [replace(_checked(upload.label, entry), in_list=True) for entry in document]
+
+
+def _document(upload: Upload) -> Any:
+    content = upload.path.read_bytes().removeprefix(_BOM)
+    try:
+        document = orjson.loads(content)
+    except orjson.JSONDecodeError as error:
+        raise long_json.NotJson(f"line {error.lineno}, column {error.colno}: {error.msg}") from None
+    require_unique_keys(content)
+    return document
+
+
+def _long_document(upload: Upload) -> Any:
+    with upload.path.open("rb") as stream:
+        return long_json.read(stream)
 
 
 def _recordings_in(document: Any) -> int:

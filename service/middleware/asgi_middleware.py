@@ -15,14 +15,17 @@ from collections.abc import Callable, Iterable, Mapping
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.auth.access_control import AccessControl
+from service.auth.access_control import OPEN, AccessControl
+from service.log import KEY
 from service.middleware.error_handlers import ProblemPage, problem_response
-from service.middleware.request_log import KEY, Answered, record
-from service.problems import Refusal, unexpected
+from service.middleware.http_protocol import OVERLOADED
+from service.middleware.request_log import Answered, record
+from service.problems import RETRY_LATER, Refusal, unexpected
 
 logger = logging.getLogger("underskin")
 
 _NUMBERS = frozenset({int, float})
+_MOST_HOT_BYTES = 10_000  # of a body that a hot route looks at, on the event loop
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
 
@@ -88,6 +91,9 @@ class AsgiMiddleware:
     ) -> None:
         """Check access, then a hot route or the API."""
         method, path = scope["method"], scope["path"]
+        if scope.get(OVERLOADED) and path not in OPEN:
+            busy = "Too many connections are open (UNDERSKIN_MAX_CONNECTIONS); try again in a while."
+            raise Refusal(503, busy, headers={**RETRY_LATER, "Connection": "close"})
         if sum(name == b"host" for name, _ in scope["headers"]) > 1:  # a proxy may have checked the other one
             raise Refusal(400, "The request has several Host headers; it must have one.")
         scope["key"] = self._access.check(method, path, headers)
@@ -97,7 +103,7 @@ class AsgiMiddleware:
             await self._api(scope, limited, exchange.send)
             return
         body = b"" if method == "GET" else await Request(scope, limited).body()
-        content = hot(body or scope["query_string"])
+        content = hot(body or scope["query_string"]) if len(body) <= _MOST_HOT_BYTES else None
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
         else:

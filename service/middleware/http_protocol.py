@@ -1,36 +1,155 @@
-"""HTTP/1.1 as uvicorn speaks it, with a limit on what is no body.
-
-httptools collects a request's line, headers and trailers without one: who never ends them would fill the memory,
-without a key.
+"""HTTP/1.1 as uvicorn speaks it, with limits on what takes memory, time and places without a key: headers and trailers
+without end, clients that stop sending or reading, and many connections.
 """
 
 from typing import Any
 
-from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
-_MOST_HEAD_BYTES = 64_000  # counted as it comes in, so that one read at most is beyond it
+from service.middleware.connection_limits import SPARE, ConnectionLimits, Limit
+
+OVERLOADED = "overloaded"  # in the scope of a request that came on a connection beyond the limit
+_LOOKS = 8  # in the time after which a connection is idle
+_LONGEST_LOOK_S = 1.0
 
 
 class LimitedHttpProtocol(HttpToolsProtocol):
-    """One connection; answers 400 and closes where request line and headers, or trailers, exceed 64 kB."""
+    """One connection; `limits` are set by `limited`."""
+
+    limits: ConnectionLimits
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self._head_bytes = 0  # since the last part of a body, or the end of the headers
+        self._in_head = True  # from the first byte of a request, or the connection, to the end of the headers
+        self._in_body = False
+        self._body_bytes = 0  # since `_progress`
+        self._progress = self._heard = self.loop.time()
+        self._unsent = 0
+
+    def connection_made(self, transport: Any) -> None:
+        """Beyond the limit others give way, or `/health` alone is answered."""
+        super().connection_made(transport)
+        if len(self.connections) > self.limits.connections:
+            self._find_room()
+        if not self.limits.watched:
+            self.limits.watched = True
+            self._look_at_all()
 
     def data_received(self, data: bytes) -> None:
         """What the client sent next."""
+        self._heard = self.loop.time()
+        if not self._in_head and not self._in_body:
+            self._in_head, self._progress = True, self._heard
         self._head_bytes += len(data)
         super().data_received(data)
-        if self._head_bytes > _MOST_HEAD_BYTES and not self.transport.is_closing():
-            self.send_400_response(f"The request line and headers exceed {_MOST_HEAD_BYTES // 1000} kB.")
+        if self._head_bytes > self.limits.head_bytes and not self.transport.is_closing():
+            kb = self.limits.head_bytes // 1000
+            self.limits.reached("header_size", f"a request's headers exceed {kb} kB (UNDERSKIN_MAX_HEADER_KB)")
+            self.send_400_response(f"The request line and headers exceed {kb} kB.")
 
     def on_headers_complete(self) -> None:
         """A body, or the next request, follows."""
         self._head_bytes = 0
+        self._in_head, self._in_body = False, True
+        self._progress, self._body_bytes = self._heard, 0
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
         """Part of a body; the application counts it."""
         self._head_bytes = 0
+        self._body_bytes += len(body)
         super().on_body(body)
+
+    def on_message_complete(self) -> None:
+        """It is the server's turn."""
+        self._in_body = False
+        super().on_message_complete()
+
+    def waits_for_client_s(self) -> float | None:
+        """As `Connection`; a client that does not take its answer keeps the server waiting, too."""
+        if self._is_at_work() or self.flow.read_paused or self.transport.is_closing():
+            return None
+        return self.loop.time() - self._heard
+
+    def sends_body(self) -> bool:
+        """As `Connection`."""
+        return self._in_body
+
+    def give_way(self) -> None:
+        """As `Connection`."""
+        if self.transport.get_write_buffer_size():
+            self.transport.abort()
+        else:
+            self.transport.close()
+
+    def _is_at_work(self) -> bool:
+        """Whether a request is being answered."""
+        return self.cycle is not None and not self.cycle.response_complete and not self._in_body
+
+    def _others(self) -> list["LimitedHttpProtocol"]:
+        """The other connections that are open."""
+        ours = [one for one in self.connections if isinstance(one, LimitedHttpProtocol)]
+        return [one for one in ours if one is not self and not one.transport.is_closing()]
+
+    def _find_room(self) -> None:
+        """For this connection, which is one too many unless others are closing."""
+        others, most = self._others(), self.limits.connections
+        if len(others) < most:
+            return
+        said = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
+        self.limits.reached("connections", said)
+        if len(others) >= most + SPARE:
+            self.transport.abort()
+        elif not self.limits.make_room(others):
+            self.app = _overloaded(self.app)
+
+    def _look_at_all(self) -> None:
+        for one in list(self.connections):
+            if isinstance(one, LimitedHttpProtocol):
+                one.look()
+        self.loop.call_later(min(_LONGEST_LOOK_S, self.limits.idle_s / _LOOKS), self._look_at_all)
+
+    def look(self) -> None:
+        """End the connection where the client has made no progress for too long."""
+        now = self.loop.time()
+        unsent = self.transport.get_write_buffer_size()
+        if unsent != self._unsent:
+            self._unsent, self._progress = unsent, now
+        if now - self._progress <= self.limits.idle_s:
+            return
+        if unsent:  # also where it is closing, which waits for that
+            self._end("idle_answer", "takes no part of its answer")
+        elif self.transport.is_closing():
+            return
+        elif self._in_head and not self._is_at_work():
+            self._end("idle_headers", "does not end its headers")
+        elif self._in_body and not self.flow.read_paused:
+            if self.limits.is_body_too_slow(self._body_bytes):
+                self._end("idle_body", "sends next to nothing of its body")
+            else:
+                self._progress, self._body_bytes = now, 0
+
+    def _end(self, limit: Limit, what: str) -> None:
+        self.limits.reached(
+            limit, f"a client {what} for {self.limits.idle_s:g} s (UNDERSKIN_IDLE_SECONDS): disconnected"
+        )
+        if limit != "idle_answer" and not (self.cycle is not None and self.cycle.response_started):
+            self.transport.write(b"".join((STATUS_LINE[408], b"connection: close\r\ncontent-length: 0\r\n\r\n")))
+            self.transport.close()
+        else:
+            self.transport.abort()
+
+
+def limited(limits: ConnectionLimits) -> type[LimitedHttpProtocol]:
+    """The protocol of a server with these limits."""
+    return type("LimitedHttpProtocol", (LimitedHttpProtocol,), {"limits": limits})
+
+
+def _overloaded(app: ASGIApp) -> ASGIApp:
+    async def marked(scope: Scope, receive: Receive, send: Send) -> None:
+        scope[OVERLOADED] = True
+        await app(scope, receive, send)
+
+    return marked

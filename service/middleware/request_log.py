@@ -2,7 +2,6 @@
 
 import asyncio
 import os
-import re
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache
@@ -12,12 +11,12 @@ import orjson
 from prometheus_client import Histogram
 
 from service.auth.keys import Key
+from service.log import without_keys
 
 # Requests are written and counted together: one by one, that would cost as much as to answer them.
 _DELAY_S = 0.2
 
 _LONGEST_WHY = 300
-KEY = re.compile(r"us_[\w-]{16,}")  # what looks like one, wherever somebody put it
 
 _seconds = Histogram(
     "underskin_request_seconds",
@@ -68,7 +67,7 @@ def _series(method: str, route: str, status: int) -> Histogram:
 
 
 def _line(request: Answered) -> bytes:
-    path = KEY.sub("us_…", request.path)[:200]
+    path = without_keys(request.path)[:200]
     fields = {
         "time": datetime.fromtimestamp(request.ended, UTC),
         "level": "info",
@@ -83,5 +82,5 @@ def _line(request: Answered) -> bytes:
         "key": request.key.name if request.key else None,
     }
     if request.why is not None:
-        fields["error"] = KEY.sub("us_…", request.why)[:_LONGEST_WHY]
+        fields["error"] = without_keys(request.why)[:_LONGEST_WHY]
     return orjson.dumps(fields, option=orjson.OPT_APPEND_NEWLINE)

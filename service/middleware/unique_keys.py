@@ -1,13 +1,20 @@
-"""JSON bodies in which an object has a key twice are refused: the parsers would take the last and say nothing."""
+"""JSON bodies that FastAPI reads: one in which an object has a key twice is refused, since the parsers would take the
+last and say nothing, and a long one is parsed beside the event loop.
+"""
 
+import asyncio
 from collections.abc import Callable, Coroutine
 from typing import Any
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
+from starlette.concurrency import run_in_threadpool
 
-from service.problems import given_twice
+from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of
+from service.problems import Refusal, given_twice
 from underskin.recordings.readers.repeated_keys import repeated_key
+
+_long = asyncio.Semaphore(2)  # long bodies that are parsed at once
 
 
 def require_unique_keys(body: bytes) -> None:
@@ -18,9 +25,20 @@ def require_unique_keys(body: bytes) -> None:
 
 class _JsonRequest(Request):
     async def json(self) -> Any:
+        body = await self.body()
+        if len(body) > LONG_BYTES:
+            async with _long:
+                return await run_in_threadpool(_long_document, body)
         document = await super().json()
-        require_unique_keys(await self.body())
+        require_unique_keys(body)
         return document
+
+
+def _long_document(body: bytes) -> Any:
+    try:
+        return as_lists(document_of(body))
+    except NotJson as error:
+        raise Refusal(400, f"The body is not JSON: {error}.") from None
 
 
 class JsonRoute(APIRoute):

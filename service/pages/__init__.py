@@ -13,13 +13,13 @@ from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
 from service.pages.shared import assets
 from service.pages.skin import page as skin
-from service.pages.start import example, login
+from service.pages.start import example, login, sessions
 from service.pages.start import page as start
 from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
 _OF_SKINS = (start, example, skin, campaign, fleet, diagnosis, plan, upload)
-_PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, assets)
+_PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets)
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:

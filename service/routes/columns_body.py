@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic_core import from_json
 
+from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of, require_few
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
@@ -20,6 +21,8 @@ except ImportError:  # where no wheel is to be had, all JSON is read as short bo
     _LONG = sys.maxsize
 else:
     _LONG = 10_000  # bytes, beyond which columns are read as arrays
+
+_MOST_PLAIN_BYTES = 10_000_000  # of columns that are read here: that takes some hundredths of a second
 
 CSV = "text/csv"
 
@@ -41,8 +44,12 @@ def parse(
             fields, labels = _from_csv(kind, body)
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
-        case "" | "application/json" if len(body) > _LONG and (plain := _plain_json(kind, body)) is not None:
+        case "" | "application/json" if (
+            _LONG < len(body) <= _MOST_PLAIN_BYTES and (plain := _plain_json(kind, body)) is not None
+        ):
             fields = plain
+        case "" | "application/json" if len(body) > LONG_BYTES:
+            fields = _long_json(kind, body)
         case _:
             fields = json_document(body, content_type, f", {CSV} or {NPZ}")
     return validated(kind, fields), labels
@@ -56,12 +63,34 @@ def json_document(body: bytes, content_type: str, also: str = "") -> Any:
     media_type = media_type_of(content_type)
     if media_type not in ("", "application/json"):
         raise Refusal(415, f"Content-Type {media_type!r} cannot be read; send application/json{also}.")
+    if len(body) > LONG_BYTES:
+        return as_lists(_apart(body))
     try:
         document = from_json(body)  # reads NaN too, so that it is refused by field and row
     except ValueError as error:
         raise Refusal(400, f"The body is not JSON: {error}.") from None
     require_unique_keys(body)
     return document
+
+
+def _long_json(kind: type[ColumnsRequest], body: bytes) -> Any:
+    """What a long JSON body holds; its columns are arrays."""
+    document = _apart(body)
+    if not isinstance(document, dict):
+        return as_lists(document)
+    for name, value in document.items():
+        if isinstance(value, np.ndarray) and kind.is_column(name):
+            require_few(value)
+        else:
+            document[name] = as_lists(value)
+    return document
+
+
+def _apart(body: bytes) -> Any:
+    try:
+        return document_of(body)
+    except NotJson as error:
+        raise Refusal(400, f"The body is not JSON: {error}.") from None
 
 
 def media_type_of(content_type: str) -> str:

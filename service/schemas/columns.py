@@ -3,7 +3,7 @@ there is no value, or CSV or NumPy's .npz, NaN there.
 """
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -16,6 +16,8 @@ from underskin.findings.codes import FindingCode
 from underskin.prediction.columns import statuses, to_csv, told
 from underskin.prediction.domain_limits import Words
 from underskin.units import Floats
+
+_ROWS_AT_ONCE = 65_536  # that become JSON in one call
 
 Status = Literal["ok", "out_of_domain"]
 
@@ -133,7 +135,12 @@ class Columns:
             "limit": self.limits,
             "status": _json_of_statuses(np.broadcast_to(self.inside, (self.rows,))),
         }
-        return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+        if self.rows <= _ROWS_AT_ONCE:
+            return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
+        parts = [b"{"]
+        for name, value in document.items():
+            parts += [orjson.dumps(name), b":", *_json_in_pieces(value), b","]
+        return b"".join([*parts[:-1], b"}"])
 
     def json_of_one(self) -> bytes:
         """The only row as a JSON object of single values."""
@@ -178,6 +185,18 @@ class Columns:
         file = io.BytesIO()
         np.savez(file, allow_pickle=False, **{name: values for name, values in arrays.items() if values is not None})
         return file.getvalue()
+
+
+def _json_in_pieces(value: Any) -> Iterator[bytes]:
+    """A member's value as JSON; a column a few rows at a time, since other threads wait for each call."""
+    if not isinstance(value, np.ndarray | list) or len(value) <= _ROWS_AT_ONCE:
+        yield orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+        return
+    step = max(1, _ROWS_AT_ONCE // (value.shape[1] if isinstance(value, np.ndarray) and value.ndim > 1 else 1))
+    for start in range(0, len(value), step):
+        yield b"," if start else b"["
+        yield orjson.dumps(value[start : start + step], option=orjson.OPT_SERIALIZE_NUMPY)[1:-1]
+    yield b"]"
 
 
 def _json_of_statuses(inside: NDArray[np.bool_]) -> orjson.Fragment:

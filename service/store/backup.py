@@ -44,7 +44,7 @@ def make(database: Database, file: Path, progress: Progress = untold) -> None:
     """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     part = file.with_name(file.name + ".part")
-    part.unlink(missing_ok=True)
+    _remove(part)
     try:
         if database.is_sqlite:
             _copy_sqlite(_sqlite_file(database), part, _BACKING_UP, progress)
@@ -58,8 +58,13 @@ def make(database: Database, file: Path, progress: Progress = untold) -> None:
             os.fsync(written.fileno())
         durable.replace(part, file)
     finally:
-        for suffix in ("", "-journal", "-wal", "-shm"):  # SQLite's own, where it ended half way
-            part.with_name(part.name + suffix).unlink(missing_ok=True)
+        _remove(part)
+
+
+def _remove(part: Path) -> None:
+    """A backup that is not whole, with SQLite's own files beside it: a journal of another one would spoil the next."""
+    for suffix in ("", "-journal", "-wal", "-shm"):
+        part.with_name(part.name + suffix).unlink(missing_ok=True)
 
 
 def verify(database: Database, file: Path) -> str:

@@ -6,7 +6,6 @@ is taken for dead, and the diagnosis is claimed again, by the same server after 
 
 import json
 import secrets
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -269,7 +268,7 @@ def _mine(connection: Connection, number: int, server: str, **values: Any) -> bo
 
 
 def clock(connection: Connection) -> float:
-    """Seconds by a clock that all servers of the store share."""
-    if connection.dialect.name == "sqlite":
-        return time.time()
-    return float(connection.execute(text("SELECT extract(epoch FROM clock_timestamp())")).scalar_one())
+    """Seconds since 1970 by the database's clock, which all servers of the store share."""
+    sqlite = connection.dialect.name == "sqlite"
+    moment = "(julianday('now') - 2440587.5) * 86400" if sqlite else "extract(epoch FROM clock_timestamp())"
+    return float(connection.execute(text(f"SELECT {moment}")).scalar_one())

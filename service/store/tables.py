@@ -221,6 +221,20 @@ key_requirement = Table(
     Column("lifted_at", String),  # by `underskin key open`; null while keys are needed
 )
 
+# Logins of browsers. The cookie is not kept: a session is valid by its signature until it expires or is ended here.
+sessions = Table(
+    "sessions",
+    metadata,
+    Column("id", String, primary_key=True),
+    Column("key_name", Text, nullable=False),
+    Column("key_sha256", String, nullable=False),
+    Column("address", String, nullable=False),
+    Column("browser", Text, nullable=False),
+    Column("started_at", String, nullable=False),
+    Column("expires_at", String, nullable=False),
+    Column("ended_at", String),
+)
+
 # Files of the lab's own mechanisms, as they were at the last backup: the folder of UNDERSKIN_MECHANISMS is what counts.
 own_mechanisms = Table(
     "own_mechanisms",

@@ -74,6 +74,8 @@ def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
         ("unit: um", "labelled: um", r"channels\.displacement_mm\.unit = None: required where labelled"),
         ("channel: load,", "channel: load, stiffness_n_per_mm: 1,", "is for displacement_mm"),
         ("kind: indentation", "rig: 3", "rig = 3: unknown field"),
+        ("kind: indentation", "3: rig", "3 = 'rig': unknown field"),
+        ("radius_mm: 2.5", "radius_mm: 2.5, temperature: .nan", "recording.temperature = '.nan': "),
     ],
 )
 def test_a_wrong_rig_description_is_refused_by_field(old: str, new: str, message: str) -> None:
@@ -85,17 +87,28 @@ def test_a_wrong_rig_description_is_refused_by_field(old: str, new: str, message
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("a: [1, 2", r"rig\.yaml: line 1: not YAML"),
+        ("a: [1, 2", r"rig\.yaml: line [12]: not YAML"),  # parsers differ on where an end is missing
         ("a: &x [1]\nb: *x", r"rig\.yaml: line 2: not YAML: references"),
         ("!!python/object/apply:os.system [ls]", r"rig\.yaml: line 1: not YAML: could not determine a constructor"),
         ("{" * 3000, "rig.yaml: line 1.*not JSON"),
-        ("[" * 3000, "rig.yaml: not YAML"),
+        ("[" * 3000, r"rig\.yaml: line 1: not YAML: lists and mappings are nested more than 100 deep"),
+        ("a: " + "[" * 60_000, r"rig\.yaml: line 1: not YAML: lists and mappings are nested more than 100 deep"),
+        ("a: !!int " + "9" * 60_000, r"rig\.yaml: not YAML: .*digits"),
         ('{"schema": }', r"rig\.yaml: line 1, column 12: not JSON"),
-        ("x" * 1_000_001, "may have up to 1000000 bytes"),
+        ("x" * 64_001, r"rig\.yaml: has 64001 bytes; a rig description may have up to 64000"),
     ],
 )
 def test_what_is_no_rig_description_is_refused(text: str, message: str) -> None:
     with pytest.raises(FileError, match=message):
+        parsed(text)
+
+
+@pytest.mark.parametrize(
+    "number", ["!!float .inf", "!!float .nan", "123456789012345678901", "!!binary aGk=", "!!set {a}"]
+)
+def test_what_json_has_not_is_no_number(number: str) -> None:
+    text = SMALL.replace("sensitivity: 1e-2", f"sensitivity: {number}")
+    with pytest.raises(InvalidInput, match=r"channels\.force_n\.sensitivity = .*must be"):
         parsed(text)
 
 

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -90,6 +91,7 @@ def site(folder: Path, service: int, tls: int, plain: int) -> str:
         "client_header_timeout     10s;": f"client_header_timeout {TIMEOUT_S}s;",
         "client_body_timeout       30s;": f"client_body_timeout {TIMEOUT_S}s;",
         "/etc/ssl/underskin/": f"{folder}/",
+        "/var/log/nginx/": f"{folder}/",
     }
     for there, here in places.items():
         assert there in text
@@ -98,9 +100,14 @@ def site(folder: Path, service: int, tls: int, plain: int) -> str:
 
 
 @pytest.fixture(scope="module")
-def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Client, int]]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Of all that nginx and the service write."""
+    return tmp_path_factory.mktemp("proxy")
+
+
+@pytest.fixture(scope="module")
+def proxy(folder: Path) -> Iterator[tuple[httpx.Client, int]]:
     """A client that speaks TLS to nginx, and nginx's plain port; nginx passes on to `underskin serve`."""
-    folder = tmp_path_factory.mktemp("proxy")
     make_certificate(folder)
     service, tls, plain = free_port(), free_port(), free_port()
     (folder / "site.conf").write_text(site(folder, service, tls, plain))
@@ -113,7 +120,11 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Clie
     make_key = [str(Path(sys.executable).with_name("underskin")), "key", "create", "proxy", "--scope", "write"]
     key = subprocess.run(make_key, env=os.environ | settings, check=True, capture_output=True, text=True).stdout.strip()
     headers = {"Host": NAME, "Authorization": f"Bearer {key}"}
-    with subprocess.Popen(serve, env=os.environ | settings) as server, subprocess.Popen(nginx) as front:
+    with (
+        (folder / "service.log").open("wb") as log,
+        subprocess.Popen(serve, env=os.environ | settings, stderr=log) as server,
+        subprocess.Popen(nginx) as front,
+    ):
         try:
             wait_until_open(service, server)
             wait_until_open(tls, front)
@@ -127,6 +138,18 @@ def proxy(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[httpx.Clie
 def ask(client: httpx.Client, method: str, path: str, **options: Any) -> httpx.Response:
     """A request whose TLS names and verifies NAME."""
     return client.request(method, path, extensions={"sni_hostname": NAME}, **options)
+
+
+@contextmanager
+def raw(client: httpx.Client) -> Iterator[ssl.SSLSocket]:
+    """A connection through TLS on which a test may say what no honest client would."""
+    trust = ssl.create_default_context()
+    trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
+    with (
+        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=TIMEOUT_S + 20) as plain,
+        trust.wrap_socket(plain, server_hostname=NAME) as connection,
+    ):
+        yield connection
 
 
 def test_a_request_through_tls_is_answered(proxy: tuple[httpx.Client, int]) -> None:
@@ -211,12 +234,7 @@ def test_the_proxy_takes_the_longest_address_of_a_page_and_no_longer_header(prox
 )
 def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int], begun: str) -> None:
     client, _ = proxy
-    trust = ssl.create_default_context()
-    trust.check_hostname, trust.verify_mode = False, ssl.CERT_NONE
-    with (
-        socket.create_connection(("127.0.0.1", client.base_url.port or 0), timeout=TIMEOUT_S + 20) as plain,
-        trust.wrap_socket(plain, server_hostname=NAME) as connection,
-    ):
+    with raw(client) as connection:
         connection.sendall(begun.encode())
         start = time.monotonic()
         try:
@@ -226,6 +244,27 @@ def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int], beg
         except OSError:
             pass  # a reset is as good as an end
         assert TIMEOUT_S - 0.5 < time.monotonic() - start < TIMEOUT_S + 15
+
+
+@pytest.mark.parametrize("path", ["/v1/skins/{}", "/v1/skins/%75s{}", "/v1/sigma?key={}", "/login?next=/{}"])
+def test_no_log_has_a_key_that_came_in_an_address(proxy: tuple[httpx.Client, int], folder: Path, path: str) -> None:
+    client, _ = proxy
+    key = client.headers["Authorization"].removeprefix("Bearer ")
+    sent = path.format(key.removeprefix("us") if "%75s" in path else key)
+    answer = ask(client, "GET", sent, headers={"X-Request-ID": key, "Referer": f"https://{NAME}{sent}"})
+    logs = [folder / name for name in ("underskin.log", "service.log")]
+    deadline = time.monotonic() + 10
+    while not all(answer.headers["X-Request-ID"] in log.read_text() for log in logs):
+        assert time.monotonic() < deadline, "the request was not logged"
+        time.sleep(0.05)
+    assert not any(key.removeprefix("us_") in log.read_text() for log in logs)
+
+
+def test_two_host_headers_are_refused(proxy: tuple[httpx.Client, int]) -> None:
+    client, _ = proxy
+    with raw(client) as connection:
+        connection.sendall(f"GET /health HTTP/1.1\r\nHost: {NAME}\r\nHost: elsewhere.example.org\r\n\r\n".encode())
+        assert connection.recv(100).split()[1] == b"400"
 
 
 def test_plain_http_is_sent_to_tls(proxy: tuple[httpx.Client, int]) -> None:

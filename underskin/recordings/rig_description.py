@@ -13,25 +13,25 @@ file, or the block, says about itself. `channels` says for each campaign field w
 several curves in one file are told apart, `estimator` how FRFs are estimated from time series (H1, H2 or Hv).
 """
 
-import re
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-import yaml
-
-from underskin.errors import FileError, InvalidInput, Mention, Requirement, conflicting, not_one_of, required, too_few
+from underskin.errors import FileError, Mention, Requirement, conflicting, not_one_of, required, too_few
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.channel_mapping import ChannelMapping, Property, SignalMapping
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
-from underskin.recordings.readers import json_file, text
+from underskin.recordings.readers import json_file
+from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.shown_values import named, shown
 from underskin.recordings.validation import mapping
 
 SCHEMA = "rig/1"
-LARGEST_BYTES = 1_000_000
+LARGEST_BYTES = 64_000
+_READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
 WHOLE_CURVES = ("file", "groups")  # what a curve may be, but for what a channel tells apart
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
@@ -64,21 +64,17 @@ class RigDescription:
 def parse(data: bytes, file: str) -> RigDescription:
     """The rig description in a YAML or JSON file.
 
-    Raises FileError where the text is neither, InvalidInput where a field cannot be used.
+    YAML is parsed in a process of its own, under the limits of reading a file. Raises FileError where the text is
+    neither, or too long, InvalidInput where a field cannot be used.
     """
     if len(data) > LARGEST_BYTES:
-        raise FileError(file, "", f"a rig description may have up to {LARGEST_BYTES} bytes")
+        raise FileError(file, "", f"has {len(data)} bytes; a rig description may have up to {LARGEST_BYTES}")
     if data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1] == b"{":
         return from_dict(json_file.document(data, file))
-    try:
-        return from_dict(yaml.load(text.decode(data, file), Loader=_PlainLoader))  # noqa: S506 (a SafeLoader)
-    except yaml.MarkedYAMLError as error:
-        place = f"line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise FileError(file, place, f"not YAML: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        if isinstance(error, InvalidInput):
-            raise
-        raise FileError(file, "", f"not YAML: {error}") from None
+    with tempfile.TemporaryFile() as stream:
+        stream.write(data)
+        stream.flush()
+        return from_dict(call_apart(_READ_YAML, stream, file, what="a rig description")["document"])
 
 
 def from_dict(document: Any) -> RigDescription:
@@ -177,38 +173,3 @@ def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping
         if name not in known:
             raise not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(known))
     return document
-
-
-class _PlainLoader(yaml.SafeLoader):
-    """Safe YAML without references, dates and keys that come twice; 1e-3 is a number, as in JSON."""
-
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        """Refuses references: a few lines of them can stand for any amount of data."""
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", mark)
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-        """Refuses a key that comes twice: the last one would be taken."""
-        mapping = super().construct_mapping(node, deep=deep)
-        if len(mapping) == len(node.value):
-            return mapping
-        seen = set()
-        for entry, _ in node.value:
-            key = self.construct_object(entry, deep=True)
-            if key in seen:
-                problem = f"the key {key!r} (column {entry.start_mark.column + 1}) must be given once in its mapping"
-                raise yaml.constructor.ConstructorError(None, None, problem, entry.start_mark)
-            seen.add(key)
-        return mapping
-
-
-_FLOAT = "tag:yaml.org,2002:float"
-_PlainLoader.yaml_implicit_resolvers = {
-    first: [(tag, pattern) for tag, pattern in resolvers if tag not in ("tag:yaml.org,2002:timestamp", _FLOAT)]
-    for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-}
-_PlainLoader.add_implicit_resolver(
-    _FLOAT, re.compile(r"^[-+]?(\d+[.]\d*|[.]\d+|\d+(?=[eE]))([eE][-+]?\d+)?$"), list("-+.0123456789")
-)

@@ -23,6 +23,7 @@ from underskin.units import Array, Floats, Indices, Mask
 
 SIGMA_TABLE = "sigma.h5"
 _MANY = 10_000  # rows
+_ROWS_AT_ONCE = 100_000  # in one call of a compiled function
 
 
 class SigmaTable(Table):
@@ -90,15 +91,18 @@ class SigmaTable(Table):
         columns = np.asarray(a_over_h, dtype=float), np.asarray(rt_over_h, dtype=float), np.cbrt(load_parameter)
         shape = np.broadcast_shapes(*(column.shape for column in columns))
         full = (c if c.size == 1 or c.shape == shape else np.broadcast_to(c, shape) for c in columns)
+        flat = [contiguous(column.ravel()) for column in full]
         sigma, rel_error = np.empty(shape), np.empty(shape)
-        sigma_rows(
-            self._point_sigma.cubics,
-            self._cell_error,
-            *self._cells_of_axes,
-            *(contiguous(column.ravel()) for column in full),
-            sigma.ravel(),
-            rel_error.ravel(),
-        )
+        for start in range(0, sigma.size, _ROWS_AT_ONCE):  # other threads wait for each call
+            part = slice(start, start + _ROWS_AT_ONCE)
+            sigma_rows(
+                self._point_sigma.cubics,
+                self._cell_error,
+                *self._cells_of_axes,
+                *(column if column.size == 1 else column[part] for column in flat),
+                sigma.ravel()[part],
+                rel_error.ravel()[part],
+            )
         return Sigma(sigma, rel_error, np.isfinite(sigma))
 
     @cached_property

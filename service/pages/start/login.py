@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
 from service.auth.access_control import AccessControl
+from service.auth.keys import Key
 from service.auth.login_throttle import LoginThrottle
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, set_session
@@ -43,13 +44,17 @@ def login(request: Request, sent: Form) -> Response:
         request.scope["why"] = "the key that was typed is not known"
         return page(request, "login.html", status=401, back=back, refused=True, missing=access.keys_missing())
     answer = see(_own(back))
-    set_session(request, answer, session.logged_in(key))
+    set_session(request, answer, access.sessions.begin(key, address, request.headers.get("user-agent", "")))
     return answer
 
 
 @router.post("/logout", dependencies=[OWN_FORM])
 def logout(request: Request) -> Response:
-    """Ends it in this browser."""
+    """Ends it, for whoever has a copy of its cookie too."""
+    key: Key | None = request.scope["key"]
+    if key is not None:
+        access: AccessControl = request.app.state.access
+        access.sessions.log_out(session.cookie_in(dict(request.scope["headers"])), key)
     answer = see("/login")
     set_session(request, answer, session.anonymous())
     return answer

@@ -252,6 +252,20 @@ def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) ->
         assert diagnoses.find(connection, row.id).state == "done"
 
 
+def test_a_server_whose_clock_is_wrong_takes_nothing_over(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    with running(place, **NONE) as server:
+        asked(server, sent(server, campaign("array")))
+    true = time.time()
+    store = database(place.database_url, place.folder)
+    with closing(store), store.writing() as connection:
+        row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
+        assert row is not None
+        monkeypatch.setattr(time, "time", lambda: true + 3600)
+        assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
+        assert diagnoses.keep_alive(connection, row.number, "first", 0.5)
+        assert abs(diagnoses.find(connection, row.id).alive_at - true) < 60
+
+
 def test_changes_need_a_key_of_scope_write(file_place: Place) -> None:
     done = file_place.command("key", "create", "reader", "--scope", "read")
     assert done.returncode == 0, done.stderr

@@ -13,6 +13,7 @@ from service.app import create_api
 from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
+from service.auth.sessions import Sessions
 from service.middleware.asgi_middleware import AsgiMiddleware
 from service.pages.shared.html import problem_page
 from service.settings import Settings
@@ -197,6 +198,7 @@ def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
         host_names=frozenset(),
         keys=keys,
         requirement=KeyRequirement(keys, store),
+        sessions=Sessions(store),
         keys_always=False,
         max_body_bytes=1000,
         max_upload_bytes=1000,

@@ -16,6 +16,7 @@ from service.app import create_api
 from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
+from service.auth.sessions import Sessions
 from service.settings import Settings
 from service.store import open_store
 from tests.support.repository import ROOT
@@ -108,6 +109,7 @@ def test_every_route_of_the_application_is_in_the_document(document: dict[str, A
         host_names=frozenset(),
         keys=keys,
         requirement=KeyRequirement(keys, store),
+        sessions=Sessions(store),
         keys_always=False,
         max_body_bytes=1,
         max_upload_bytes=1,

@@ -1,0 +1,136 @@
+"""Bodies of JSON as large as they may be: how long `/health` takes meanwhile, and the memory that they take."""
+
+import http.client
+import json
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from bench import servers
+from bench.diagnosed import document
+from bench.figures import Figure
+from bench.servers import Server
+
+_BYTES = 62_000_000
+_QUIET_S = 3.0
+_EVERY_S = 0.01
+_P = 0.99
+
+
+def _filled(start: str, entry: str, end: str) -> bytes:
+    """A body whose middle is one entry again and again."""
+    return f"{start}{entry * ((_BYTES - len(start) - len(end)) // len(entry))}{end}".encode()
+
+
+def _columns() -> bytes:
+    """Two columns with all digits."""
+    number = "0.30000000000000004, "
+    column = f"[{number * (_BYTES // 2 // len(number))}1]"
+    return f'{{"a_over_h": {column}, "rt_over_h": {column}}}'.encode()
+
+
+def _campaign() -> bytes:
+    """Many recordings of 60 lines."""
+    made = document({}, columns=4, preloads_n=(0.5, 1.0), lines=60)
+    recordings = made["recordings"]
+    assert isinstance(recordings, list)
+    entry = json.dumps(recordings[0])
+    entries = (entry.replace(f'"{recordings[0]["id"]}"', f'"r{number}"', 1) for number in range(_BYTES // len(entry)))
+    return (
+        json.dumps({**made, "recordings": []})
+        .replace('"recordings": []', f'"recordings": [{",".join(entries)}]')
+        .encode()
+    )
+
+
+_BODIES: dict[str, tuple[str, Callable[[], bytes], int]] = {
+    "sigma, all digits": ("/v1/sigma", _columns, 200),
+    "sigma, empty lists": ("/v1/sigma", lambda: _filled('{"rt_over_h": 0.6, "a_over_h": [', "[],", "1]}"), 413),
+    "d33, nulls": ("/v1/d33", lambda: _filled('{"thickness_mm": [', "null,", "1]}"), 413),
+    "Evaluate": ("/umbridge/Evaluate", lambda: _filled('{"name": "sigma", "input": [[', "0.25, ", "1]]}"), 400),
+    "campaign": ("/v1/campaigns", _campaign, 201),
+}  # fmt: skip
+
+
+def measure() -> list[Figure]:
+    """The 99th percentile of `/health` while nothing else is asked and beside each body, and the most memory."""
+    figures = []
+    with servers.underskin() as server:
+        with _beside(server) as quiet:
+            time.sleep(_QUIET_S)
+        figures.append(Figure("/health beside nothing, 99th percentile", 1e3 * _percentile(quiet.times_s), "ms"))
+        for name, (path, make, status) in _BODIES.items():
+            body = make()
+            before = _memory_bytes(server.process.pid)
+            with _beside(server) as beside:
+                _post(server, path, body, status)
+            times = 1e3 * _percentile(beside.times_s)
+            figures.append(Figure(f"/health beside 62 MB, {name}, 99th percentile", times, "ms", 200, "lower"))
+            grown = (beside.memory_bytes - before) / len(body)
+            figures.append(Figure(f"memory beside 62 MB, {name}", grown, "× the body", 6, "lower"))
+    return figures
+
+
+class _Beside:
+    """What is measured while a request is answered."""
+
+    def __init__(self) -> None:
+        self.times_s: list[float] = []
+        self.memory_bytes = 0
+        self.ended = threading.Event()
+
+
+@contextmanager
+def _beside(server: Server) -> Iterator[_Beside]:
+    seen = _Beside()
+
+    def ask() -> None:
+        connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)
+        while not seen.ended.wait(_EVERY_S):
+            start = time.perf_counter()
+            connection.request("GET", "/health")
+            connection.getresponse().read()
+            seen.times_s.append(time.perf_counter() - start)
+        connection.close()
+
+    def look() -> None:
+        while not seen.ended.wait(_EVERY_S):
+            seen.memory_bytes = max(seen.memory_bytes, _memory_bytes(server.process.pid))
+
+    threads = [threading.Thread(target=run) for run in (ask, look)]
+    for thread in threads:
+        thread.start()
+    try:
+        yield seen
+    finally:
+        seen.ended.set()
+        for thread in threads:
+            thread.join()
+
+
+def _post(server: Server, path: str, body: bytes, status: int) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=600)
+    connection.request("POST", path, body, {"Content-Type": "application/json"})
+    answer = connection.getresponse()
+    said = answer.read()
+    connection.close()
+    if answer.status != status:
+        raise RuntimeError(f"{path} answered {answer.status}: {said[:500].decode()}")
+
+
+def _memory_bytes(pid: int) -> int:
+    """Of a process and all that it has started."""
+    process = Path(f"/proc/{pid}")
+    try:
+        found = re.search(r"VmRSS:\s+(\d+) kB", (process / "status").read_text())
+        children = [child for task in process.glob("task/*/children") for child in task.read_text().split()]
+    except OSError:  # it has ended
+        return 0
+    return (int(found[1]) * 1024 if found else 0) + sum(_memory_bytes(int(child)) for child in children)
+
+
+def _percentile(times_s: list[float]) -> float:
+    return sorted(times_s)[int(_P * (len(times_s) - 1))]

@@ -1,0 +1,90 @@
+"""The sessions that go on, as the store knows them: each login is noted, and ending one ends it on every server."""
+
+import logging
+import threading
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
+from sqlalchemy.exc import SQLAlchemyError
+
+from service.auth import session
+from service.auth.keys import Key
+from service.log import LastingFailure
+from service.store import AnyRow, Database, Missing, StorageFull, StoreMoved, sessions
+from service.store.times import stored
+
+logger = logging.getLogger("underskin")
+
+_LOOK_S = 0.5  # how often: an ended session is refused within a second
+_JOIN_S = 10.0
+_LONGEST_BROWSER = 200
+_STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
+
+
+class Sessions:
+    """Which sessions were ended; a thread of the server looks between `start` and `stop`.
+
+    What was ended stays so for this process, whatever store is restored meanwhile.
+    """
+
+    def __init__(self, store: Database) -> None:
+        """Nothing is looked at yet."""
+        self._store = store
+        self._ended: frozenset[str] = frozenset()
+        self._failure = LastingFailure(logger)
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="sessions", daemon=True)
+
+    def has_ended(self, cookie: str) -> bool:
+        """Whether the session of a cookie was ended, as of the last look."""
+        return session.id_of(cookie) in self._ended
+
+    def begin(self, key: Key, address: str, browser: str) -> str:
+        """The cookie of a new session, which is noted; raises as Database.writing."""
+        cookie = session.logged_in(key)
+        expires_at = stored(datetime.fromtimestamp(session.expires(cookie), UTC).isoformat())
+        shown = "".join(letter for letter in browser if letter.isprintable())[:_LONGEST_BROWSER]
+        noted = sessions.NewSession(session.id_of(cookie), key.name, key.sha256, address, shown, expires_at)
+        self._store.write(sessions.add, noted)
+        return cookie
+
+    def listed(self, key: Key) -> Sequence[AnyRow]:
+        """The sessions of a key that go on, the latest first."""
+        return self._store.read(sessions.listed, key.sha256)
+
+    def end(self, session_id: str, key: Key) -> None:
+        """End a session of a key, at once on this server; raises Missing, and as Database.writing."""
+        self._store.write(sessions.end, session_id, key.sha256)
+        self._ended |= {session_id}
+
+    def log_out(self, cookie: str, key: Key) -> None:
+        """End the session of a cookie on this server whatever happens to the store; the log says what did."""
+        self._ended |= {session.id_of(cookie)}
+        try:
+            self._store.write(sessions.end, session.id_of(cookie), key.sha256)
+        except Missing:
+            pass  # it began before sessions were noted
+        except _STORE_FAILED as error:
+            self._failure.log("a logout cannot be kept: the session ends on this server alone", error)
+
+    def look(self) -> None:
+        """Bring what was ended up to date."""
+        self._ended |= self._store.read(sessions.ended)
+
+    def start(self) -> None:
+        """Look from now on."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Look no more."""
+        self._ending.set()
+        if self._thread.ident is not None:
+            self._thread.join(_JOIN_S)
+
+    def _watch(self) -> None:
+        while not self._ending.wait(_LOOK_S):
+            try:
+                self.look()
+                self._failure.is_over()
+            except _STORE_FAILED as error:
+                self._failure.log("which sessions were ended cannot be looked up", error)

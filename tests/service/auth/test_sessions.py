@@ -1,0 +1,129 @@
+"""Sessions of browsers: listed for their key, ended one by one, on the page, by a logout and by the command line."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import httpx
+import pytest
+
+from service.auth.session import COOKIE
+from tests.service.pages.forms import BROWSING, token_of
+from tests.support.store_server import Place, Server, running
+
+LOGIN_FIRST = 303  # a page sends who is not logged in to the login
+
+Browser = Callable[..., httpx.Client]
+
+
+@pytest.fixture
+def keyed(place: Place) -> Iterator[tuple[Server, dict[str, str]]]:
+    """A server with two keys."""
+    keys = {name: place.command("key", "create", name).stdout.strip() for name in ("mara", "otto")}
+    with running(place, key=keys["mara"], UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        yield server, keys
+
+
+@pytest.fixture
+def log_in(keyed: tuple[Server, dict[str, str]]) -> Iterator[Browser]:
+    """A browser of some name in which the key of a name was typed, at that server or another."""
+    server, keys = keyed
+    with ExitStack() as stack:
+
+        def logged_in(name: str, browser: str, at: Server = server) -> httpx.Client:
+            headers = {**BROWSING, "User-Agent": browser, "Origin": str(at.http.base_url).rstrip("/")}
+            client = stack.enter_context(httpx.Client(base_url=at.http.base_url, headers=headers, timeout=60))
+            form = {"form_token": token_of(client.get("/login").text), "key": keys[name]}
+            assert client.post("/login", data=form).status_code == 303
+            assert client.get("/").status_code == 200
+            return client
+
+        yield logged_in
+
+
+def listed(place: Place) -> dict[str, list[str]]:
+    """What the command line lists, by the browser's name: id, key, start, end, address."""
+    rows = [line.split("\t") for line in place.command("key", "sessions").stdout.splitlines()]
+    return {row[5]: row[:5] for row in rows}
+
+
+def post(browser: httpx.Client, path: str) -> int:
+    """The status of a form of the page of sessions."""
+    return browser.post(path, data={"form_token": token_of(browser.get("/sessions").text)}).status_code
+
+
+def is_refused_within_a_second(browser: httpx.Client) -> bool:
+    """Whether a page asks for a login, now or in a request a second from now."""
+    deadline = time.monotonic() + 1
+    asked, status = 0.0, 0
+    while status != LOGIN_FIRST and asked < deadline:
+        asked = time.monotonic()
+        status = browser.get("/").status_code
+        time.sleep(0.02)
+    return status == LOGIN_FIRST
+
+
+def test_a_session_is_listed_and_ended_by_another_of_its_key(
+    keyed: tuple[Server, dict[str, str]], log_in: Browser
+) -> None:
+    server, _ = keyed
+    lost, own, other = log_in("mara", "the lost one"), log_in("mara", "at home"), log_in("otto", "otto's")
+    rows = listed(server.place)
+    assert {name: (row[1], row[4]) for name, row in rows.items()} == {
+        "the lost one": ("mara", "127.0.0.1"),
+        "at home": ("mara", "127.0.0.1"),
+        "otto's": ("otto", "127.0.0.1"),
+    }
+    page = own.get("/sessions").text
+    assert ("the lost one" in page, "at home" in page, "otto" in page) == (True, True, False)
+    end = f"/sessions/{rows['the lost one'][0]}/end"
+    assert post(other, end) == 404  # not of its key
+    assert own.post(end, data={"form_token": token_of(other.get("/sessions").text)}).status_code == 403
+    assert lost.get("/").status_code == 200
+    assert post(own, end) == 303
+    assert lost.get("/").status_code == LOGIN_FIRST  # at once on the server that was asked
+    assert post(own, end) == 404
+    assert (own.get("/").status_code, other.get("/").status_code) == (200, 200)
+    assert set(listed(server.place)) == {"at home", "otto's"}
+
+
+def test_a_logout_ends_copies_of_the_cookie_too(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
+    server, _ = keyed
+    browser = log_in("mara", "at home")
+    stolen = {**BROWSING, "Cookie": f"{COOKIE}={browser.cookies[COOKIE]}"}
+    address = str(server.http.base_url)
+    assert httpx.get(address, headers=stolen).status_code == 200
+    assert post(browser, "/logout") == 303
+    assert httpx.get(address, headers=stolen).status_code == LOGIN_FIRST
+    assert listed(server.place) == {}
+
+
+def test_the_command_line_ends_a_session_on_every_server_also_after_a_restart(
+    keyed: tuple[Server, dict[str, str]], log_in: Browser
+) -> None:
+    server, keys = keyed
+    place = server.place
+    lost, kept = log_in("mara", "the lost one"), log_in("mara", "at home")
+    session_id = listed(place)["the lost one"][0]
+    ended = place.command("key", "end-session", session_id)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "", "")
+    assert is_refused_within_a_second(lost)
+    assert kept.get("/").status_code == 200
+    with running(place, key=keys["mara"], UNDERSKIN_DIAGNOSIS_WORKERS="0") as second:
+        cookies = {name: f"{COOKIE}={one.cookies[COOKIE]}" for name, one in (("lost", lost), ("kept", kept))}
+        found = {
+            name: httpx.get(str(second.http.base_url), headers={**BROWSING, "Cookie": cookie}).status_code
+            for name, cookie in cookies.items()
+        }
+    assert found == {"lost": LOGIN_FIRST, "kept": 200}
+    again = place.command("key", "end-session", session_id)
+    assert (again.returncode, again.stderr) == (1, f"underskin: There is no session '{session_id}' that goes on.\n")
+
+
+def test_the_cookie_is_kept_nowhere(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
+    server, _ = keyed
+    cookie = log_in("mara", "at home").cookies[COOKIE]
+    time.sleep(0.5)  # the log is written a moment later
+    written = [path.read_bytes() for path in server.place.folder.parent.rglob("*") if path.is_file()]
+    assert any(b"/login" in text for text in written)  # of the log
+    assert not any(part.encode() in text for text in written for part in (cookie, cookie.split(".")[0]))

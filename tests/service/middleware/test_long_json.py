@@ -1,0 +1,180 @@
+"""Bodies of JSON as large as they may be: the others are answered meanwhile, and they take little memory."""
+
+import json
+import re
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Self
+
+import httpx
+import pytest
+
+from tests.service.requests import problem_of
+from tests.support.server import Server, running
+from tests.support.store_server import campaign
+
+pytestmark = pytest.mark.slow
+
+LARGE = 20_000_000  # bytes; the limit is 64 MB
+MOST_WAIT_S = 1.5  # of another request, on a machine that runs all tests; a parser in this process held it for seconds
+MOST_MEMORY = 6  # times the body, of the server's process and the one that parses
+JSON = {"Content-Type": "application/json"}
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One for all tests here."""
+    with running(tmp_path_factory.mktemp("long"), {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}) as started:
+        yield started
+
+
+def filled(start: str, entry: str, end: str) -> bytes:
+    """A body of LARGE bytes whose middle is one entry again and again."""
+    return f"{start}{entry * ((LARGE - len(start) - len(end)) // len(entry))}{end}".encode()
+
+
+def of_campaign(**fields: Any) -> bytes:
+    """A campaign of LARGE bytes: many recordings, all good."""
+    document = campaign("large", sensors=1, lines=200) | fields
+    one = document["recordings"][0]
+    count = LARGE // len(json.dumps(one))
+    document["recordings"] = [{**one, "id": f"r{number}"} for number in range(count)]
+    return json.dumps(document).encode()
+
+
+def memory_bytes(pid: int) -> int:
+    """Of a process and all that it has started."""
+    process = Path(f"/proc/{pid}")
+    try:
+        found = re.search(r"VmRSS:\s+(\d+) kB", (process / "status").read_text())
+        children = [child for task in process.glob("task/*/children") for child in task.read_text().split()]
+    except OSError:  # it has ended
+        return 0
+    return (int(found[1]) * 1024 if found else 0) + sum(memory_bytes(int(child)) for child in children)
+
+
+class Beside:
+    """What happens beside a request: the longest wait of `/health`, and the memory that the server takes more."""
+
+    def __init__(self, server: Server) -> None:
+        self._server = server
+        self._ending = threading.Event()
+        self._before = memory_bytes(server.process.pid)
+        self.longest_s = 0.0
+        self.asked = 0
+        self.memory = 0
+        self._threads = [threading.Thread(target=run) for run in (self._ask, self._look)]
+
+    def __enter__(self) -> Self:
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ending.set()
+        for thread in self._threads:
+            thread.join()
+
+    def _ask(self) -> None:
+        with httpx.Client(base_url=self._server.url, timeout=60) as client:
+            while not self._ending.is_set():
+                start = time.perf_counter()
+                assert client.get("/health").status_code == 200
+                self.longest_s = max(self.longest_s, time.perf_counter() - start)
+                self.asked += 1
+                time.sleep(0.01)
+
+    def _look(self) -> None:
+        while not self._ending.wait(0.02):
+            self.memory = max(self.memory, memory_bytes(self._server.process.pid) - self._before)
+
+
+def attacked(server: Server, path: str, body: bytes) -> httpx.Response:
+    """The answer to a body, beside which all must be well."""
+    with Beside(server) as beside:
+        answer = httpx.post(server.url + path, content=body, headers=JSON, timeout=300)
+    assert beside.asked > 5
+    assert beside.longest_s < MOST_WAIT_S
+    assert beside.memory < MOST_MEMORY * len(body)
+    return answer
+
+
+def test_a_batch_in_all_digits_is_answered(server: Server) -> None:
+    numbers = ", ".join(["0.30000000000000004", "1.7000000000000002"] * (LARGE // 42))
+    answer = attacked(server, "/v1/sigma", f'{{"a_over_h": [{numbers}], "rt_over_h": 0.6}}'.encode())
+    found = answer.raise_for_status().json()
+    short = httpx.post(
+        server.url + "/v1/sigma", json={"a_over_h": [0.30000000000000004, 1.7000000000000002], "rt_over_h": 0.6}
+    )
+    assert found["sigma"] == short.json()["sigma"] * (LARGE // 42)
+    assert set(found["status"]) == {"ok"}
+
+
+Body = Callable[[], bytes]
+COLUMN = '{"rt_over_h": 1, "a_over_h": ['
+NUMBER = "0.25000000000000, "
+POINT = '{"name": "sigma", "input": [['
+REFUSED: dict[str, tuple[str, Body, int]] = {
+    "nested": ("/v1/sigma", lambda: filled(COLUMN, "[],", "[]]}"), 413),
+    "null": ("/v1/d33", lambda: filled('{"thickness_mm": [', "null,", "1]}"), 413),
+    "short numbers": ("/v1/sigma", lambda: filled(COLUMN, "1,", "1]}"), 413),
+    "many keys": ("/v1/sigma", lambda: filled("{", '"k":1,', '"k":1}'), 413),
+    "a key twice": ("/v1/sigma", lambda: filled(COLUMN, NUMBER, '1], "rt_over_h": 1}'), 422),
+    "no end": ("/v1/sigma", lambda: filled(COLUMN, NUMBER, "1"), 400),
+    "a long vector": ("/umbridge/Evaluate", lambda: filled(POINT, NUMBER, "1]]}"), 400),
+    "a config": ("/umbridge/Evaluate", lambda: filled(f'{POINT}1, 1, 0]], "config": {{"x": [', "{},", "1]}}"), 413),
+    "a campaign's name": ("/v1/campaigns", lambda: filled('{"schema": "campaign/1", "name": [', "{},", "1]}"), 413),
+    "a list of lists": ("/v1/stress", lambda: filled('{"pressure_map": [', "[1],", "1]}"), 413),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_takes_much_memory_is_refused(server: Server, case: str) -> None:
+    path, body, status = REFUSED[case]
+    answer = attacked(server, path, body())
+    problem_of(answer, status)
+    assert len(answer.content) < 2000
+
+
+def test_a_large_campaign_is_kept(server: Server) -> None:
+    body = of_campaign()
+    answer = attacked(server, "/v1/campaigns", body)
+    assert answer.status_code == 201
+    entries = answer.json()["recordings"]
+    assert {entry["status"] for entry in entries} == {"ok"}
+    kept = httpx.get(f"{server.url}/v1/campaigns/{answer.json()['id']}/document", timeout=120).json()
+    sent = {entry["id"]: entry for entry in json.loads(body)["recordings"]}
+    assert len(kept["recordings"]) == len(sent)
+    for entry in kept["recordings"][::100]:
+        assert entry["frf_re_pc_per_n"] == sent[entry["id"]]["frf_re_pc_per_n"]
+
+
+@pytest.mark.parametrize("wrong", ["1,, 2", "01", ".5", "1, null", "1, NaN", "+1", "1 2", ""])
+def test_what_is_no_number_is_found_where_it_is(server: Server, wrong: str) -> None:
+    """As in a short body, which other tests look at."""
+    numbers = "0.25, " * 250_000
+    body = f'{{"rt_over_h": 0.6,\n "a_over_h": [{numbers}{wrong}]}}'.encode()
+    problem = problem_of(
+        httpx.post(server.url + "/v1/sigma", content=body, headers=JSON, timeout=60), 422 if "null" in wrong else 400
+    )
+    place = len(' "a_over_h": [') + len(numbers)
+    if "null" in wrong:
+        assert problem["errors"][0]["field"] == "a_over_h"
+        assert problem["errors"][0]["index"] == 250_001
+    else:
+        found = re.search(r"line 2, column (\d+)", problem["detail"])
+        assert found
+        assert abs(int(found[1]) - place) < 8
+
+
+def test_fields_beside_a_long_column_mean_the_same(server: Server) -> None:
+    """Texts that look like lists, escapes, short lists, single numbers, blanks."""
+    column = ", ".join(["0.25"] * 250_000)
+    good = f'\n{{ "model" : "half_space", "a_over_h": [{column}], "rt_over_h":0.6, "load_parameter": 0 }} '
+    found = httpx.post(server.url + "/v1/sigma", content=good, headers=JSON, timeout=60).raise_for_status().json()
+    assert (found["model"], len(found["sigma"]), len(set(found["sigma"]))) == ("half_space", 250_000, 1)
+    odd = f'{{"a_over_h": [{column}], "rt_over_h": 0.6, "model": "\\"[{column}]"}}'
+    errors = problem_of(httpx.post(server.url + "/v1/sigma", content=odd, headers=JSON, timeout=60), 422)["errors"]
+    assert [error["field"] for error in errors] == ["model"]

@@ -1,0 +1,98 @@
+"""Long JSON documents, read by `sandbox.call_apart` in a process of its own: long lists of numbers become arrays.
+
+The lists are cut out of the text and converted piece by piece, which takes 8 bytes a number and no Python object for
+each; what is left is short, and is read as any JSON. So little memory suffices, and whoever asked gets arrays.
+"""
+
+import re
+import secrets
+from typing import Any, BinaryIO
+
+import numpy as np
+import orjson
+
+from underskin.errors import FileError
+from underskin.recordings.readers.repeated_keys import repeated_key
+from underskin.units import Floats
+
+_BOM = b"\xef\xbb\xbf"
+_PIECE = 1 << 16  # characters of a list that are objects at once
+# A string, which may hold anything; a list of numbers alone; or a quotation mark that begins no string.
+_PARTS = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"|\[([-+0-9.eE,\s]{64,}+)\]|"', re.DOTALL)
+_NO_MEMORY = "Not enough memory"  # how orjson says it
+_DEEPEST = 200  # lists and objects in each other, which is what can be answered
+
+
+def read(stream: BinaryIO, most_plain: str) -> dict[str, Any]:
+    """One of: `document`; `invalid`, the line, the column and what is wrong there; `repeated`, a key and its second
+    place; `plain`, the bytes beside long lists of numbers where they are more than `most_plain`."""
+    body = stream.read().removeprefix(_BOM)
+    mark = secrets.token_hex(16)  # nothing in the document can pass for a list that was cut out
+    text, arrays = _cut(body, mark)
+    if len(text) > int(most_plain):
+        return {"plain": len(text)}
+    try:
+        document = orjson.loads(text)
+    except orjson.JSONDecodeError as error:
+        if error.msg.startswith(_NO_MEMORY):
+            raise MemoryError from None
+        return {"invalid": _place(body, error)}
+    if repeated_key(text):
+        return {"repeated": repeated_key(body)}
+    return {"document": _with_arrays(document, mark, arrays, 0)}
+
+
+def _cut(body: bytes, mark: str) -> tuple[bytes, list[Floats]]:
+    """The document with a string in place of each long list of numbers, and these lists."""
+    kept: list[bytes] = []
+    arrays: list[Floats] = []
+    behind = 0
+    for part in _PARTS.finditer(body):
+        if part[0] == b'"':
+            break
+        array = None if part[1] is None else _numbers(body, *part.span(1))
+        if array is not None:
+            kept += body[behind : part.start()], b'"%b:%d"' % (mark.encode(), len(arrays))
+            arrays.append(array)
+            behind = part.end()
+    return b"".join((*kept, body[behind:])), arrays
+
+
+def _numbers(body: bytes, start: int, end: int) -> Floats | None:
+    """The numbers between two commas each; None where the list is not as JSON has it."""
+    numbers = np.empty(body.count(b",", start, end) + 1)
+    filled = 0
+    while start <= end:
+        comma = body.find(b",", min(start + _PIECE, end), end)
+        stop = end if comma < 0 else comma
+        try:
+            piece = orjson.loads(b"[%b]" % body[start:stop])
+        except orjson.JSONDecodeError:
+            return None
+        if not piece:  # nothing between two commas
+            return None
+        numbers[filled : filled + len(piece)] = piece
+        filled += len(piece)
+        start = stop + 1
+    return numbers
+
+
+def _place(body: bytes, error: orjson.JSONDecodeError) -> list[Any]:
+    """Where the whole document, not what was left of it, is no JSON."""
+    try:
+        orjson.loads(body)
+    except orjson.JSONDecodeError as whole:
+        error = whole
+    return [error.lineno, error.colno, error.msg]
+
+
+def _with_arrays(value: Any, mark: str, arrays: list[Floats], depth: int) -> Any:
+    if depth > _DEEPEST:
+        raise FileError("", "", f"lists and objects are nested more than {_DEEPEST} deep")
+    if isinstance(value, dict):
+        return {name: _with_arrays(entry, mark, arrays, depth + 1) for name, entry in value.items()}
+    if isinstance(value, list):
+        return [_with_arrays(entry, mark, arrays, depth + 1) for entry in value]
+    if isinstance(value, str) and value.startswith(mark):
+        return arrays[int(value.removeprefix(f"{mark}:"))]
+    return value
