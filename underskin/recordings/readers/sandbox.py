@@ -11,7 +11,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -76,7 +75,7 @@ def call_apart(
         if status != 0:
             raise FileError(file, "", f"the process that read it as {what} {_end(status, said)}")
         answer.seek(0)
-        return _understood(answer.read(), file)
+        return _understood(answer, file)
 
 
 def _end(status: int, said: BinaryIO) -> str:
@@ -88,32 +87,34 @@ def _end(status: int, said: BinaryIO) -> str:
     return f"ended with status {status}: {last}"
 
 
-def _understood(answer: bytes, file: str) -> dict[str, Any]:
-    (size,) = _LENGTH.unpack_from(answer)
-    header = orjson.loads(answer[_LENGTH.size : _LENGTH.size + size])
+def _understood(answer: BinaryIO, file: str) -> dict[str, Any]:
+    (size,) = _LENGTH.unpack(answer.read(_LENGTH.size))
+    header = orjson.loads(answer.read(size))
     contents = header["answer"]
     if "error" in contents:
         error = contents["error"]
         raise FileError(file, error["place"], error["reason"], code=ErrorCode(error["code"]))
-    return dict(_with_arrays(contents, header["mark"], memoryview(answer)[_LENGTH.size + size :]))
+    return dict(_with_arrays(contents, header["mark"], answer, answer.tell()))
 
 
-def _with_arrays(contents: Any, mark: str, buffer: memoryview) -> Any:
-    """What was answered, with the array that each {mark: [type, start, count]} stands for."""
+def _with_arrays(contents: Any, mark: str, answer: BinaryIO, start: int) -> Any:
+    """What was answered, with the array that each {mark: [type, place behind start, count]} stands for."""
     if isinstance(contents, list):
-        return [_with_arrays(entry, mark, buffer) for entry in contents]
+        return [_with_arrays(entry, mark, answer, start) for entry in contents]
     if not isinstance(contents, dict):
         return contents
     if contents.keys() == {mark}:
-        kind, start, count = contents[mark]
-        return np.frombuffer(buffer, dtype=kind, count=count, offset=start).copy()
-    return {name: _with_arrays(value, mark, buffer) for name, value in contents.items()}
+        kind, place, count = contents[mark]
+        answer.seek(start + place)
+        return np.fromfile(answer, dtype=kind, count=count)
+    return {name: _with_arrays(value, mark, answer, start) for name, value in contents.items()}
 
 
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
     contents = parse(name, stream, "")
     if isinstance(contents, Contents):
-        return asdict(contents)
+        blocks = [{**vars(block), "channels": [vars(one) for one in block.channels]} for block in contents.blocks]
+        return {**vars(contents), "blocks": blocks}
     return {"document": contents.campaign, "warnings": contents.warnings}
 
 
