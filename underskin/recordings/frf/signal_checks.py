@@ -137,9 +137,8 @@ def _jumps(signal: Floats) -> Mask:
     # In parts of two lengths, so that they are taken at once: a long series has some ten thousand.
     length, longer = divmod(len(bend), max(1, len(bend) // _LOCAL))
     parts = np.split(bend, [longer * (length + 1)])
-    medians = [
-        np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, (length + 1, length), strict=True)
-    ]
+    sizes = (length + 1, length)
+    medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
     usual = 1.4826 * np.concatenate(medians)
     around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
     scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
