@@ -11,8 +11,9 @@ from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
-from underskin.errors import ErrorCode, InvalidInput, wrong_type
+from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, wrong_type
 from underskin.prediction.csv_columns import CsvColumn, CsvError, from_csv
+from underskin.recordings.reading import sheet_text
 
 try:
     import simdjson
@@ -22,29 +23,40 @@ else:
     _LONG = 10_000  # bytes, beyond which columns are read as arrays
 
 CSV = "text/csv"
+XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+XLSM = "application/vnd.ms-excel.sheet.macroEnabled.12"
+_WORKBOOK = "the workbook of the body"
 
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
 def parse(
-    kind: type[_Kind], body: bytes, content_type: str, most_bytes: int
+    kind: type[_Kind], body: bytes, content_type: str, most_bytes: int, sheet: str | None = None
 ) -> tuple[_Kind, Mapping[str, Sequence[str]]]:
-    """The request in `body`, and the columns of words in a CSV, which only say what a row is; an .npz may have
-    `most_bytes` when it is expanded.
+    """The request in `body`, and the columns of words in a CSV or workbook, which only say what a row is; an .npz may
+    have `most_bytes` when it is expanded; `sheet`: of a workbook, which is read in a process of its own, as files are.
 
     Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
     """
     labels: Mapping[str, Sequence[str]] = {}
+    if sheet is not None and not is_workbook(content_type):
+        raise conflicting("sheet", sheet, f"must be left out: the body is no workbook ({XLSX})")
     match media_type_of(content_type):
         case "text/csv":
             fields: Any
-            fields, labels = _from_csv(kind, body)
+            fields, labels = _from_csv(kind, body, "The CSV of the body")
+        case _ if is_workbook(content_type):
+            try:
+                text = sheet_text(body, _WORKBOOK, sheet)
+            except FileError as error:
+                raise Refusal(400, f"{error}.") from None
+            fields, labels = _from_csv(kind, text.encode(), "The workbook of the body")
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
         case "" | "application/json" if len(body) > _LONG and (plain := _plain_json(kind, body)) is not None:
             fields = plain
         case _:
-            fields = json_document(body, content_type, f", {CSV} or {NPZ}")
+            fields = json_document(body, content_type, f", {CSV}, {NPZ} or {XLSX}")
     return validated(kind, fields), labels
 
 
@@ -67,6 +79,11 @@ def json_document(body: bytes, content_type: str, also: str = "") -> Any:
 def media_type_of(content_type: str) -> str:
     """A Content-Type without its parameters."""
     return content_type.split(";", 1)[0].strip().lower()
+
+
+def is_workbook(content_type: str) -> bool:
+    """Whether a body is said to be an Excel workbook, with macros or without."""
+    return media_type_of(content_type) in (XLSX, XLSM.lower())
 
 
 def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | None:
@@ -107,11 +124,11 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
     return True
 
 
-def _from_csv(kind: type[ColumnsRequest], body: bytes) -> tuple[dict[str, Any], dict[str, list[str]]]:
+def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], dict[str, list[str]]]:
     try:
         found = from_csv(body, kind.model_fields)
     except CsvError as error:
-        raise Refusal(400, f"The CSV of the body {error}.") from None
+        raise Refusal(400, f"{what} {error}.") from None
     # The request's own checks refuse unknown columns.
     return {
         **found.unknown,
