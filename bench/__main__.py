@@ -19,6 +19,7 @@ from bench import (
     newton_step,
     orderings,
     pages,
+    readers,
     single_requests,
     start,
     store,
@@ -42,6 +43,7 @@ PARTS = {
     "store": store.measure,
     "pages": pages.measure,
     "waits": waits.measure,
+    "readers": readers.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 
