@@ -20,6 +20,7 @@ from bench import (
     newton_step,
     orderings,
     pages,
+    readers,
     single_requests,
     start,
     store,
@@ -44,6 +45,7 @@ PARTS = {
     "store": store.measure,
     "pages": pages.measure,
     "waits": waits.measure,
+    "readers": readers.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 

@@ -36,6 +36,7 @@ SECTIONS = {
     "fleet": "Ten skins as a fleet",
     "waits": "What a reader waits for",
     "bodies": "Bodies of 62 MB",
+    "readers": "Long files",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
 }
@@ -64,6 +65,8 @@ again.""",
     "waits": """The server and its workers have one core, and Chromium runs beside them; a worker is ready before each
 click. The files are campaigns of 64 recordings × 60 lines, whose reports are the same to the byte for one process and
 two.""",
+    "readers": """Processor time of the reading process and of the one that asked it. Memory includes the
+interpreter's, and that of the numbers.""",
     "curves": """Ratios are of the root mean squares that plain least squares leave of one curve alone, the modulus, the
 contact point and the force's zero free: the diagnosis' own fit, by which it states `fit.before.rmse_percent`, beside
 SciPy's `least_squares` from several starts, with Hertz' and Johnson, Kendall and Roberts' laws written out in

@@ -12,8 +12,9 @@ from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
-from underskin.errors import ErrorCode, InvalidInput, wrong_type
+from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, wrong_type
 from underskin.prediction.csv_columns import CsvColumn, CsvError, from_csv
+from underskin.recordings.reading import sheet_text
 
 try:
     import simdjson
@@ -25,23 +26,34 @@ else:
 _MOST_PLAIN_BYTES = 10_000_000  # of columns that are read here: that takes some hundredths of a second
 
 CSV = "text/csv"
+XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
+XLSM = "application/vnd.ms-excel.sheet.macroEnabled.12"
+_WORKBOOK = "the workbook of the body"
 
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
 def parse(
-    kind: type[_Kind], body: bytes, content_type: str, most_bytes: int
+    kind: type[_Kind], body: bytes, content_type: str, most_bytes: int, sheet: str | None = None
 ) -> tuple[_Kind, Mapping[str, Sequence[str]]]:
-    """The request in `body`, and the columns of words in a CSV, which only say what a row is; an .npz may have
-    `most_bytes` when it is expanded.
+    """The request in `body`, and the columns of words in a CSV or workbook, which only say what a row is; an .npz may
+    have `most_bytes` when it is expanded; `sheet`: of a workbook, which is read in a process of its own, as files are.
 
     Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
     """
     labels: Mapping[str, Sequence[str]] = {}
+    if sheet is not None and not is_workbook(content_type):
+        raise conflicting("sheet", sheet, f"must be left out: the body is no workbook ({XLSX})")
     match media_type_of(content_type):
         case "text/csv":
             fields: Any
-            fields, labels = _from_csv(kind, body)
+            fields, labels = _from_csv(kind, body, "The CSV of the body")
+        case _ if is_workbook(content_type):
+            try:
+                text = sheet_text(body, _WORKBOOK, sheet)
+            except FileError as error:
+                raise Refusal(400, f"{error}.") from None
+            fields, labels = _from_csv(kind, text.encode(), "The workbook of the body")
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
         case "" | "application/json" if (
@@ -51,7 +63,7 @@ def parse(
         case "" | "application/json" if len(body) > LONG_BYTES:
             fields = _long_json(kind, body)
         case _:
-            fields = json_document(body, content_type, f", {CSV} or {NPZ}")
+            fields = json_document(body, content_type, f", {CSV}, {NPZ} or {XLSX}")
     return validated(kind, fields), labels
 
 
@@ -98,6 +110,11 @@ def media_type_of(content_type: str) -> str:
     return content_type.split(";", 1)[0].strip().lower()
 
 
+def is_workbook(content_type: str) -> bool:
+    """Whether a body is said to be an Excel workbook, with macros or without."""
+    return media_type_of(content_type) in (XLSX, XLSM.lower())
+
+
 def _plain_json(kind: type[ColumnsRequest], body: bytes) -> dict[str, Any] | None:
     """The fields of a JSON object with the columns as arrays, without a Python object for each number.
 
@@ -136,11 +153,11 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
     return True
 
 
-def _from_csv(kind: type[ColumnsRequest], body: bytes) -> tuple[dict[str, Any], dict[str, list[str]]]:
+def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], dict[str, list[str]]]:
     try:
         found = from_csv(body, kind.model_fields)
     except CsvError as error:
-        raise Refusal(400, f"The CSV of the body {error}.") from None
+        raise Refusal(400, f"{what} {error}.") from None
     # The request's own checks refuse unknown columns.
     return {
         **found.unknown,

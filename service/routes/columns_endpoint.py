@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
-from fastapi import APIRouter, Header, Request, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 
 from service.dependencies import StoreToRead, Table
-from service.routes.columns_body import CSV, json_document, parse
+from service.ingest.reading import READING_SLOTS
+from service.routes.columns_body import CSV, XLSM, XLSX, is_workbook, json_document, parse
 from service.routes.npz_body import NPZ
 from service.schemas.columns import AnswerInColumns, Columns, ColumnsRequest
 from service.store import Database
@@ -21,6 +22,10 @@ Accept = Annotated[
         description="`text/csv` returns the columns as CSV and `application/x-npz` as NumPy's .npz, both with NaN; "
         "otherwise JSON with null."
     ),
+]
+Sheet = Annotated[
+    str | None,
+    Query(min_length=1, max_length=200, description="Of a workbook with several sheets: which of them, by its name."),
 ]
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
 # Beside JSON, what an answer in columns may be, for OpenAPI.
@@ -45,26 +50,31 @@ def add_columns_route(
     """An endpoint that reads a request in columns, answers it and writes it as the client accepts it."""
 
     async def endpoint(
-        request: Request, table: Table, store: StoreToRead, accept: Accept = "application/json"
+        request: Request, table: Table, store: StoreToRead, accept: Accept = "application/json", sheet: Sheet = None
     ) -> Response:
-        """In columns: a list has an entry a row, a single number holds for all rows. Accept chooses CSV or .npz."""
+        """In columns: a list has an entry a row, a single number holds for all rows. Accept chooses CSV or .npz. A
+        sheet of a workbook is read as the CSV that it would be saved as."""
         body = await request.body()
         content_type = request.headers.get("content-type", "")
         most_bytes = request.app.state.access.max_body_bytes
 
         def work() -> Response:
             with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                asked, labels = parse(kind, body, content_type, most_bytes)
+                asked, labels = parse(kind, body, content_type, most_bytes, sheet)
                 found = answer(table, store, asked)
                 if preferred(accept) == CSV:  # the rows go back to where they came from, with what they are called
                     found = replace(found, names={**labels, **found.names})
                 return respond(found, accept)
 
+        if is_workbook(content_type):
+            async with READING_SLOTS:
+                return await asyncio.to_thread(work)
         if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()
         return await _in_thread(work)
 
-    others: dict[str, Any] = {CSV: {"schema": {"type": "string"}, "example": _as_csv(example)}, NPZ: _BINARY}
+    others: dict[str, Any] = {CSV: {"schema": {"type": "string"}, "example": _as_csv(example)}}
+    others |= dict.fromkeys((NPZ, XLSX, XLSM), _BINARY)
     router.post(
         path,
         operation_id=f"{path[1:]}_columns",

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from service import durable
+from service.store import identity
 from service.store.engine import Database
 from service.store.errors import StoreError
 from service.store.tables import metadata
@@ -97,7 +98,12 @@ def replace_with(database: Database, file: Path, progress: Progress = untold) ->
     """Put a backup in place of the store in one transaction; running servers see it from their next request on."""
     verify(database, file)
     if database.is_sqlite:
-        _copy_sqlite(file, _sqlite_file(database), _RESTORING, progress)
+        target = _sqlite_file(database)
+        with closing(sqlite3.connect(target, timeout=60)) as store:
+            own = identity.number_in(store)
+            _copy_sqlite(file, target, _RESTORING, progress)
+            if own and not identity.number_in(store):  # a backup of before stores had one
+                identity.put(store, own)
     else:
         _replace_pg(database, file, progress)
 

@@ -23,7 +23,7 @@ from service.settings import Settings
 from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
-from service.usecases.scheduled_backups import kept, newest
+from service.usecases.scheduled_backups import OWNER, foreign, kept, newest
 from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
@@ -181,6 +181,11 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
     if settings.backup_to is None:
         yield Observation("backups", Level.WARNING, "the server makes none by itself",
                       "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
+        return
+    if words := foreign(store, settings.backup_to):
+        yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",
+                          "set UNDERSKIN_BACKUP_TO to a folder of its own; if it is this store after all, "
+                          f"delete {settings.backup_to / OWNER}")  # fmt: skip
         return
     ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -_SKEW_S]
     if ahead:

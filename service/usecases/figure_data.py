@@ -26,7 +26,8 @@ def numbers(
 ) -> dict[str, Any]:
     """`recordings`: columns of FRF against preload; `spreads`: FRFs of recordings alike, over all lines, whatever the
     band, and so perhaps `known`; None where they are few."""
-    lines = [] if known else measured(campaign)
+    few = sum(isinstance(recording, FrfRecording) for recording in campaign.recordings) <= MOST_SINGLE
+    lines = [] if known or few else measured(campaign)
     alike = [_plain(spread) for spread in spreads_of(lines)] if len(lines) > MOST_SINGLE else None
     return {
         "recordings": {} if inversion is None else _preload_columns(campaign, inversion),

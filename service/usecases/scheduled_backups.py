@@ -2,8 +2,8 @@
 
 When the next one is due is read from the folder itself, so that a restart neither skips one nor makes one too many. Of
 several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile. A folder is
-for one store. None is deleted while the newest is far smaller than the largest, as where a server was started on an
-empty data folder.
+for one store: a file in it says for which, and servers of others make none there. None is deleted while the newest is
+far smaller than the largest, as where a server was started on an empty data folder.
 """
 
 import fcntl
@@ -21,7 +21,7 @@ from pathlib import Path
 from prometheus_client import Counter, Gauge
 
 from service import durable
-from service.store import Database, StorageFull, backup
+from service.store import Database, StorageFull, StoreError, backup, identity
 from service.usecases import mechanism_files
 
 logger = logging.getLogger("underskin")
@@ -31,6 +31,7 @@ _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
 _SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
 _SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
+OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
 _LOOK_S = 60.0  # how often it is looked whether one is due
 _RETRY_S = 600.0  # after a failure
 _JOIN_S = 30.0
@@ -72,6 +73,18 @@ def newest(folder: Path) -> Kept | None:
     return next((entry for entry in kept(folder) if entry.age_s > -_SKEW_S), None)
 
 
+def foreign(store: Database, folder: Path) -> str:
+    """That a folder is for the backups of another store, in words; empty where it is not."""
+    try:
+        owner = (folder / OWNER).read_text().strip()
+    except FileNotFoundError:
+        return ""
+    own = store.read(identity.find)
+    if owner == own:
+        return ""
+    return f"{folder} holds the backups of another store ({owner}; this one is {own or 'new'})"
+
+
 class ScheduledBackups:
     """Makes a backup of a store into `folder` every so many hours and keeps the newest `keep`, between `start` and
     `stop`."""
@@ -89,8 +102,8 @@ class ScheduledBackups:
 
     @property
     def overdue(self) -> bool:
-        """Whether the newest is older than twice the time between two, or there is none."""
-        last = newest(self._folder)
+        """Whether the newest is older than twice the time between two, or there is none of this store."""
+        last = self._newest()
         return last is None or last.age_s > 2 * self._every_s
 
     def start(self) -> None:
@@ -120,7 +133,10 @@ class ScheduledBackups:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with _locked(self._folder) as ours:
             last = newest(self._folder)
-            if not ours or (last is not None and last.age_s < self._every_s):
+            if not ours:
+                return
+            self._own()
+            if last is not None and last.age_s < self._every_s:
                 return
             for left in self._folder.glob(f"{_PREFIX}*.part*"):  # of a server that ended half way
                 left.unlink()
@@ -138,6 +154,18 @@ class ScheduledBackups:
         fields = {"file": str(file), "bytes": file.stat().st_size, "seconds": round(time.monotonic() - started, 1)}
         logger.info("backup made and read back", extra={"fields": fields})
 
+    def _own(self) -> None:
+        """Note whose folder this is; raises StoreError where it is another store's."""
+        if words := foreign(self._store, self._folder):
+            raise StoreError(f"{words}; give each store a folder of its own (UNDERSKIN_BACKUP_TO)")
+        owner = self._folder / OWNER
+        if not owner.exists():
+            owner.write_text(self._store.read(identity.find) or self._store.write(identity.ensure))
+
+    def _newest(self) -> Kept | None:
+        """The newest one of this store."""
+        return None if foreign(self._store, self._folder) else newest(self._folder)
+
     def _rotate(self, size: int) -> None:
         """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
         entries = [entry for entry in kept(self._folder) if entry.age_s > -_SKEW_S]
@@ -152,11 +180,11 @@ class ScheduledBackups:
             old.path.unlink()
 
     def _age_s(self) -> float:
-        last = newest(self._folder)
+        last = self._newest()
         return float("nan") if last is None else last.age_s
 
     def _size(self) -> float:
-        last = newest(self._folder)
+        last = self._newest()
         return 0.0 if last is None else last.path.stat().st_size
 
 

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
 
 import underskin
@@ -216,3 +217,19 @@ def test_python_m() -> None:
         text=True,
     )
     assert "0.93651" in shown.stdout
+
+
+def test_columns_come_from_a_sheet_of_a_workbook_by_its_name(tmp_path: Path) -> None:
+    book = openpyxl.Workbook()
+    book.active.append(["measured by", "mb"])
+    sheet = book.create_sheet("Day 2")
+    for row in (["a_over_h", "rt_over_h"], [0.3, 0.6], [0.5, 0.6]):
+        sheet.append(row)
+    file, text = tmp_path / "points.xlsx", tmp_path / "points.csv"
+    book.save(file)
+    text.write_text("a_over_h,rt_over_h\n0.3,0.6\n0.5,0.6\n")
+    of_csv = run("sigma", "--input", str(text), "--csv").stdout
+    assert run("sigma", "--input", str(file), "--sheet", "Day 2", "--csv").stdout == of_csv
+    assert "those with anything in them: 'Sheet', 'Day 2'" in refused("sigma", "--input", str(file))
+    assert "is no workbook" in refused("sigma", "--input", str(text), "--sheet", "Day 2")
+    assert "--sheet goes with --input" in refused("sigma", "--a-over-h", "1", "--rt-over-h", "1", "--sheet", "Day 2")

@@ -7,7 +7,7 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.prediction.csv_columns import from_csv
-from underskin.recordings.reading import only_sheet
+from underskin.recordings.reading import sheet_text
 
 FIELDS = ("preload_n", "frf_pc_per_n")
 
@@ -55,4 +55,4 @@ def test_a_text_in_a_workbook_that_may_have_its_thousands_apart_is_refused() -> 
         book.active.append(row)
     book.save(content)
     with pytest.raises(InvalidInput, match=r"frf_pc_per_n\[1\] = '1,000': .*1,000 can be 1000 or 1.000"):
-        numbers(only_sheet(content.getvalue(), "measured.xlsx"))
+        numbers(sheet_text(content.getvalue(), "measured.xlsx"))

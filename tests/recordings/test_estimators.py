@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.recordings.known_signals import GAIN, RATE, answer_to, known_frf
+from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, known_frf
 from tests.support.campaign_documents import document
 from tests.support.instrument_files import rig
 from underskin.errors import InvalidInput
 from underskin.recordings import read_file
 from underskin.recordings.campaign import FrfRecording, from_dict, to_dict
-from underskin.recordings.frf.estimation import broadband, lines_of
+from underskin.recordings.frf.estimation import broadband, lines_of, stepped_sine
 from underskin.recordings.frf.estimators import ESTIMATORS, Estimator
 from underskin.recordings.readers import hdf5_file
 from underskin.units import Floats
@@ -73,6 +73,32 @@ def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
     assert found["H1"] == pytest.approx(1 / (1 + NOISE**2), abs=0.005)
     assert found["H2"] == pytest.approx(1 + NOISE**2, abs=0.005)
     assert found["Hv"] == pytest.approx(1, abs=0.003)
+
+
+@pytest.mark.slow
+def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
+    """White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
+    quarter of its magnitude at 10 Hz, so that a ratio of that tone's own powers would give the geometric mean of H1 and
+    H2, which is too large there."""
+    force = dwelling([10.0, 125.0], cycles=600)
+    charge, true = answer_to(force), np.abs(known_frf(np.array([10.0, 125.0])))
+    random, noise, repeats = np.random.default_rng(910_001), 0.007, 40
+    found: dict[str, list[Floats]] = {name: [] for name in ESTIMATORS}
+    uncertainty = []
+    for _ in range(repeats):
+        seen_force = force + noise * random.standard_normal(len(force))
+        seen_charge = charge + noise * np.sqrt(np.mean(true**2)) * random.standard_normal(len(force))
+        for name in ESTIMATORS:
+            frf = stepped_sine(seen_force, seen_charge, RATE, estimator=name)
+            found[name].append(np.abs(frf.values) / true)
+            uncertainty.append(frf.relative_uncertainty)
+    hv = np.array(found["Hv"])
+    standard_error = hv.std(axis=0, ddof=1) / np.sqrt(repeats)
+    assert np.all(np.abs(hv.mean(axis=0) - 1) < 3 * standard_error)
+    of_each_tone = np.sqrt(np.array(found["H1"]) * np.array(found["H2"])).mean(axis=0)
+    assert of_each_tone[1] - 1 > 4 * standard_error[1]
+    covered = np.abs(np.log(hv)) < 1.96 * np.array(uncertainty[2::3])
+    assert np.mean(covered) > 0.85
 
 
 def test_without_noise_all_three_agree_and_keep_the_sign_of_the_phase() -> None:

@@ -53,7 +53,12 @@ IndenterRadiusMm = Annotated[_Given, _column("Radius R of the sphere [mm].")]
 PreloadN = Annotated[_Given, _column("Static force F [N].")]
 Input = Annotated[
     str | None,
-    typer.Option("--input", metavar="FILE", help="CSV file with columns named as the options (_ for -); - is stdin."),
+    typer.Option(
+        "--input", metavar="FILE", help="CSV file or workbook with columns named as the options (_ for -); - is stdin."
+    ),
+]
+Sheet = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Of --input, where a workbook has several sheets: which of them.")
 ]
 Csv = Annotated[bool, typer.Option("--csv", help="Write CSV (inputs, results, limit, status) instead of a table.")]
 Files = Annotated[
@@ -80,6 +85,7 @@ def sigma(
     load_parameter: Annotated[_Given, _column("L = F/(R² E), 0 if left out: the linear layer.")] = None,
     model: Annotated[Body, typer.Option(help="The layer on a rigid base, or the half space.")] = Body.LAYER,
     input_file: Input = None,
+    sheet: Sheet = None,
     csv: Csv = False,
 ) -> None:
     """The stress transmission σ, from dimensionless numbers."""
@@ -87,7 +93,9 @@ def sigma(
     from underskin.prediction import answers
 
     defaults = {"load_parameter": 0.0}
-    _answer(options, defaults, input_file, csv, lambda table, columns: answers.sigma(table, columns, model.value))
+    _answer(
+        options, defaults, (input_file, sheet), csv, lambda table, columns: answers.sigma(table, columns, model.value)
+    )
 
 
 @app.command(no_args_is_help=True)
@@ -101,6 +109,7 @@ def frf(
     poisson_ratio: PoissonRatio = None,
     units_checked: UnitsChecked = False,
     input_file: Input = None,
+    sheet: Sheet = None,
     csv: Csv = False,
 ) -> None:
     """The FRF, charge over force, that a skin should show under a sphere."""
@@ -109,7 +118,9 @@ def frf(
     from underskin.prediction import answers
 
     defaults = {"poisson_ratio": 0.5}
-    _answer(options, defaults, input_file, csv, lambda table, columns: answers.frf(table, columns, units_checked))
+    _answer(
+        options, defaults, (input_file, sheet), csv, lambda table, columns: answers.frf(table, columns, units_checked)
+    )
 
 
 @app.command(no_args_is_help=True)
@@ -126,6 +137,7 @@ def d33(
     poisson_ratio: PoissonRatio = None,
     units_checked: UnitsChecked = False,
     input_file: Input = None,
+    sheet: Sheet = None,
     csv: Csv = False,
     files: Files = None,
     rig: RigOption = None,
@@ -142,7 +154,8 @@ def d33(
     options = {name: given[name] for name in (*_PRESSED_SKIN, "frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     if files:
         for_columns = [f"--{name.replace('_', '-')}" for name, values in options.items() if values]
-        for_columns += [name for name, used in (("--input", input_file), ("--units-checked", units_checked)) if used]
+        of_columns = (("--input", input_file), ("--sheet", sheet), ("--units-checked", units_checked))
+        for_columns += [name for name, used in of_columns if used]
         _refuse(for_columns, "is for columns; files say it themselves")
         from underskin.cli.invert_files import invert_files
 
@@ -155,7 +168,9 @@ def d33(
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
 
-    _answer(options, defaults, input_file, csv, lambda table, columns: answers.d33(table, columns, units_checked))
+    _answer(
+        options, defaults, (input_file, sheet), csv, lambda table, columns: answers.d33(table, columns, units_checked)
+    )
 
 
 def _refuse(options: Sequence[str], why: str) -> None:
@@ -167,16 +182,19 @@ def _refuse(options: Sequence[str], why: str) -> None:
 def _answer(
     options: Mapping[str, _Given],
     defaults: Mapping[str, float | None],
-    input_file: str | None,
+    source: tuple[str | None, str | None],
     as_csv: bool,
     compute: "Callable[[SigmaTable, Mapping[str, Floats]], ComputedColumns]",
 ) -> None:
-    """Gather the columns, compute, and write inputs and results."""
+    """Gather the columns, compute, and write inputs and results; `source`: a file of columns, and a sheet of it."""
     from underskin.cli import columns
     from underskin.prediction.columns import rows
     from underskin.surrogate.sigma_table import load_table
 
-    gathered, labels = columns.gather(options, defaults, input_file)
+    input_file, sheet = source
+    if input_file is None:
+        _refuse(["--sheet"] if sheet is not None else [], "goes with --input, and none is given")
+    gathered, labels = columns.gather(options, defaults, input_file, sheet)
     count = rows(gathered)
     table = load_table()
     answer = compute(table, gathered)

@@ -9,14 +9,23 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.errors import ErrorCode, FileError, InvalidInput, UnderskinError, not_unique, unreadable, wrong_type
+from underskin.errors import (
+    ErrorCode,
+    FileError,
+    InvalidInput,
+    UnderskinError,
+    conflicting,
+    not_unique,
+    unreadable,
+    wrong_type,
+)
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.prediction.columns import statuses, to_csv, told
 from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.prediction.domain_limits import Words
 from underskin.recordings.readers.formats import ZIP
-from underskin.recordings.reading import only_sheet
+from underskin.recordings.reading import sheet_text
 from underskin.units import LAB, Floats, Mask
 
 STANDARD_INPUT = "-"
@@ -50,15 +59,18 @@ PIPED_WIDTH = 200  # of a table that goes into a file or a pipe
 
 
 def gather(
-    options: Mapping[str, Sequence[str] | None], defaults: Mapping[str, float | None], path: str | None
+    options: Mapping[str, Sequence[str] | None],
+    defaults: Mapping[str, float | None],
+    path: str | None,
+    sheet: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, list[str]]]:
-    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input) or its default;
-    one whose default is None may be left out. Then the file's columns of words.
+    """Every field of `options`, from its option, the CSV file at `path` (`-` is standard input), or a workbook's
+    `sheet`, or its default; one whose default is None may be left out. Then the file's columns of words.
 
     An option such as ["0.5,1", "2"] is a column of three; a single number has shape () and holds for all rows. Raises
     InvalidInput, or UnderskinError for a field that has no value.
     """
-    in_file, labels = ({}, {}) if path is None else _from_csv(path, list(options))
+    in_file, labels = ({}, {}) if path is None else _from_csv(path, sheet, list(options))
     columns = {}
     for name, values in options.items():
         if values and name in in_file:
@@ -81,9 +93,9 @@ def _from_option(name: str, values: Sequence[str]) -> Floats:
     return numbers if numbers.size > 1 else numbers.reshape(())
 
 
-def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
+def _from_csv(path: str, sheet: str | None, allowed: Sequence[str]) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     try:
-        found = from_csv(_content(path), allowed)
+        found = from_csv(_content(path, sheet), allowed)
     except OSError as error:
         raise unreadable("input", path, f"must be a readable CSV or .xlsx file ({error.strerror})") from error
     except FileError as error:
@@ -96,12 +108,16 @@ def _from_csv(path: str, allowed: Sequence[str]) -> tuple[dict[str, Floats], dic
     return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
 
 
-def _content(path: str) -> bytes:
-    """A CSV file, or the only sheet of a workbook as one."""
+def _content(path: str, sheet: str | None) -> bytes:
+    """A CSV file, or as one a sheet of a workbook: of a name, or the only one."""
     source = sys.stdin.fileno() if path == STANDARD_INPUT else path
     with open(source, "rb", closefd=path != STANDARD_INPUT) as file:
         content = file.read()
-    return only_sheet(content, path).encode() if content.startswith(ZIP) else content
+    if content.startswith(ZIP):
+        return sheet_text(content, path, sheet).encode()
+    if sheet is not None:
+        raise conflicting("sheet", sheet, f"must be left out: {path} is no workbook")
+    return content
 
 
 def write_csv(

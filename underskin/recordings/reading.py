@@ -17,7 +17,7 @@ from underskin.recordings.readers import formats
 from underskin.recordings.readers.sandbox import call_apart, parse_apart
 from underskin.recordings.rig_description import RigDescription
 
-_ONLY_SHEET = "underskin.recordings.readers.xlsx_file:only_sheet"
+_SHEET_TEXT = "underskin.recordings.readers.xlsx_file:sheet_text"
 _LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
 
 
@@ -83,10 +83,10 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
         return formats.parse(kind, stream, name)
 
 
-def only_sheet(content: bytes, name: str) -> str:
-    """The only sheet of a workbook as text, cells separated by tabs; raises FileError."""
+def sheet_text(content: bytes, name: str, sheet: str | None = None) -> str:
+    """A sheet of a workbook as text, cells separated by tabs: that of a name, or the only one; raises FileError."""
     with _opened(content, name) as stream:
-        return str(call_apart(_ONLY_SHEET, stream, name, what="XLSX")["text"])
+        return str(call_apart(_SHEET_TEXT, stream, name, *([] if sheet is None else [sheet]), what="XLSX")["text"])
 
 
 @contextmanager

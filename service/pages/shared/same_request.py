@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from fastapi import Request
 
@@ -36,12 +36,16 @@ def from_file(request: Request, path: str, file: str, call: str) -> SameRequest:
     return SameRequest(curl, f"import json\nimport pathlib\n{python}")
 
 
-def files(request: Request, labels: Sequence[str], rig: str | None, skin: str) -> SameRequest:
+def files(
+    request: Request, labels: Sequence[str], rig: str | None, skin: str, estimator: str | None = None
+) -> SameRequest:
     """POST files as a form, with a rig description where they need one."""
-    query = f"?skin={quote(skin, safe='')}" if skin else ""
+    said = {name: value for name, value in (("skin", skin), ("estimator", estimator)) if value}
+    query = "?" + urlencode(said, quote_via=quote, safe="") if said else ""
     parts = [f"file=@{label}" for label in labels] + ([] if rig is None else [f"rig=@{rig}"])
     curl = _curl(request, f"/v1/campaigns{query}", *(f"-F {shlex.quote(part)}" for part in parts))
-    arguments = [repr(list(labels)), *([f"skin={skin!r}"] if skin else []), *([] if rig is None else [f"rig={rig!r}"])]
+    options = {**said, **({} if rig is None else {"rig": rig})}
+    arguments = [repr(list(labels)), *(f"{name}={value!r}" for name, value in options.items())]
     call = f"client.campaigns.post_files({', '.join(arguments)})"
     return SameRequest(curl, _python(request, call))
 

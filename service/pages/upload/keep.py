@@ -37,7 +37,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         most = request.app.state.settings.max_body_bytes
         try:
             options = IngestOptions(
-                pending.skin, pending.corrects, reason, False, together, None, sender(request), most
+                pending.skin, pending.corrects, reason, False, together, None, sender(request), most, pending.estimator
             )
             answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:

@@ -30,10 +30,13 @@ from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
 from underskin.recordings import rig_description
+from underskin.recordings.frf.estimators import checked_estimator
 
 router = APIRouter(prefix="/upload")
 
 _LONGEST_FIELD = 1000  # bytes of a field beside the files
+_ESTIMATOR = "estimator"
+_ESTIMATORS = {"H1": "noise in the charge", "H2": "noise in the force", "Hv": "noise in both"}  # for which each is
 _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
 
@@ -62,6 +65,7 @@ def form(
         skin=skin,
         corrects=corrects,
         known=known,
+        estimators=_ESTIMATORS,
         most_mb=request.app.state.settings.max_upload_mb,
         same=same_request.files(request, ["monday.tdms"], "rig.yaml", skin),
     )
@@ -80,10 +84,12 @@ async def send(request: Request, store: Store) -> Response:
         if not given:
             raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
         corrects = fields.get(CORRECTS) or None
+        said = fields.get(_ESTIMATOR)
+        estimator = checked_estimator(_ESTIMATOR, said) if said else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
         rig_and_errors = await run_in_threadpool(rig_in_use, store, rig, skin)
         pending = pending_uploads.put(cookie, given)
-    pending.skin, pending.corrects = skin, corrects
+    pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
     pending.rig, pending.refused = rig_and_errors
     pending.rig_label = None if rig is None or pending.rig is None else rig.label
     try:
@@ -140,7 +146,11 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         mapping=mappings,
         spring=spring_mapping,
         same=same_request.files(
-            request, [one.label for one in pending.seen[:_MOST_NAMED]], pending.rig_label, pending.skin or ""
+            request,
+            [one.label for one in pending.seen[:_MOST_NAMED]],
+            pending.rig_label,
+            pending.skin or "",
+            pending.estimator,
         ),
     )
 
@@ -213,7 +223,8 @@ def frf_csv(request: Request, pending: Pending, file: int) -> Response:
 def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
-    return look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    return replace(inspected, campaigns=[one.with_estimator(pending.estimator) for one in inspected.campaigns])
 
 
 def _look(request: Request, pending: PendingUpload) -> None:

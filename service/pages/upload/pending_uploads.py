@@ -19,6 +19,7 @@ from service.pages.shared.figures import Drawn
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.skin_summary import SkinSummary
 from service.store import Missing
+from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
 
 LASTS_S = 3600.0
@@ -45,6 +46,7 @@ class PendingUpload:
     )  # what is wrong with the form, or kept it from being kept
     seen: list[FileSummary] = field(default_factory=list)
     drawn: dict[int, list[Drawn]] = field(default_factory=dict)
+    estimator: Estimator | None = None  # of FRFs from time series, whatever files or rig say
     corrects: str | None = None  # the campaign whose place it takes
     reason: str = ""  # why it does
     skin_summary: SkinSummary | None = None  # where it is an exported skin

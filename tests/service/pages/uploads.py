@@ -11,11 +11,12 @@ def file(name: str, content: bytes | str) -> FilePayload:
     return {"name": name, "mimeType": "", "buffer": content.encode() if isinstance(content, str) else content}
 
 
-def look_at(visitor: Visit, files: list[FilePayload], *, rig: str = "", skin: str = "") -> None:
+def look_at(visitor: Visit, files: list[FilePayload], *, rig: str = "", skin: str = "", estimator: str = "") -> None:
     page = visitor.page
     visitor.go("/upload")
     page.get_by_label("Files").set_input_files(files)
     page.get_by_label("Skin").fill(skin)
+    page.get_by_label("Estimator").select_option(estimator)
     if rig:
         page.get_by_label("Rig description").set_input_files(file("rig.yaml", rig))
     page.get_by_role("button", name="Look at them").click()

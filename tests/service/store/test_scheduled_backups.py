@@ -159,6 +159,41 @@ def test_two_servers_make_one_backup_between_them(place: Place, tmp_path: Path) 
         assert len(kept(folder)) == 1
 
 
+def test_a_folder_of_another_store_is_left_alone_and_the_doctor_says_so(place: Place, tmp_path: Path) -> None:
+    folder, other = tmp_path / "backups", Place(tmp_path / "other")
+    other.folder.mkdir()
+    with running(place, **scheduled(folder)):
+        theirs = wait_for(folder, 1)
+    often = {"UNDERSKIN_BACKUP_EVERY": _SECOND, "UNDERSKIN_BACKUP_KEEP": "1"}
+    with running(other, **scheduled(folder, **often)) as server:
+        deadline = time.monotonic() + 60
+        while metric(server, "underskin_backup_failures_total") < 1:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert "overdue" in server.http.get("/").text
+    assert [entry.path for entry in kept(folder)] == theirs
+    assert "holds the backups of another store" in (tmp_path / "other.log").read_text()
+    status, found = doctor(other, UNDERSKIN_BACKUP_TO=str(folder), **_NONE)
+    assert (status, found["backups"]["level"]) == (2, "critical")
+    assert "holds the backups of another store" in found["backups"]["found"]
+    assert "delete" in found["backups"]["advice"]
+    _, own = doctor(place, UNDERSKIN_BACKUP_TO=str(folder), **_NONE)
+    assert own["backups"]["level"] == "ok"
+
+
+def test_a_store_restored_from_a_backup_of_before_it_had_a_schedule_goes_on_with_its_own(tmp_path: Path) -> None:
+    folder, place, old = tmp_path / "backups", Place(tmp_path / "data"), tmp_path / "old.sqlite3"
+    place.folder.mkdir()
+    with running(place, **_NONE):
+        assert place.command("backup", str(old)).returncode == 0
+    with running(place, **scheduled(folder)):
+        wait_for(folder, 1)
+        restored = place.command("restore", str(old))
+        assert restored.returncode == 0, restored.stderr
+    with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
+        wait_for(folder, 2)
+
+
 def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     place.folder.chmod(0o700)

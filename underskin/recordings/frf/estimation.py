@@ -12,7 +12,7 @@ import numpy as np
 
 from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimators import Estimator, ratio
+from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
 from underskin.recordings.frf.spectral_average import Blocks, Frf, averaged, without_line
@@ -204,11 +204,12 @@ def stepped_sine(force: Floats, charge: Floats, sample_rate: float, *, estimator
         raise unusable("force_n", f"{len(defects)} defects", "must dwell on a tone for some undamaged cycles")
     frequency = np.array(sorted(lines))
     values, coherence, averages = np.empty(len(lines), complex), np.empty(len(lines)), np.empty(len(lines))
-    for index, line in enumerate(frequency):
-        blocks = [np.concatenate(part)[:, None] for part in zip(*lines[line], strict=True)]
-        value, gamma2 = ratio(blocks[0], blocks[1], estimator)
-        values[index], averages[index] = value[0], len(blocks[0])
-        coherence[index] = gamma2[0] if len(blocks[0]) > 1 else np.nan
+    spectra = [tuple(np.concatenate(part)[:, None] for part in zip(*lines[line], strict=True)) for line in frequency]
+    kappa = noise_ratio((tone, answer) for tone, answer in spectra)
+    for index, (tone, answer) in enumerate(spectra):
+        value, gamma2 = ratio(tone, answer, estimator, kappa)
+        values[index], averages[index] = value[0], len(tone)
+        coherence[index] = gamma2[0] if len(tone) > 1 else np.nan
     return Frf(frequency, values, coherence, averages, tuple(defects))
 
 

@@ -11,9 +11,13 @@ S_fq the mean of conj(F) Q (Bendat and Piersol, Random Data, chapters 6 and 7):
 Hv is the total least-squares line through (F, Q): unbiased where the noise powers have the ratio S_kk/S_mm = κ, and
 always between H1 and H2 in magnitude (Rocklin, Crowley and Vold, A Comparison of H1, H2, and Hv Frequency Response
 Functions, IMAC 3, 1985). κ is taken to be the ratio of the signals' own powers over all lines, so that Hv does not
-depend on units, and assumes that both channels have the same signal-to-noise ratio.
+depend on units, and assumes that both channels have the same signal-to-noise ratio over the band. It is one number for
+all lines, tones of a stepped sine too: noise of an amplifier has one power at all frequencies, or nearly, while the
+signals rise and fall with the FRF. With a κ for each line S_qq = κ S_ff there, and Hv would be the geometric mean of H1
+and H2 at each, too large where the charge is small beside that of other lines, and too small where it is large.
 """
 
+from collections.abc import Iterable
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -34,7 +38,18 @@ def checked_estimator(field: str, value: Any) -> Estimator:
     raise not_one_of(field, value, ESTIMATORS)
 
 
-def ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Complexes, Floats]:
+def noise_ratio(spectra: Iterable[tuple[Complexes, Complexes]]) -> float:
+    """κ of the module, [C²/N²], from spectra of force and charge, each (blocks, lines): of some lines in each pair."""
+    ff, qq = (sum(_power(part).sum() for part in channel) for channel in zip(*spectra, strict=True))
+    return float(qq / max(ff, _TINY))
+
+
+def _power(spectra: Complexes) -> Floats:
+    """The mean over blocks at each line."""
+    return np.asarray(np.mean(np.abs(spectra) ** 2, axis=0))
+
+
+def ratio(force: Complexes, charge: Complexes, estimator: Estimator, kappa: float) -> tuple[Complexes, Floats]:
     """The FRF and its coherence from spectra of blocks.
 
     Parameters
@@ -43,6 +58,8 @@ def ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Co
         Spectra [N], [C], scaled alike.
     estimator : "H1", "H2" or "Hv"
         See the module.
+    kappa : float
+        `noise_ratio` of all lines, which Hv needs.
 
     Returns
     -------
@@ -55,14 +72,13 @@ def ratio(force: Complexes, charge: Complexes, estimator: Estimator) -> tuple[Co
         There is no such estimator.
     """
     checked_estimator("estimator", estimator)
-    ff, qq = (np.mean(np.abs(blocks) ** 2, axis=0) for blocks in (force, charge))
+    ff, qq = _power(force), _power(charge)
     fq = np.mean(np.conj(force) * charge, axis=0)
     coherence = np.minimum(np.abs(fq) ** 2 / np.maximum(ff * qq, _TINY), 1.0)
     if estimator == "H1":
         return fq / np.maximum(ff, _TINY), coherence
     if estimator == "H2":
         return qq * fq / np.maximum(np.abs(fq) ** 2, _TINY), coherence
-    kappa = qq.sum() / max(ff.sum(), _TINY)
     difference = qq - kappa * ff
     root = np.sqrt(difference**2 + 4 * kappa * np.abs(fq) ** 2)
     share = np.where(difference > 0, (difference + root) / (2 * np.maximum(np.abs(fq) ** 2, _TINY)), 0)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from underskin.errors import unusable
 from underskin.findings import sentences
-from underskin.recordings.frf.estimators import Estimator, ratio
+from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
 from underskin.units import Complexes, Floats
 
@@ -80,7 +80,8 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
     force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
     frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
     averages = _independent_blocks(count, blocks.taper, blocks.step)
-    values, coherence = ratio(force_spectra, charge_spectra, estimator)
+    kappa = noise_ratio([(force_spectra, charge_spectra)])
+    values, coherence = ratio(force_spectra, charge_spectra, estimator, kappa)
     scale = 2 / blocks.taper.sum()
     force_power, charge_power = (np.abs(scale * spectra) ** 2 for spectra in (force_spectra, charge_spectra))
     return Frf(

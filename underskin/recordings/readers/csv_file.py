@@ -14,8 +14,9 @@ from typing import BinaryIO
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
 from underskin.recordings.readers import table_headings, table_rows, text
+from underskin.recordings.readers.cell_bytes import BLANKS
 from underskin.recordings.readers.table_headings import Headings
-from underskin.recordings.readers.table_rows import BLANKS, Table
+from underskin.recordings.readers.table_rows import Table
 from underskin.recordings.readers.table_sections import Lines, Section, SectionReader
 from underskin.recordings.readers.text_blocks import BlockText
 from underskin.recordings.readers.unit_labels import unit

@@ -16,7 +16,7 @@ an empty `id` continues the recording, and so does its own id where every row ha
 whatever else the lab noted. A cell too many, a field that comes again and a recording that begins twice are refused.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from difflib import get_close_matches
 from itertools import islice, takewhile
@@ -176,13 +176,12 @@ class _Template:
     def _columns(self, start: int, end: int) -> list[Column]:
         """The field of each column and the factor to its unit, each field once."""
         headings = self.rows[-1]
-        rows = (
-            self.lines.cells(index, line)
-            for first, lines in self.lines.blocks(start, end)
-            for index, line in enumerate(lines, start=first)
-        )
+
+        def under(places: Sequence[int]) -> Iterator[list[str]]:
+            return self.lines.under(places, len(headings), start, end)
+
         try:
-            columns, left_out = template_columns.columns(headings, rows, _KNOWN, self.decimal)
+            columns, left_out = template_columns.columns(headings, under, _KNOWN, self.decimal)
         except NoField as error:
             raise self.error(start - 1, str(error), error.place) from None
         self.warnings += left_out

@@ -11,7 +11,6 @@ import struct
 import subprocess
 import sys
 import tempfile
-from dataclasses import asdict
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -115,7 +114,8 @@ def _with_arrays(contents: Any, mark: str, answer: BinaryIO, behind: int) -> Any
 def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
     contents = parse(name, stream, "")
     if isinstance(contents, Contents):
-        return asdict(contents)
+        blocks = [{**vars(block), "channels": [vars(one) for one in block.channels]} for block in contents.blocks]
+        return {**vars(contents), "blocks": blocks}
     return {"document": contents.campaign, "warnings": contents.warnings}
 
 

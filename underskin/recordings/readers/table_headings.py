@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from underskin.errors import FileError
 from underskin.recordings.readers import text
-from underskin.recordings.readers.table_rows import BLANKS, Table, split, uncommented
+from underskin.recordings.readers.cell_bytes import BLANKS
+from underskin.recordings.readers.table_rows import Table, split, uncommented
 from underskin.recordings.readers.unit_labels import labelled_unit, unit
 
 _LABEL = re.compile(

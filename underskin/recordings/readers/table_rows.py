@@ -11,8 +11,8 @@ from itertools import groupby
 
 from underskin.errors import FileError
 from underskin.recordings.readers import text
+from underskin.recordings.readers.cell_bytes import BLANKS
 
-BLANKS = " "
 _STYLES = (("\t", "."), (";", "."), (",", "."), ("\t", ","), (";", ","), (BLANKS, "."), (BLANKS, ","))
 _TOKEN = re.compile(r'"[^"]*"|\S+')
 _COMMENT = re.compile(r"\s*(#|%|//|!)+\s*")

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from underskin.recordings.readers import text
-from underskin.recordings.readers.table_rows import BLANKS, Table, is_comment, no_row
-from underskin.recordings.readers.text_blocks import BlockText, numbers, split_lines
+from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
+from underskin.recordings.readers.table_rows import Table, is_comment, no_row
+from underskin.recordings.readers.text_blocks import BlockText
 from underskin.units import Floats
 
-_FEW = 64  # lines that are not worth being parted
+_FEW = 16  # rows that are not worth being taken at once
 _LOOSE = 4096  # rows that are kept as lists
 _LEAST = 2  # rows of a group
 _MOST_GROUPS = 1000
@@ -69,7 +70,7 @@ class Section:
         for place in range(len(self._parts[0])):
             whole.append(np.concatenate([part[place] for part in self._parts]))
             for part in self._parts:
-                part[place] = part[place][:0]
+                part[place] = np.empty(0)
         return whole
 
 
@@ -91,6 +92,7 @@ class SectionReader:
 
     def __init__(self, table: Table, headings: frozenset[str], file: str) -> None:
         self._table = table
+        self._style = RowStyle(table.separator, table.decimal, table.columns, table.width)
         self._headings = headings
         self._file = file
         self.sections: list[Section] = []
@@ -109,42 +111,23 @@ class SectionReader:
             first += len(lines)
 
     def _take(self, first: int, lines: Sequence[str]) -> None:
-        cells = self._cells(lines)
-        columns = None if cells is None else self._numbers(cells)
-        if cells is not None and columns is not None:
-            self._section(first).add_rows(first + len(lines) - 1, columns)
-            self.count += len(lines)
+        """Take lines, of which the first is at an index."""
+        rows = PlainRows(lines, self._style)
+        taken = 0
+        for line, start, end in rows.runs():
+            if end - start < _FEW:
+                continue
+            self._take_lines(first + taken, lines[taken:line])
+            taken = line + end - start
+            self._section(first + line).add_rows(first + taken - 1, [column[start:end] for column in rows.numbers])
+            self.count += end - start
             for column in self.texts:
-                self._see(column, first, lines, cells[column])
-        elif len(lines) > _FEW:  # most lines may be plain rows
-            half = len(lines) // 2
-            self._take(first, lines[:half])
-            self._take(first + half, lines[half:])
-        else:
-            for index, line in enumerate(lines, start=first):
-                self._take_line(index, line)
+                self._see(column, first + line, lines[line:taken], rows.texts(column, start, end))
+        self._take_lines(first + taken, lines[taken:])
 
-    def _cells(self, lines: Sequence[str]) -> list[tuple[str, ...]] | None:
-        """The cells of each column; None where lines are not split alike."""
-        separator, width = self._table.separator, self._table.width
-        if separator == BLANKS:
-            rows = [line.split() for line in lines]
-            if any('"' in line or "\t" in line or ";" in line for line in lines):
-                return None
-        elif (split := split_lines(lines, separator)) is not None:
-            rows = split
-        else:
-            return None
-        if any(len(row) != width for row in rows):
-            if max(map(len, rows)) > width:
-                return None
-            rows = [[*row, *[""] * (width - len(row))] for row in rows]
-        return list(zip(*rows, strict=True))
-
-    def _numbers(self, cells: Sequence[Sequence[str]]) -> list[Floats] | None:
-        columns = [numbers(cells[column], self._table.decimal) for column in self._table.columns]
-        whole = [column for column in columns if column is not None]
-        return whole if len(whole) == len(columns) else None
+    def _take_lines(self, first: int, lines: Sequence[str]) -> None:
+        for index, line in enumerate(lines, start=first):
+            self._take_line(index, line)
 
     def _take_line(self, index: int, line: str) -> None:
         row = self._table.row(line)

@@ -7,7 +7,7 @@ names no field, are left out.
 
 import cmath
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -42,23 +42,59 @@ class NoField(ValueError):
         self.place = place
 
 
+@dataclass
+class _Nameless:
+    """What stands in the cells of a column that names no field, empty ones left out."""
+
+    count: int = 0
+    example: str = ""
+    has_numbers: bool = False
+    largest: float = 0.0  # magnitude of a number
+    counts_from: float | None = None  # the first number, as long as each is one more than that above it
+
+    def see(self, cell: str, decimal: str) -> None:
+        """Take the next cell."""
+        number = text.number(cell, decimal)
+        if not self.count:
+            self.example, self.counts_from = cell, number
+        elif self.counts_from is not None and number != self.counts_from + self.count:
+            self.counts_from = None
+        if number is not None:
+            self.has_numbers = True
+            self.largest = max(self.largest, abs(number))
+        self.count += 1
+
+    @property
+    def is_index(self) -> bool:
+        """Whether it counts the rows, from 0 or 1."""
+        return self.counts_from in (0, 1)
+
+
 def columns(
-    headings: Sequence[str], rows: Iterable[Sequence[str]], known: Collection[str], decimal: str
+    headings: Sequence[str],
+    under: Callable[[Sequence[int]], Iterable[Sequence[str]]],
+    known: Collection[str],
+    decimal: str,
 ) -> tuple[list[Column], list[str]]:
-    """The columns that hold fields, and which are left out, in words; `rows` are the cells under the headings.
+    """The columns that hold fields, and which are left out, in words; `under` gives the cells at some places, row by
+    row.
 
     Raises NoField.
     """
     found: dict[str, Column] = {}
     left_out: list[str] = []
     meanings = [field_of(heading, known) for heading in headings]
-    others = _under([place for place, meant in enumerate(meanings) if meant is None], rows)
+    others = {place: _Nameless() for place, meant in enumerate(meanings) if meant is None}
+    for row in under(list(others)) if others else ():
+        for cell, column in zip(row, others.values(), strict=True):
+            if cell:
+                column.see(cell, decimal)
     for place, (heading, meant) in enumerate(zip(headings, meanings, strict=True)):
         if meant is None and heading.strip().lower().replace(" ", "_") == _PHASE_ALONE:
-            meant = PHASE, _angle_of(place, heading, [text.number(cell, decimal) for cell in others[place]])
+            meant = PHASE, _angle_of(place, heading, others[place])
             left_out.append(f"{heading!r} is read as degrees: it has values beyond 2π")
         if meant is None:
-            left_out += _without(place, heading, others[place], known, decimal)
+            left_out += _without(place, heading, others[place], known)
             continue
         field, factor = meant
         if field in found:
@@ -66,17 +102,6 @@ def columns(
         found[field] = Column(place, field, factor, heading)
     _require_whole(found)
     return list(found.values()), left_out
-
-
-def _under(places: Sequence[int], rows: Iterable[Sequence[str]]) -> dict[int, list[str]]:
-    """The cells under the headings at some places, without the empty ones."""
-    under: dict[int, list[str]] = {place: [] for place in places}
-    if places:
-        for row in rows:
-            for place in places:
-                if place < len(row) and row[place]:
-                    under[place].append(row[place])
-    return under
 
 
 def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
@@ -105,32 +130,31 @@ def in_small_letters(name: str) -> str:
     return name[:bracket].lower() + name[bracket:]
 
 
-def _angle_of(place: int, heading: str, values: Sequence[float | None]) -> float:
+def _angle_of(place: int, heading: str, column: _Nameless) -> float:
     """The factor to rad of a phase whose unit its heading does not say, by its values; raises NoField where they may be
     either."""
-    if any(value is not None and abs(value) > _TURN for value in values):
+    if column.largest > _TURN:
         return _ANGLES["deg"]
     names = " or ".join(f"{_PHASE_ALONE}_{angle}" for angle in ("deg", "rad"))
     raise NoField(place, f"{heading!r} has no unit, and its values may be degrees or radians: call it {names}")
 
 
-def _without(place: int, heading: str, cells: Sequence[str], known: Collection[str], decimal: str) -> list[str]:
+def _without(place: int, heading: str, column: _Nameless, known: Collection[str]) -> list[str]:
     """That a column which names no field is left out, in words, if it matters; raises NoField where that loses
     something."""
-    numbers = [text.number(cell, decimal) for cell in cells]
     if heading.strip().lower() in NO_NAME:
-        if place == 0 and numbers in (list(range(len(cells))), list(range(1, len(cells) + 1))):
-            return []
-        if cells:
-            raise NoField(place, f"has no heading, but cells such as {cells[0]!r}")
+        if column.count and not (place == 0 and column.is_index):
+            raise NoField(place, f"has no heading, but cells such as {column.example!r}")
         return []
     alike = get_close_matches(heading.strip().lower().replace(" ", "_"), [*known, MAGNITUDE, PHASE], 1, _ALIKE)
     if alike:
         raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; did you mean {alike[0]}?")
     keep = f"{FURTHER}NAME keeps a column of anything else"
-    if any(number is not None for number in numbers):
+    if column.has_numbers:
         raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; {keep}")
-    return [f"column {heading!r} holds words and is no field: it is left out ({keep})"] if cells else []
+    if not column.count:
+        return []
+    return [f"column {heading!r} holds words and is no field: it is left out ({keep})"]
 
 
 def _require_whole(found: dict[str, Column]) -> None:

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from underskin.errors import FileError
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.readers import text
-from underskin.recordings.readers.text_blocks import BlockText, split_lines
+from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
+from underskin.recordings.readers.text_blocks import BlockText
 
 _FIRST_LINE = 2000
 _TO_SPREADSHEETS = re.compile(r"sep=\S?\s*", re.IGNORECASE)
@@ -77,18 +78,20 @@ class TemplateLines:
                 yield max(start, first), some
             first += len(lines)
 
-    def plain(self, lines: Sequence[str], width: int) -> list[list[str]] | None:
-        """The cells of lines, `width` each and not stripped; None where any line says nothing or has more, so that
-        `cells` must tell."""
-        rows = split_lines(lines, self.separator)
-        if rows is None or any(map(_may_say_nothing, {row[0] for row in rows if row})):
-            return None
-        if all(len(row) == width for row in rows):
-            return rows
-        if any(cell.strip() for row in rows for cell in row[width:]):
-            return None
-        return [[*row[:width], *[""] * (width - len(row))] for row in rows]
+    def under(self, places: Sequence[int], width: int, start: int, end: int) -> Iterator[list[str]]:
+        """The cells at some of `width` places, of each line from one index to another."""
+        style = RowStyle(self.separator, ".", (), width, is_template=True)
+        for first, lines in self.blocks(start, end):
+            rows = PlainRows(lines, style)
+            taken = 0
+            for line, row, behind in rows.runs():
+                yield from self._under(places, first + taken, lines[taken:line])
+                columns = [[cell.strip() for cell in rows.texts(place, row, behind)] for place in places]
+                yield from map(list, zip(*columns, strict=True))
+                taken = line + behind - row
+            yield from self._under(places, first + taken, lines[taken:])
 
-
-def _may_say_nothing(first: str) -> bool:
-    return first.lstrip()[:4].lower().startswith(("#", "sep="))
+    def _under(self, places: Sequence[int], first: int, lines: Sequence[str]) -> Iterator[list[str]]:
+        for index, line in enumerate(lines, start=first):
+            cells = self.cells(index, line)
+            yield [cells[place] if place < len(cells) else "" for place in places]

@@ -10,15 +10,14 @@ import numpy as np
 from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS
 from underskin.recordings.readers import template_columns
+from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
 from underskin.recordings.readers.template_columns import FURTHER, MAGNITUDE, PARTS, PHASE, Column
 from underskin.recordings.readers.template_lines import TemplateLines
-from underskin.recordings.readers.text_blocks import numbers
 from underskin.units import Floats
 
 POSITION = ("position_x_mm", "position_y_mm")
 _ID = "id"
 _LEAST = 8  # rows that are worth being taken at once
-_FEW = 64  # lines that are not worth being parted
 _Run = tuple[str, int, int]  # an id, the first of its rows and the one behind the last
 
 
@@ -40,6 +39,10 @@ class TemplateRecordings:
     def __init__(self, lines: TemplateLines, columns: Sequence[Column], width: int, reader: CellReader) -> None:
         self._lines = lines
         self._columns = columns
+        self._each = [column for column in columns if column.field in (*COLUMNS, MAGNITUDE, PHASE)]
+        self._once = [column for column in columns if column not in self._each]
+        places = [column.place for column in self._each]
+        self._style = RowStyle(lines.separator, reader.decimal, places, width, is_template=True)
         self._identity = next(column.place for column in columns if column.field == _ID)
         self._width = width
         self._reader = reader
@@ -53,22 +56,17 @@ class TemplateRecordings:
 
     def take(self, first: int, lines: Sequence[str]) -> None:
         """Take lines, of which the first is at an index; raises FileError."""
-        rows = self._lines.plain(lines, self._width)
-        if rows is None and len(lines) > _FEW:  # most lines may be plain
-            half = len(lines) // 2
-            self.take(first, lines[:half])
-            self.take(first + half, lines[half:])
-            return
-        places = [] if rows is None else [place for place, row in enumerate(rows) if any(row)]
-        if rows is None or not places:
-            self._take_rows(first, lines)
-            return
-        cells = list(zip(*(rows[place] for place in places), strict=True))
-        for own, start, end in _runs([cell.strip() for cell in cells[self._identity]]):
-            run = [column[start:end] for column in cells]
-            if end - start < _LEAST or not self._take_run(own, first + places[start], run):
-                for place in places[start:end]:
-                    self._take_rows(first + place, lines[place : place + 1])
+        rows = PlainRows(lines, self._style)
+        taken = 0
+        for line, start, end in rows.runs():
+            self._take_rows(first + taken, lines[taken:line])
+            ids = [cell.strip() for cell in rows.texts(self._identity, start, end)]
+            for own, run_start, run_end in _runs(ids, start):
+                taken = line + run_end - start
+                index = first + line + run_start - start
+                if run_end - run_start < _LEAST or not self._take_run(own, index, rows, slice(run_start, run_end)):
+                    self._take_rows(index, lines[index - first : taken])
+        self._take_rows(first + taken, lines[taken:])
 
     def _take_rows(self, first: int, lines: Sequence[str]) -> None:
         """The same row by row, which names what is wrong."""
@@ -111,22 +109,14 @@ class TemplateRecordings:
         }
         return template_columns.with_parts(values)
 
-    def _take_run(self, own: str, index: int, cells: Sequence[Sequence[str]]) -> bool:
-        """Take rows of one id at once, by their columns of cells; False where single rows must tell what they are."""
+    def _take_run(self, own: str, index: int, rows: PlainRows, run: slice) -> bool:
+        """Take rows of one id at once; False where single rows must tell what they are."""
         begins = self._begins(own)
         if (begins and own in self._begun) or not (own or self._current):
             return False
         once: dict[str, Any] = {}
-        lines: dict[str, Floats | None] = {}
-        for column in self._columns:
-            under = cells[column.place]
-            if column.field in COLUMNS or column.field in (MAGNITUDE, PHASE):
-                found = numbers(under, self._reader.decimal) if any(under) else None
-                if found is None and any(under):
-                    return False
-                lines[column.field] = None if found is None else found * column.factor
-                continue
-            different = {cell.strip() for cell in set(under)} - {""}
+        for column in self._once:
+            different = {cell.strip() for cell in set(rows.texts(column.place, run.start, run.stop))} - {""}
             if len(different) > 1:
                 return False
             for cell in different:
@@ -134,16 +124,21 @@ class TemplateRecordings:
                     once[column.field] = self._reader.value(column.field, cell, (index, column.place), column.factor)
                 except FileError:
                     return False
+        lines: dict[str, Floats | None] = {}
+        for place, column in enumerate(self._each):
+            filled = rows.filled[run, place]
+            if filled.any() and not filled.all():
+                return False
+            lines[column.field] = rows.numbers[place][run] * column.factor if filled.any() else None
         whole = _with_parts(lines)
         if whole is None or (not begins and self._recordings[-1].contradiction(once)):
             return False
-        self._recording(own, index).add_lines(once, whole, len(cells[0]))
+        self._recording(own, index).add_lines(once, whole, run.stop - run.start)
         return True
 
 
-def _runs(ids: Sequence[str]) -> Iterator[_Run]:
-    """The runs of rows of one id."""
-    start = 0
+def _runs(ids: Sequence[str], start: int) -> Iterator[_Run]:
+    """The runs of rows of one id, of which the first row is at `start`."""
     for own, run in groupby(ids):
         end = start + sum(1 for _ in run)
         yield own, start, end

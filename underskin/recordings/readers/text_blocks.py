@@ -1,15 +1,11 @@
 """A text read in blocks of whole lines, so that a long file never lies in memory as a whole."""
 
 import codecs
-import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import BinaryIO
-
-import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings.readers import text
-from underskin.units import Floats
 
 BLOCK_BYTES = 1 << 20
 
@@ -95,27 +91,3 @@ def _require_whole(stream: BinaryIO, encoding: str, start: int, file: str) -> No
         decoder.decode(b"", final=True)
     except UnicodeDecodeError as error:
         raise text.no_text(file, place - held + error.start, encoding, error.reason) from None
-
-
-def split_lines(lines: Sequence[str], separator: str) -> list[list[str]] | None:
-    """The cells of each line, not stripped; None where quotes do not close on their line."""
-    if not any('"' in line for line in lines):
-        return [line.split(separator) for line in lines]
-    try:
-        rows = list(csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True))
-    except csv.Error:
-        return None
-    return rows if len(rows) == len(lines) else None
-
-
-def numbers(cells: Sequence[str], decimal: str) -> Floats | None:
-    """The numbers in cells, as `text.number` reads each; None where any holds something else."""
-    joined = "\n".join(cells)
-    if not joined.isascii():
-        joined = joined.replace(text.MINUS, "-")
-    if not joined.isascii() or "_" in joined or (decimal == "," and "." in joined):
-        return None
-    try:
-        return np.fromiter(map(float, joined.replace(decimal, ".").split("\n")), np.float64, len(cells))
-    except ValueError:
-        return None

@@ -33,13 +33,16 @@ def read(stream: BinaryIO, file: str) -> Contents | Document:
     return replace(contents, warnings=(*contents.warnings, *book.notes))
 
 
-def only_sheet(stream: BinaryIO) -> dict[str, Any]:
-    """The `text` of the only sheet with anything in it, cells separated by tabs; raises FileError."""
+def sheet_text(stream: BinaryIO, sheet: str | None = None) -> dict[str, Any]:
+    """The `text` of a visible sheet with anything in it, cells separated by tabs: that of a name, or the only one;
+    raises FileError."""
     sheets = dict(WorkbookSheets(stream, "").texts())
-    if len(sheets) != 1:
+    wanted = list(sheets) if sheet is None else [name for name in sheets if name == sheet]
+    if len(wanted) != 1:
         found = f"those with anything in them: {_listed(list(sheets))}" if sheets else "none has anything in it"
-        raise FileError("", "", f"must have one sheet with columns; {found}")
-    return {"text": next(iter(sheets.values()))}
+        must = "one sheet with columns, or be sent with the name of one" if sheet is None else f"a sheet {sheet!r}"
+        raise FileError("", "", f"must have {must}; {found}")
+    return {"text": sheets[wanted[0]]}
 
 
 def _listed(names: list[str]) -> str:
