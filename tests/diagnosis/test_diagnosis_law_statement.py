@@ -4,22 +4,23 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from rig.unlisted.campaign import write
+from rig.unlisted.campaign import as_json, draw
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import load_table
 
-SEED, COUNT, HERTZ = 4242, 68, "0067"  # drawn with a contact radius that grows with F^0.067
+SEED, HERTZ = 4242, 67  # of a campaign drawn with a contact radius that grows with F^0.067
 DELAY = "c6h8e3rgx"  # of an independent rig: a phase that grows with the square of frequency
 
 
 @pytest.mark.slow
-def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_another_exponent(tmp_path: Path) -> None:
-    truth = write(SEED, COUNT, tmp_path, False)[HERTZ]
-    assert "F^0.067 instead of F^(1/3)" in truth["law"]["expression"]
-    report = diagnosis_report(parse(json.loads((tmp_path / f"{HERTZ}.json").read_text())), load_table())
+def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_another_exponent() -> None:
+    drawn = draw(np.random.default_rng([SEED, HERTZ]), "hertz")
+    assert "F^0.067 instead of F^(1/3)" in drawn.truth["law"]["expression"]
+    report = diagnosis_report(parse(as_json(drawn)), load_table())
     (change,) = report["unnamed"]["parameters"]
     assert change["low"] < 0.067 - 1 / 3 < change["high"]
     said = f"the contact radius grows with the preload to the power {1 / 3 + change['value']:.2f} ("

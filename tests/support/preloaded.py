@@ -25,7 +25,11 @@ from pathlib import Path
 from typing import Any
 
 UNDERSKIN = Path(sys.executable).with_name("underskin")
-_MODULES = ("service.cli.serve", "service.cli.keys", "service.cli.backup", "alembic.runtime.migration", "psycopg")
+_MODULES = (  # of the server, and of commands that ask it or invert files
+    *("service.cli.serve", "service.cli.keys", "service.cli.backup", "alembic.runtime.migration", "psycopg"),
+    *("underskin.cli.app", "underskin.client.service_client", "underskin.inversion.invert"),
+    *("rich.progress", "rich.table"),
+)
 _LONGEST = 1 << 17  # bytes of a request
 _LIMIT = 300.0  # s, for a command to end by itself
 _STATUS = struct.Struct("i")
