@@ -63,7 +63,7 @@ def ask_of_skin(
 ) -> JSONResponse:
     """Puts one diagnosis of all of them into the queue, or of those chosen: what acts in all, and since when. The same
     request on campaigns that have not changed is answered with that diagnosis. 409 where fewer than two campaigns in
-    use have recordings.
+    use have FRFs.
     """
 
     def act(connection: Connection) -> AnyRow:

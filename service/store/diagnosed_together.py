@@ -14,7 +14,7 @@ from sqlalchemy.sql.selectable import ScalarSelect
 from service.schemas.diagnoses import DiagnosisKind
 from service.store import skins
 from service.store.campaigns import CURRENT
-from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnosed_skins, diagnoses
+from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnosed_skins, diagnoses, recordings
 from service.store.tables import skins as skin_rows
 
 
@@ -56,6 +56,14 @@ def usable(connection: Connection, skin_id: str) -> list[Member]:
 def count_usable(connection: Connection, skin_id: str) -> int:
     """How many there are."""
     return int(connection.execute(select(func.count()).select_from(campaigns).where(_usable(skin_id))).scalar_one())
+
+
+def count_with_frfs(connection: Connection, members: Sequence[Member]) -> int:
+    """How many of these campaigns have FRFs that are not excluded."""
+    has = (recordings.c.kind == "frf") & recordings.c.excluded_at.is_(None)
+    query = select(func.count(recordings.c.campaign.distinct())).where(has)
+    numbers = [one.number for one in members]
+    return int(connection.execute(query.where(recordings.c.campaign.in_(numbers))).scalar_one())
 
 
 def _usable(skin_id: str) -> ColumnElement[bool]:

@@ -10,7 +10,7 @@ from sqlalchemy import Connection, func, select
 from service.store import campaigns as kept
 from service.store import inversions
 from service.store import models as adopted_models
-from service.store.tables import AnyRow, campaigns, diagnoses, sensor_d33, skins
+from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
@@ -27,7 +27,7 @@ class Glance:
     last: AnyRow | None  # campaign; None where none is current
     cursor: int
     d33: list[tuple[str, float]] = field(default_factory=list)
-    diagnosis: AnyRow | None = None  # the latest of the last campaign
+    diagnosis: AnyRow | None = None  # the latest of the last campaign: of it alone, else of it with others
     model: AnyRow | None = None  # in force
     # d33 of the array [pC/N] in the last campaign by the model in force, and by the paper's; None where not kept
     adopted_d33: float | None = None
@@ -53,7 +53,8 @@ def glances(
         glance.last = row
         if row.number in values:
             glance.d33.append((row.time, values[row.number]))
-    diagnosed = latest_diagnoses(connection, [row.number for row in recent])
+    numbers = [row.number for row in recent]
+    diagnosed = _latest_together(connection, numbers) | latest_diagnoses(connection, numbers)
     adopted = adopted_models.in_force_of(connection, list(by_skin))
     for glance in by_skin.values():
         if glance.last is not None:
@@ -108,3 +109,14 @@ def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int
         .order_by(diagnoses.c.number)
     )
     return {row.campaign: row for row in connection.execute(query)}
+
+
+def _latest_together(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
+    """The latest diagnosis of each of these campaigns together with others, of one skin or of a fleet."""
+    query = (
+        select(diagnosed_campaigns.c.campaign.label("member"), *(diagnoses.c[name] for name in _OF_DIAGNOSES))
+        .join(diagnosed_campaigns, diagnosed_campaigns.c.diagnosis == diagnoses.c.number)
+        .where(diagnosed_campaigns.c.campaign.in_(numbers))
+        .order_by(diagnoses.c.number)
+    )
+    return {row.member: row for row in connection.execute(query)}

@@ -1,5 +1,7 @@
 """The stated d33 counts what does not show: an effect that changes it alone, few sensors, a law's unknown level."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -66,6 +68,16 @@ def test_the_stated_d33_holds_the_true_one_beside_an_effect_that_does_not_show(
     assert nothing is not None
     stated = parameter(nothing, place_of(nothing, "d33"))
     assert not stated["low"] < hidden.d33_pc_per_n < stated["high"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("times", "said"), [(2.0, "2 times the declared 14 pC/N"), (1.0, "")])
+def test_a_charge_taken_peak_to_peak_shows_beside_the_declared_d33(times: float, said: str, table: SigmaTable) -> None:
+    """Nothing else in the recordings tells a factor on all of them."""
+    made = campaign(Made(**{**vars(CENTRED), "d33_pc_per_n": 14.0 * times}), table)
+    statement = diagnosis_report(replace(made, skin=replace(made.skin, d33_pc_per_n=14.0)), table)["statement"]
+    assert said in statement
+    assert ("times the declared" in statement) == bool(said)
 
 
 @pytest.mark.slow

@@ -207,6 +207,7 @@ def test_the_command_writes_a_report_for_each_readable_file(tmp_path: Path, tabl
     assert "torn.json" in result.stderr
     report = json.loads((tmp_path / "reports" / "palm.json").read_text(encoding="utf-8"))
     assert report["schema"] == "report/1"
+    assert f"{good}: {report['verdict']}\n{report['statement']}\n" in result.stderr
     assert [file.name for file in (tmp_path / "reports").iterdir()] == ["palm.json"]
 
 

@@ -131,19 +131,43 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
 
 
 def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:
+    """Files of one name in two folders are one report all the same; a recording that was refused is a finding of it."""
     files = []
     for number, (name, start) in enumerate([("may", "2017-05-03T09:00:00Z"), ("september", SEPTEMBER)]):
-        file = tmp_path / f"{name}.json"
-        file.write_text(json.dumps(document(name, start, seed=5 + number)))
+        made = document(name, start, seed=5 + number)
+        if name == "september":
+            made["recordings"][2]["preload_n"] = -1.0
+        file = tmp_path / name / "campaign.json"
+        file.parent.mkdir()
+        file.write_text(json.dumps(made))
         files.append(str(file))
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["diagnose", *files, "--together", "both", "--output-dir", str(out), "--html"])
     assert done.exit_code == 0, done.output
     report = json.loads((out / "both.json").read_text())
     assert report["campaigns"] == ["may", "september"]
+    refusal = report["findings"][0]
+    assert (refusal["code"], refusal["recording"]) == ("refused", made["recordings"][2]["id"])
+    assert refusal["statement"].startswith("september: preload_n = -1.0")
     assert "agree within the noise" in (out / "both.html").read_text()
     refused = CliRunner().invoke(app, ["diagnose", *files, "--fleet", "f", "--output-dir", str(out)])
     assert refused.exit_code != 0
+
+
+def test_curves_beside_one_campaign_of_frfs_are_told_how_to_become_one_campaign(tmp_path: Path) -> None:
+    """Campaigns are compared by FRFs: a block of the elastomer belongs into the campaign of the FRFs."""
+    frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"
+    frfs.write_text(json.dumps(document("may", "2017-05-03T09:00:00Z", seed=5)))
+    travel = np.linspace(0.0, 1.0, 20)  # mm
+    cylinder = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
+    cylinder |= {"displacement_mm": travel.tolist(), "force_n": (125.0 * travel).tolist()}
+    skin = {"youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
+    block.write_text(json.dumps({"schema": "campaign/1", "name": "block", "skin": skin, "recordings": [cylinder]}))
+    asked = ["diagnose", str(frfs), str(block), "--together", "palm", "--output-dir", str(tmp_path / "out")]
+    done = CliRunner(env={"COLUMNS": "400"}).invoke(app, asked)
+    assert done.exit_code == 2
+    assert f"{block} has none" in done.stderr
+    assert "underskin import FILES --together NAME" in done.stderr
 
 
 def sensors(name: str, d33: Floats, relative: float) -> SensorsOfCampaign:

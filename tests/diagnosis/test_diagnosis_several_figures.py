@@ -1,5 +1,6 @@
 """Reports of several campaigns draw d33 over campaigns, and skins on the band of their population."""
 
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -90,3 +91,27 @@ def test_quantities_of_a_fleet_are_called_in_words(fleet: dict[str, Any]) -> Non
     titles = [entry.text for entry in of_report(fleet)["population"].layout.annotations]
     assert titles == ["d33 [pC/N]", "Young's modulus [MPa]", "Thickness [mm]"]
     assert quantity_in_words("contact_resonance.tip_mass") == "tip mass of contact resonance"
+
+
+def test_the_page_of_several_says_what_each_was_alone_and_that_nothing_is_planned(
+    together: dict[str, Any], fleet: dict[str, Any]
+) -> None:
+    for document, key in ((together, "campaign"), (fleet, "skin")):
+        shown = page(document, {})
+        assert "these recordings decide" not in shown
+        assert "Each campaign's own diagnosis says what to measure next" in shown
+        assert [one[key] for one in document["provenance"]["each"] if f"{escape(one[key])} alone: " not in shown] == []
+        assert "&#39;verdict&#39;" not in shown  # no notation of the code
+
+
+def test_an_answer_that_is_not_sure_is_not_called_decided(together: dict[str, Any]) -> None:
+    """Of a single campaign whose rivals no recording of its rig would tell apart."""
+    single = {name: value for name, value in together.items() if name != "campaigns"}
+    for verdict, probability, decided in (
+        ("explained", 0.97, True),
+        ("no_mismatch", 0.6, False),
+        ("ambiguous", 0.5, False),
+    ):
+        shown = page({**single, "verdict": verdict, "probability": probability}, {})
+        assert ("these recordings decide" in shown) == decided
+        assert ("These recordings do not decide" in shown) == (not decided)

@@ -36,6 +36,7 @@ def same_as_plain(text: str) -> Reading:
         "# exported on Monday\n" + changed("r1,", "# by hand, mb\nr1,"),
         changed("-0.5", "\N{MINUS SIGN}0.5"),
         changed("id,sensor", "ID,Sensor"),
+        changed(HEADINGS, HEADINGS.replace("preload_n", "Preload N").replace("frf_re_pc_per_n", "FRF re pC per N")),
         changed("schema,", "Schema,").replace("name,", "NAME,").replace("sensor,s01,0", "Sensor,s01,0"),
         changed("skin.thickness_mm,2.5", "Skin.Thickness [µm],2500").replace("skin.young", "SKIN.Young"),
         changed(HEADINGS, HEADINGS.replace("\n", ",\n")),
@@ -49,6 +50,7 @@ def same_as_plain(text: str) -> Reading:
         "comments",
         "minus",
         "capitals",
+        "blanks",
         "capitals above",
         "capitals and units",
         "blank heading",
@@ -75,6 +77,11 @@ def test_columns_of_words_are_left_out_and_told() -> None:
     assert "conditions.NAME" in warning
 
 
+def test_times_stand_under_a_heading_with_blanks() -> None:
+    text = ABOVE + HEADINGS.replace("\n", ",Recorded at\n") + ROWS.replace("-0.5\n", "-0.5,24.12.2025 09:30\n", 1)
+    assert only(read(text)).recorded_at == "2025-12-24T09:30:00+00:00"
+
+
 def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed() -> None:
     unknown = refusal(ABOVE + HEADINGS.replace("\n", ",humidity\n") + ROWS.replace("-0.5\n", "-0.5,40\n"))
     assert (unknown.place, "conditions.NAME" in unknown.reason) == ("line 9, column 9", True)
@@ -82,6 +89,30 @@ def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed()
     assert "did you mean skin.thickness_mm?" in refusal(changed("skin.thickness_mm", "skin.thicknes_mm")).reason
     unnamed = refusal(ABOVE + HEADINGS.replace("id,", "id,,") + ROWS.replace("r1,", "r1,40,").replace("\n,", "\n,,"))
     assert unnamed.reason == "has no heading, but cells such as '40'"
+
+
+@pytest.mark.parametrize(
+    ("field", "heading", "meant"),
+    [
+        ("indenter_radius_mm", "Sphere radius [mm]", "indenter_radius_mm"),
+        ("preload_n", "F0 [mN]", "preload_n"),
+        ("dynamic_force_n", "dyn. F (mN)", "dynamic_force_n"),
+        ("frequency_hz", "f [Hz]", "frequency_hz"),
+    ],
+)
+def test_a_heading_of_its_own_is_guessed_by_its_unit_from_what_the_table_lacks(
+    field: str, heading: str, meant: str
+) -> None:
+    assert f"{heading!r} is no field, or its unit is not of the field; is it {meant}," in (
+        refusal(changed(HEADINGS, HEADINGS.replace(field, heading))).reason
+    )
+
+
+@pytest.mark.parametrize("said", ["p-p", "peak-to-peak", "pp", "RMS"])
+def test_a_force_that_is_no_amplitude_is_not_taken_for_one(said: str) -> None:
+    reason = refusal(changed("dynamic_force_n", f"Dynamic force {said} [N]")).reason
+    assert "dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms" in reason
+    assert "did you mean" not in reason
 
 
 def test_a_note_under_the_table_is_left_out_and_told() -> None:

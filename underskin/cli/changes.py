@@ -80,8 +80,8 @@ def join(
     """Say that two ids mean one skin: figures of SKIN use the campaigns of both."""
     with connect(url, key) as client:
         detail = client.skins.join(skin, other, reason)
-    joined = ", ".join(entry["id"] for entry in detail["joined"])
-    _say(detail, f"skin {detail['id']}: joined to it are {joined}", json)
+    joined = " and ".join(entry["id"] for entry in detail["joined"])
+    _say(detail, f"skin {detail['id']} counts as one with {joined}", json)
 
 
 def adopt(

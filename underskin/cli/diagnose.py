@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from underskin.cli.diagnose_several import of_several
-from underskin.cli.reports import write_page, write_report
+from underskin.cli.reports import in_words, refuse_overwriting, write_page, write_report
 from underskin.cli.rigs import EstimatorOption, RigOption, read_by, reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
@@ -38,11 +38,11 @@ Workers = Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each 
 
 @dataclass(frozen=True)
 class _Outcome:
-    """The outcome of one campaign: its verdict, or why there is no report."""
+    """The outcome of one campaign: its verdict and, below it, its statement, or why there is no report."""
 
     source: str
     problem: str = ""
-    verdict: str = ""
+    answer: str = ""
     notes: tuple[str, ...] = ()  # what was taken for what, and what to look at
 
 
@@ -87,15 +87,16 @@ def diagnose(
 
     one_blas_thread()
     files, campaign = files or [], campaign or []
-    _refuse_overwriting(files, campaign, output_dir)
+    several = together is not None or fleet is not None
+    _check_inputs(files, campaign, output_dir, several=several)
     description = None if rig is None else rig_description_in(rig)
     if output_dir.exists() and not output_dir.is_dir():
         raise typer.BadParameter(f"{output_dir} is a file", param_hint="--output-dir")
     output_dir.mkdir(parents=True, exist_ok=True)
-    if campaign and (together is not None or fleet is not None):
+    if campaign and several:
         raise typer.BadParameter("takes files; of stored campaigns ask the service", param_hint="--together, --fleet")
     read = partial(read_by, rig=description, estimator=estimator)
-    if together is not None or fleet is not None:
+    if several:
         of_several(files, read, without or [], output_dir, html=html, together=together, fleet=fleet)
         return
     # Absolute, since a cluster's workers have a working folder of their own
@@ -111,7 +112,7 @@ def diagnose(
             for outcome in outcomes:
                 progress.advance(bar)
                 failed |= bool(outcome.problem)
-                line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.verdict}"
+                line = f"underskin: {outcome.problem}" if outcome.problem else f"{outcome.source}: {outcome.answer}"
                 for said in (line, *(f"{outcome.source}: {note}" for note in outcome.notes)):
                     console.print(said, markup=False, highlight=False, soft_wrap=True)
     if output_dir == _REPORTS and any(output_dir.iterdir()):
@@ -120,23 +121,12 @@ def diagnose(
         raise typer.Exit(2)
 
 
-def _refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
-    """Reports are named like their campaigns: two of one name, or a campaign in the folder, would be lost."""
-    names = [*(file.stem for file in files), *campaigns]
-    if not names:
+def _check_inputs(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path, *, several: bool) -> None:
+    """Raise BadParameter for nothing to diagnose, and for a report in the place of another file; `several`: in one."""
+    if not files and not campaigns:
         raise typer.BadParameter("give files or --campaign", param_hint="FILES")
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        sources = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
-        clashing = " and ".join(source for name, source in sources if name == twice[0])
-        problem = (
-            f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
-            "Rename files, or run once for each, with an --output-dir of its own"
-        )
-        raise typer.BadParameter(problem, param_hint="FILES")
-    lost = [file for file in files if (output_dir / f"{file.stem}.json").resolve() == file.resolve()]
-    if lost:
-        raise typer.BadParameter(f"the report would overwrite {lost[0]}", param_hint="--output-dir")
+    if not several:
+        refuse_overwriting(files, campaigns, output_dir)
 
 
 def _of_files(
@@ -216,7 +206,7 @@ def _one(
         from underskin.diagnosis.reporting.figures import figures
 
         write_page(document, output_dir / f"{file.stem}.html", figures(diagnosis, document))
-    return _Outcome(str(file), verdict=str(document["verdict"]), notes=tuple(reading_notes(reading)))
+    return _Outcome(str(file), "", in_words(document), tuple(reading_notes(reading)))
 
 
 @cache
@@ -259,7 +249,7 @@ def _fetched(client: "Client", campaign: str, diagnosis: str, output_dir: Path, 
     write_report(document, output_dir / f"{campaign}.json")
     if html:
         write_page(document, output_dir / f"{campaign}.html")
-    return _Outcome(campaign, verdict=finished.report.verdict)
+    return _Outcome(campaign, answer=in_words(document))
 
 
 def plan(

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from underskin.cli.reports import write_page, write_report
+from underskin.cli.reports import in_words, write_page, write_report
+from underskin.cli.rigs import reading_notes
 
 if TYPE_CHECKING:
     from underskin.recordings.campaign import Campaign
@@ -34,22 +35,19 @@ def of_several(
     from underskin.diagnosis.several.fleet import diagnose_fleet
     from underskin.surrogate.sigma_table import load_table
 
-    name = together if together is not None else fleet
-    if name is None or (together is not None and fleet is not None):
-        raise typer.BadParameter("one of --together and --fleet", param_hint="--fleet")
-    if not _NAME.fullmatch(name):
-        raise typer.BadParameter(
-            f"{name!r}: letters, digits, spaces, points and hyphens", param_hint="--together, --fleet"
-        )
-    target = output_dir / f"{name}.json"
+    target = output_dir / f"{_name(together, fleet)}.json"
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
-    campaigns = _read(files, read)
+    readings = _read(files, read)
+    campaigns = [reading.campaign for reading in readings]
     known = sorted({campaign.skin.id for campaign in campaigns if campaign.skin.id is not None})
     if together is not None and len(known) > 1:
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
         raise typer.BadParameter(allowed, param_hint="--together")
     console = Console(stderr=True)
+    if together is not None:
+        for file in _without_frfs(files, campaigns):
+            console.print(f"{file}: left out: it has no FRFs", markup=False, highlight=False, soft_wrap=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
 
@@ -57,27 +55,83 @@ def of_several(
             progress.update(bar, completed=share)
 
         if together is not None:
-            document = diagnose_together(campaigns, load_table(), name, without, told)
+            document = diagnose_together(campaigns, load_table(), target.stem, without, told)
         else:
-            document = diagnose_fleet(_by_skin(campaigns), load_table(), name, without, told)
+            document = diagnose_fleet(_by_skin(campaigns), load_table(), target.stem, without, told)
         told(1.0)
+    document = {**document, "findings": [*_refused(readings), *document["findings"]]}
     write_report(document, target)
     if html:
         write_page(document, target.with_suffix(".html"))
-    console.print(f"{name}: {document['verdict']}", markup=False, highlight=False)
-    console.print(document["statement"], markup=False, highlight=False, soft_wrap=True)
+    console.print(f"{target.stem}: {in_words(document)}", markup=False, highlight=False, soft_wrap=True)
+    for file, reading in zip(files, readings, strict=True):
+        for note in reading_notes(reading):
+            console.print(f"{file}: {note}", markup=False, highlight=False, soft_wrap=True)
 
 
-def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Campaign"]:
+def _name(together: str | None, fleet: str | None) -> str:
+    """What the report is called."""
+    name = together if together is not None else fleet
+    if name is None or (together is not None and fleet is not None):
+        raise typer.BadParameter("one of --together and --fleet", param_hint="--fleet")
+    if not _NAME.fullmatch(name):
+        raise typer.BadParameter(
+            f"{name!r}: letters, digits, spaces, points and hyphens", param_hint="--together, --fleet"
+        )
+    return name
+
+
+def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Reading"]:
     from underskin.errors import UnderskinError
 
-    campaigns = []
+    readings = []
     for file in files:
         try:
-            campaigns.append(read(file).campaign)
+            readings.append(read(file))
         except UnderskinError as error:
             raise UnderskinError(f"{file}: {error}") from error
-    return campaigns
+    return readings
+
+
+def _without_frfs(files: Sequence[Path], campaigns: Sequence["Campaign"]) -> list[Path]:
+    """The files of curves alone, which several campaigns are not compared by; BadParameter where others are too few."""
+    from underskin.recordings.campaign import FrfRecording
+
+    curves = [
+        file
+        for file, campaign in zip(files, campaigns, strict=True)
+        if not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)
+    ]
+    if curves and len(files) - len(curves) < 2:
+        said = ", ".join(map(str, curves))
+        allowed = (
+            f"compares campaigns by their FRFs, and {said} {'has' if len(curves) == 1 else 'have'} none. Curves tell "
+            "more in one campaign with the FRFs: send the files with `underskin import FILES --together NAME`, then "
+            "run `underskin diagnose --campaign ID`"
+        )
+        raise typer.BadParameter(allowed, param_hint="--together")
+    return curves
+
+
+def _refused(readings: Sequence["Reading"]) -> list[dict[str, str]]:
+    """Findings of the recordings that were refused when they were read, led by the campaign's name."""
+    from underskin.findings.codes import Reason
+    from underskin.findings.finding import Finding
+
+    findings = [
+        (
+            reading.campaign.name,
+            Finding(
+                Reason.REFUSED,
+                problem.recording,
+                problem.field,
+                {"field": problem.field, "value": problem.value, "allowed": problem.allowed},
+            ).in_report(),
+        )
+        for reading in readings
+        for problem in reading.problems
+    ]
+    return [{**said, "statement": f"{name}: {said['statement']}"} for name, said in findings]
 
 
 def _by_skin(campaigns: Sequence["Campaign"]) -> dict[str, list["Campaign"]]:

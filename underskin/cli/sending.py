@@ -79,7 +79,8 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
     except UnderskinError as error:  # the campaign is stored nevertheless
         return f"no d33: {error}", []
     moduli = [
-        f"E {significant(one['youngs_modulus_mpa'], 4)} ± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
+        f"E of {one['recording']} {significant(one['youngs_modulus_mpa'], 4)} "
+        f"± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
         for one in answer["moduli"]
     ]
     array = answer["array"]

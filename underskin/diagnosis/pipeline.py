@@ -85,7 +85,8 @@ def _diagnosed(
 ) -> DiagnosisResult:
     progress(0.05)
     possible = without_extremes(campaign)
-    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table, mechanisms))
+    declared = campaign.skin.d33_pc_per_n
+    begun = DiagnosisResult(campaign.name, possible.findings, _provenance(table, mechanisms), declared)
     if possible.findings and possible.lacking:
         return replace(begun, lacking=possible.lacking)
     campaign = possible.campaign

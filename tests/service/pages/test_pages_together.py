@@ -45,6 +45,9 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     assert page.get_by_role("heading", name="Diagnosed together").count() == 1
     reader.go(f"/campaigns/{first}")
     assert "together with others, as several" in page.get_by_role("main").inner_text()
+    reader.go("/")
+    assert "together, as several" in page.get_by_role("row").filter(has_text="several").inner_text()
+    assert "not diagnosed" in page.get_by_role("row").filter(has_text="alone").inner_text()
 
 
 def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:

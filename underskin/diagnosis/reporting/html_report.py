@@ -13,6 +13,7 @@ import plotly.io
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.answer_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.figures import explanations
@@ -46,7 +47,7 @@ def _macros() -> Any:
     loader = PackageLoader("underskin.diagnosis.reporting")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
     environment.filters |= {function.__name__: function for function in _FILTERS}
-    environment.globals["catalogue"] = CATALOGUE
+    environment.globals |= {"catalogue": CATALOGUE, "EXPLAINED": EXPLAINED}
     return environment.get_template("report.html").module
 
 

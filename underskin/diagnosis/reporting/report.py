@@ -54,6 +54,7 @@ class DiagnosisResult:
     name: str
     findings: Sequence[Finding]
     provenance: Mapping[str, Any]
+    skin_d33_pc_per_n: float | None = None  # as the skin declares it
     lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
     few: Search | None = None  # in its place where recordings agree with the model but are too few to say so alone
@@ -161,7 +162,15 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     contradictory = [] if diagnosis.joined is None else kinds.contradictions(diagnosis.joined)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
-    d33 = stated_d33(search, problem, fit, diagnosis.shifts, stands=stands, contradictory=bool(contradictory))
+    d33 = stated_d33(
+        search,
+        problem,
+        fit,
+        diagnosis.shifts,
+        stands=stands,
+        contradictory=bool(contradictory),
+        skin_pc_per_n=diagnosis.skin_d33_pc_per_n,
+    )
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = averaged.presence(search, averaged.present(search, problem))

@@ -1,7 +1,7 @@
 """The d33 of a report: whether it is to be quoted, and what would change it that these recordings do not show."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,12 +29,13 @@ BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does
 class StatedD33:
     """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
     and move it beyond its interval; those that are wrong declared numbers keep it from being quoted. `why_not`: what
-    else does, in words."""
+    else does, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none."""
 
     document: Mapping[str, Any] | None
     findings: Sequence[Finding] = ()
     hidden: Sequence[HiddenShift] = ()
     why_not: Sequence[str] = ()
+    skin_pc_per_n: float | None = None
 
     @property
     def declared(self) -> list[HiddenShift]:
@@ -57,12 +58,22 @@ class StatedD33:
         largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
         named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
         hides = f", provided that no {named} hides" if named else ""
-        return f"{value} {self.document['unit']} (95 %: {low} to {high}){hides}"
+        return f"{value} {self.document['unit']} (95 %: {low} to {high}){self._beside_declared()}{hides}"
+
+    def _beside_declared(self) -> str:
+        """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
+        charge taken for an amplitude halves or doubles every FRF, which nothing else in the recordings tells."""
+        assert self.document is not None
+        declared = self.skin_pc_per_n
+        if declared is None or self.document["low"] <= declared <= self.document["high"]:
+            return ""
+        return f", {self.document['value'] / declared:.2g} times the declared {declared:g} {self.document['unit']}"
 
     def interval(self) -> str:
         """Where it lies, and why it is not to be quoted."""
         assert self.document is not None
-        lies = f"it lies from {self.document['low']:.3g} to {self.document['high']:.3g} {self.document['unit']}"
+        low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
+        lies = f"it lies from {low} to {high} {self.document['unit']}{self._beside_declared()}"
         if self.declared:
             each = " and ".join(f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.declared)
             return f"{lies}, but what would not show here would change it, {each}"
@@ -101,12 +112,13 @@ def stated_d33(
     *,
     stands: bool,
     contradictory: bool,
+    skin_pc_per_n: float | None,
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
     `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, d33 is plausible, the answer fits the
     recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
-    show here would move d33 beyond its interval.
+    show here would move d33 beyond its interval. `skin_pc_per_n`: the skin's declared one.
     """
     d33 = None if problem.lines.curves else averaged.d33(search, problem)
     if d33 is None:
@@ -128,8 +140,9 @@ def stated_d33(
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
     findings = [finding] if implausible else []
     # Beside other reasons not to quote it, a hidden one would not be what decides.
-    stated = StatedD33({**d33, "quotable": not why_not}, findings, () if why_not else hidden, why_not)
-    return StatedD33({**d33, "quotable": False}, findings, hidden) if stated.declared else stated
+    quotable = {**d33, "quotable": not why_not}
+    stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
+    return replace(stated, document={**d33, "quotable": False}) if stated.declared else stated
 
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:

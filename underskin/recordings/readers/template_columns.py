@@ -7,6 +7,7 @@ names no field, are left out.
 
 import cmath
 import math
+import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -22,6 +23,15 @@ _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _PHASE_ALONE, _TURN = "frf_phase", 2 * math.pi
 NO_NAME = ("", "unnamed: 0")  # the second by pandas
 _ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
+# What each FRF needs, without the unit, by its field
+_NEEDED = {
+    "indenter_radius_mm": "indenter_radius",
+    "preload_n": "preload",
+    "dynamic_force_n": "dynamic_force",
+    "frequency_hz": "frequency",
+    MAGNITUDE: "frf_magnitude",
+}
+_NO_AMPLITUDE = re.compile(r"force.*\b(p-?p|pk-?pk|peak.to.peak|rms)\b")
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,7 @@ def columns(
     found: dict[str, Column] = {}
     left_out: list[str] = []
     meanings = [field_of(heading, known) for heading in headings]
+    present = {meant[0] for meant in meanings if meant is not None}
     others = {place: _Nameless() for place, meant in enumerate(meanings) if meant is None}
     for row in under(list(others)) if others else ():
         for cell, column in zip(row, others.values(), strict=True):
@@ -94,7 +105,7 @@ def columns(
             meant = PHASE, _angle_of(place, heading, others[place])
             left_out.append(f"{heading!r} is read as degrees: it has values beyond 2π")
         if meant is None:
-            left_out += _without(place, heading, others[place], known)
+            left_out += _without(place, heading, others[place], [*known, MAGNITUDE, PHASE], present)
             continue
         field, factor = meant
         if field in found:
@@ -110,8 +121,8 @@ def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
     if heading.lower().startswith(FURTHER):
         return FURTHER + heading[len(FURTHER) :], 1.0
     lower = heading.lower()
-    if lower in known or lower == MAGNITUDE:
-        return lower, 1.0
+    if (whole := lower.replace(" ", "_")) in known or whole == MAGNITUDE:
+        return whole, 1.0
     if lower in ("frf_phase_deg", PHASE):
         return PHASE, _ANGLES[lower.rpartition("_")[2]]
     bracketed = in_brackets(heading)
@@ -139,22 +150,42 @@ def _angle_of(place: int, heading: str, column: _Nameless) -> float:
     raise NoField(place, f"{heading!r} has no unit, and its values may be degrees or radians: call it {names}")
 
 
-def _without(place: int, heading: str, column: _Nameless, known: Collection[str]) -> list[str]:
-    """That a column which names no field is left out, in words, if it matters; raises NoField where that loses
-    something."""
+def _without(place: int, heading: str, column: _Nameless, fields: Sequence[str], present: Collection[str]) -> list[str]:
+    """That a column which names none of the fields is left out, in words, if it matters; raises NoField where that
+    loses something. `present` are the fields of the other columns."""
     if heading.strip().lower() in NO_NAME:
         if column.count and not (place == 0 and column.is_index):
             raise NoField(place, f"has no heading, but cells such as {column.example!r}")
         return []
-    alike = get_close_matches(heading.strip().lower().replace(" ", "_"), [*known, MAGNITUDE, PHASE], 1, _ALIKE)
+    none = f"{heading!r} is no field, or its unit is not of the field"
+    if _NO_AMPLITUDE.search(heading.lower()):
+        raise NoField(place, f"{none}; dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms")
+    alike = get_close_matches(heading.strip().lower().replace(" ", "_"), fields, 1, _ALIKE)
     if alike:
-        raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; did you mean {alike[0]}?")
+        raise NoField(place, f"{none}; did you mean {alike[0]}?")
     keep = f"{FURTHER}NAME keeps a column of anything else"
     if column.has_numbers:
-        raise NoField(place, f"{heading!r} is no field, or its unit is not of the field; {keep}")
+        lacking = _lacking(heading, present)
+        raise NoField(
+            place,
+            f"{none}; is it {' or '.join(lacking)}, which the table lacks? {keep}" if lacking else f"{none}; {keep}",
+        )
     if not column.count:
         return []
     return [f"column {heading!r} holds words and is no field: it is left out ({keep})"]
+
+
+def _lacking(heading: str, present: Collection[str]) -> list[str]:
+    """The fields of an FRF that a table has not and that the unit of a heading is one of."""
+    labelled = in_brackets(heading)
+    if labelled is None or "displacement_mm" in present:
+        return []
+    has = {*present, *([MAGNITUDE] if PARTS[0] in present else [])}
+    return [
+        field
+        for field, name in _NEEDED.items()
+        if field not in has and field_of(f"{name} [{labelled[1]}]", ()) is not None
+    ]
 
 
 def _require_whole(found: dict[str, Column]) -> None:
