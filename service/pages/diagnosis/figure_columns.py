@@ -82,6 +82,24 @@ def _curve(figure: Mapping[str, Any]) -> FigureColumns:
     return _by_name(("recording", "shows", "depth_mm", "force_n"), rows)
 
 
+def _frf(figure: Mapping[str, Any]) -> FigureColumns:
+    """Every recording's lines, what models predict of them and leave, and the band of the noise."""
+    layout, meta = figure["layout"], figure["layout"]["meta"]
+    first = {axis: [trace[axis] for trace in figure["data"]] for axis in ("x", "y")}
+    buttons = [button for menu in layout.get("updatemenus", []) for button in menu["buttons"]]
+    own = [{**first, **button["args"][0]} for button in buttons] or [first]
+    rows: list[tuple[Any, ...]] = []
+    for name, sensor, numbers in zip(meta["recordings"], meta["sensors"], own, strict=True):
+        lines = zip(*map(_numbers, (numbers["x"][0], *numbers["y"])), strict=True)
+        rows += [(name, sensor, *line) for line in lines]
+    return _by_name(("recording", "sensor", "frequency_hz", *map(_with_unit, meta["shows"])), rows)
+
+
+def _with_unit(shows: str) -> str:
+    unit = "deg" if "phase" in shows else "percent" if " " in shows else "pc_per_n"
+    return f"{shows.replace(' ', '_')}_{unit}"
+
+
 def _rounded(value: float) -> float:
     """To the digits of a number of four bytes."""
     return float(f"{value:.6g}")
@@ -107,6 +125,7 @@ _OF_REPORT: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
 }
 _OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "where": _where,
+    "frf": _frf,
     "curve": _curve,
     "before_after": _before_after,
 }

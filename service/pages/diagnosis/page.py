@@ -33,6 +33,8 @@ router = APIRouter()
 _ABOUT = {
     "where": "Each cell is the mean over the recordings in it, empty where there is none; the outlined region holds "
     "most of the misfit.",
+    "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
+    "predicted on the band that 95 % of the noise stays in. A double click shows residuals beyond the panel.",
     "curve": "One recording with the models before and after, the worst explained one first; below, measured less "
     "predicted. A double click shows all of the air, another one the contact.",
     "before_after": "Each point a recording, or a part of its lines; the grey band is what noise alone allows.",

@@ -12,7 +12,9 @@ function document_of(plot) {
 function as_chosen(figure, list) {
   if (!list) return figure;
   const [changed, layout] = figure.layout.updatemenus[0].buttons[list.value].args;
-  figure.data.forEach((trace, index) => (trace.visible = changed.visible[index]));
+  for (const [name, values] of Object.entries(changed)) {
+    figure.data.forEach((trace, index) => (trace[name] = values[index]));
+  }
   for (const [path, value] of Object.entries(layout)) {
     const keys = path.split(".");
     const last = keys.pop();
@@ -85,10 +87,24 @@ function prepare(root) {
     plot.style.minHeight = `${plot.dataset.height}px`;
     seen.observe(plot);
   }
-  for (const list of root.querySelectorAll("[data-choice]")) {
-    list.addEventListener("change", () => redraw(list.closest("figure").querySelector(".plot")));
-  }
+  for (const list of root.querySelectorAll("[data-choice]")) choose(list);
   for (const button of root.querySelectorAll("[data-save]")) button.addEventListener("click", () => save(button));
+}
+
+// One after another, by the list, or by the buttons beside it.
+function choose(list) {
+  const figure = list.closest("figure");
+  const steps = [...figure.querySelectorAll("[data-step]")];
+  list.addEventListener("change", () => {
+    for (const step of steps) step.disabled = !list.options[list.selectedIndex + Number(step.dataset.step)];
+    redraw(figure.querySelector(".plot"));
+  });
+  for (const step of steps) {
+    step.addEventListener("click", () => {
+      list.selectedIndex += Number(step.dataset.step);
+      list.dispatchEvent(new Event("change"));
+    });
+  }
 }
 
 async function save(button) {

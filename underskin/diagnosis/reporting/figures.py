@@ -19,6 +19,8 @@ from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.curve_data import shown_curves
 from underskin.diagnosis.reporting.curve_figure import curve_figure
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
+from underskin.diagnosis.reporting.frf_data import shown_frfs
+from underskin.diagnosis.reporting.frf_figure import frf_figure
 from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
@@ -35,7 +37,7 @@ _ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the shar
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name: where, curve, before_after, explanations, parameters; those that it has. `document`: its report."""
+    """By name, those there are: where, frf or curve, before_after, explanations, parameters. `document`: its report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
     nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
@@ -49,6 +51,9 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
     }
     if diagnosis.curves is not None:
         drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, nothing, shown)
+    elif not diagnosis.problem.lines.curves:
+        recordings = shown_frfs(diagnosis.problem, nothing, shown)
+        drawn["frf"] = frf_figure(recordings, *_models(diagnosis.problem, shown))
     if any(entry["parameters"] for entry in document["mechanisms"]):
         drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
     return drawn
@@ -56,9 +61,13 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
 
 def _curve(problem: FittingProblem, recorded: Campaign, nothing: Explanation, shown: Explanation) -> go.Figure:
     """Each curve with the model before and after; with one of them where nothing is added."""
+    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, *_models(problem, shown))
+
+
+def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
+    """What the models before and after are called; before empty where nothing is added."""
     simplest = SIMPLEST[problem.kind]
-    before, after = (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
-    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, before, after)
+    return (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
 
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:
