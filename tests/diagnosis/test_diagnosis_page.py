@@ -214,13 +214,16 @@ def test_figures_show_the_report_s_numbers(found: DiagnosisResult, document: dic
     bars = drawn["explanations"].data[0]
     assert next(iter(bars.y)) == "contact resonance"
     assert list(bars.x) == [document["probability"], *(entry["probability"] for entry in document["alternatives"])]
-    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "after them, 95 %"]
+    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "95 % interval"]
     parameters = document["mechanisms"][0]["parameters"]
     assert [list(ends) for ends in intervals] == [[entry["low"], entry["high"]] for entry in parameters]
-    for prior, ends in zip(
-        (trace.x for trace in drawn["parameters"].data if str(trace.name).startswith("before")), intervals, strict=True
-    ):
-        assert prior[1] - prior[0] > ends[1] - ends[0]
+    for axis, (low, high) in zip(drawn["parameters"].select_xaxes(), intervals, strict=True):
+        assert (high - low) / (axis.range[1] - axis.range[0]) == pytest.approx(1 / 3)  # it is seen, however narrow
+    notes = [note.text for note in drawn["parameters"].layout.annotations]
+    assert all("before the recordings" in note for note in notes)
+    for plot in ("", "2"):
+        x, y = (drawn["before_after"].layout[f"{axis}axis{plot}"].range for axis in "xy")
+        assert x == y
 
 
 @pytest.mark.slow

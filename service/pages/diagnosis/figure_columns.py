@@ -56,7 +56,7 @@ def _where(figure: Mapping[str, Any]) -> FigureColumns:
     places = product(layout["yaxis"]["ticktext"], layout["xaxis"]["ticktext"])
     values = zip(places, _numbers(trace["z"]), _numbers(trace["customdata"]), strict=True)
     rows = [(x, y, None if np.isnan(value) else value, int(count)) for (y, x), value, count in values]
-    return _by_name((*heads, f"{trace['colorbar']['title']['text']}, measured above the model", "points"), rows)
+    return _by_name((*heads, layout["title"]["text"].removeprefix("Where: "), "points"), rows)
 
 
 def _before_after(figure: Mapping[str, Any]) -> FigureColumns:

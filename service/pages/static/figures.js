@@ -43,6 +43,29 @@ async function draw(plot) {
   if (plot.dataset.drawn) return;
   plot.dataset.drawn = "yes";
   await redraw(plot);
+  plot.on("plotly_click", ({ points: [point] }) => choose_sensor(point.id));
+  plot.on("plotly_hover", ({ points: [point] }) => point_at(point.id));
+}
+
+// A sensor that is clicked in any figure is the one that the page's list would choose.
+function choose_sensor(id) {
+  const list = document.querySelector("[data-sensors]");
+  if (id === undefined || ![...(list?.options ?? [])].some((option) => option.value === id)) return;
+  list.value = id;
+  submit(list);
+}
+
+// A sensor that is pointed at in any figure gets its line, where a figure shows many.
+function point_at(id) {
+  for (const plot of document.querySelectorAll(".plot[data-drawn]")) {
+    const line = plot.data?.findIndex((trace) => trace.name === "pointed at");
+    if (id === undefined || !(line > -1) || plot.dataset.pointed === id) continue;
+    plot.dataset.pointed = id;
+    const every = plot.data.find((trace) => trace.name === "every sensor");
+    const own = every.ids.flatMap((name, index) => (name === id ? [index] : []));
+    const column = (name) => [own.map((index) => every[name][index])];
+    Plotly.restyle(plot, { x: column("x"), y: column("y"), ids: [own.map(() => id)], text: column("text") }, [line]);
+  }
 }
 
 // With the JSON as it is now.
