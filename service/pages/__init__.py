@@ -5,6 +5,7 @@ from fastapi.routing import APIRoute
 
 from service.pages.array import loads, pressure_map
 from service.pages.campaign import page as campaign
+from service.pages.compare import page as compare
 from service.pages.design import page as design
 from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
@@ -18,7 +19,7 @@ from service.pages.start import page as start
 from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
-_OF_SKINS = (start, example, skin, campaign, fleet, diagnosis, plan, upload)
+_OF_SKINS = (start, example, skin, campaign, compare, fleet, diagnosis, plan, upload)
 _PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets)
 
 router = APIRouter(include_in_schema=False)

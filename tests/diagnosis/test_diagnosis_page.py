@@ -4,7 +4,7 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -115,18 +115,33 @@ def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -
     assert [name for name in CATALOGUE if "_" in name and name in tags.text] == []  # no names of the code
 
 
+def drawn_texts(figure: Any) -> Iterator[str]:
+    """All texts of a figure but those that plotly never draws: what it is told to remember, and what buttons are called
+    in a list of the page."""
+    if isinstance(figure, str):
+        yield figure
+    elif isinstance(figure, list):
+        for entry in figure:
+            yield from drawn_texts(entry)
+    elif isinstance(figure, dict):
+        unseen = ("meta", "name") if "method" in figure else ("meta",)
+        for name, entry in figure.items():
+            if name not in unseen:
+                yield from drawn_texts(entry)
+
+
 @pytest.mark.slow
-def test_markup_in_a_campaign_stays_text(text: str) -> None:
+def test_markup_in_a_campaign_stays_text(text: str, found: DiagnosisResult, document: dict[str, Any]) -> None:
     tags = Tags(text)
     assert f"Diagnosis of palm {HOSTILE}" in tags.text
     assert f"{HOSTILE}3" in tags.text
     assert tags.count("img") == tags.count("a") == 0
-    assert tags.count("script") == 1 + 4  # plotly's own, and one a figure
+    assert tags.count("script") == 1 + 5  # plotly's own, and one a figure
     assert "<script>alert" not in text
     # In the figures, too, texts reach plotly escaped: it would show <a> and <b> as such.
-    drawn = text[text.index("Plotly.newPlot") :]
-    assert "\\u003ca href" not in drawn
-    assert "\\u0026lt;a href" in drawn or "&lt;a href" in drawn
+    texts = [one for figure in figures(found, document).values() for one in drawn_texts(json.loads(figure.to_json()))]
+    assert not any("<a href" in one for one in texts)
+    assert any("&lt;a href" in one for one in texts)
 
 
 @pytest.mark.slow
@@ -154,7 +169,7 @@ def drawn_by_a_browser(text: str, folder: Path) -> str:
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
     drawn = drawn_by_a_browser(text, tmp_path)
-    for name in ("where", "before_after", "explanations", "parameters"):
+    for name in ("where", "frf", "before_after", "explanations", "parameters"):
         part = drawn[drawn.index(f'id="figure-{name}"') :]
         assert "main-svg" in part[: part.index("</script>")]
     assert "<img src=x" not in drawn
@@ -174,19 +189,41 @@ def test_a_list_that_keys_reach_chooses_the_recording(document: dict[str, Any], 
     assert set(title.split(",")) == {menu.buttons[1].name.partition(":")[0]}
 
 
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_buttons_lead_from_one_frf_to_the_next(
+    found: DiagnosisResult, document: dict[str, Any], tmp_path: Path
+) -> None:
+    figure = figures(found, document)["frf"]
+    look = "const [back, on] = document.querySelectorAll('label + button, label + button + button');"
+    look += "const seen = () => [back.disabled, on.disabled, document.getElementById('figure-frf').data[0].y[0]];"
+    look += "const before = seen(); on.click(); document.title = JSON.stringify([before, seen()]);"
+    script = f"<script>addEventListener('load', () => setTimeout(() => {{{look}}}, 500))</script></html>"
+    shown = drawn_by_a_browser(page(document, {"frf": figure}).replace("</html>", script), tmp_path)
+    first, second = json.loads(re.findall("<title>(.*?)</title>", shown)[0])
+    buttons = figure.layout.updatemenus[0].buttons
+    assert (first, second) == (
+        [True, False, buttons[0].args[0]["y"][0][0]],
+        [False, False, buttons[1].args[0]["y"][0][0]],
+    )
+
+
 @pytest.mark.slow
 def test_figures_show_the_report_s_numbers(found: DiagnosisResult, document: dict[str, Any]) -> None:
     drawn = figures(found, document)
     bars = drawn["explanations"].data[0]
     assert next(iter(bars.y)) == "contact resonance"
     assert list(bars.x) == [document["probability"], *(entry["probability"] for entry in document["alternatives"])]
-    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "after them, 95 %"]
+    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "95 % interval"]
     parameters = document["mechanisms"][0]["parameters"]
     assert [list(ends) for ends in intervals] == [[entry["low"], entry["high"]] for entry in parameters]
-    for prior, ends in zip(
-        (trace.x for trace in drawn["parameters"].data if str(trace.name).startswith("before")), intervals, strict=True
-    ):
-        assert prior[1] - prior[0] > ends[1] - ends[0]
+    for axis, (low, high) in zip(drawn["parameters"].select_xaxes(), intervals, strict=True):
+        assert (high - low) / (axis.range[1] - axis.range[0]) == pytest.approx(1 / 3)  # it is seen, however narrow
+    notes = [note.text for note in drawn["parameters"].layout.annotations]
+    assert all("before the recordings" in note for note in notes)
+    for plot in ("", "2"):
+        x, y = (drawn["before_after"].layout[f"{axis}axis{plot}"].range for axis in "xy")
+        assert x == y
 
 
 @pytest.mark.slow
@@ -231,13 +268,13 @@ def curves() -> Campaign:
     return replace(empty, recordings=tuple(recordings))
 
 
-EVERY = {"where", "before_after", "explanations", "parameters"}
+EVERY = {"where", "frf", "before_after", "explanations", "parameters"}
 ALONE = Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,))
 KINDS = [
     (lambda: campaign(Made(), load_table()), "no_mismatch", EVERY - {"parameters"}),
     (lambda: campaign(OFF_CENTRE, load_table()), "explained", EVERY),
     (lambda: campaign(ALONE, load_table()), "insufficient_data", set()),
-    (curves, "explained", EVERY - {"parameters"} | {"curve"}),  # a thin layer has no parameter
+    (curves, "explained", EVERY - {"parameters", "frf"} | {"curve"}),  # a thin layer has no parameter
 ]
 
 
@@ -253,6 +290,7 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     assert readable(document["statement"]).partition(". ")[0].rstrip(".") in tags.text
     if not names:
         assert tags.count("script") == 0
+    assert ("The grey band holds 95 %" in tags.text) == ("frf" in names)
     assert ("Depth is counted from the fitted contact point" in tags.text) == ("curve" in names)
     fitted = document["fit"]["after"].get("youngs_modulus") if document["fit"] else None
     assert ("Young's modulus [MPa]" in tags.text) == (fitted is not None) == ("curve" in names)

@@ -5,7 +5,7 @@ import plotly.graph_objects as go
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.frf import frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
@@ -15,18 +15,6 @@ from underskin.recordings.frf.summary import FrfLines
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
 REASONS = ("", "", "weak: 21 % of the array's d33")
-
-
-def test_the_map_shows_each_sensor_in_its_place_and_marks_those_that_stand_out() -> None:
-    figure = array_map(SENSORS, [0.0, 8.0, 16.0], [0.0, 0.0, 8.0], D33, 0.1 * D33, REASONS)
-    plain, odd = figure.data
-    assert list(zip(plain.x, plain.y, strict=True)) == [(0.0, 0.0), (8.0, 0.0)]
-    assert odd.marker.symbol != plain.marker.symbol
-    assert odd.text[0] == f"s3: {REASONS[2]}"
-    assert list(plain.marker.color) == [14.0, 15.0]
-    assert (plain.marker.cmin, plain.marker.cmax) == (odd.marker.cmin, odd.marker.cmax) == (3.0, 15.0)
-    assert "pC/N" in plain.hovertemplate
-    assert "mm" in plain.hovertemplate
 
 
 def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
@@ -39,6 +27,8 @@ def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
     assert list(points["4 mm, model"].x) == [0.5, 1.0]
     assert points["4 mm, measured"].marker.symbol != points["10 mm, measured"].marker.symbol
     assert points["4 mm, measured"].marker.color != points["10 mm, measured"].marker.color
+    assert points["4 mm, model"].line.dash != points["10 mm, model"].line.dash
+    np.testing.assert_allclose(points["4 mm, measured"].error_y.array, 1.96 * 0.1 * points["4 mm, measured"].y)
 
 
 def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
@@ -48,6 +38,9 @@ def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
     np.testing.assert_allclose(figure.data[0].error_y.arrayminus, 1)
     band = figure.layout.shapes[0]
     assert (band.y0, band.y1) == (13.5, 14.5)
+    ringed = response_per_sensor(SENSORS, D33, D33 - 1, D33 + 2, None, REASONS, "s2").data[0]
+    assert list(ringed.ids) == ["s1", "s2"]
+    assert ringed.marker.line.width[1] > ringed.marker.line.width[0]
     assert figure.to_json()
 
 
@@ -97,12 +90,20 @@ def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_sta
     sensors = [SensorPoints(f"s{number:02}", times, own.tolist(), [0.2, 0.2], "") for number, own in enumerate(d33)]
     figure = d33_history(sensors)
     assert figure.layout.showlegend is False
-    upper, lower, median, apart = figure.data
+    upper, lower, median, apart, every, pointed = figure.data
+    assert (len(every.x), len(pointed.x)) == (120, 0)
+    assert [value for sensor, value in zip(every.ids, every.y, strict=True) if sensor == "s17"] == d33[17].tolist()
     np.testing.assert_allclose(median.y, np.median(d33, axis=0))
     for number in range(2):
         inside = (d33[:, number] > lower.y[number]) & (d33[:, number] < upper.y[number])
         assert inside.sum() == 54  # 90 %
     assert (list(apart.text), list(apart.x), list(apart.y)) == (["s17"], [times[1]], [9.0])
+    np.testing.assert_allclose(apart.error_y.array, 1.96 * 0.2)
+    *_, chosen = d33_history(sensors, "s03").data
+    assert (chosen.name, list(chosen.y)) == ("s03", d33[3].tolist())
+    np.testing.assert_allclose(chosen.error_y.array, 1.96 * 0.2)
+    (alone,) = d33_history(sensors[:5], "s03").data
+    assert alone.name == "s03"
     few = d33_history(sensors[:5])
     assert [trace.name for trace in few.data] == [f"s0{number}" for number in range(5)]
     assert few.layout.showlegend is True

@@ -4,7 +4,8 @@ import numpy as np
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
+from underskin.figures.array import frf_versus_preload, response_per_sensor
+from underskin.figures.array_map import array_map
 from underskin.inversion.invert import Inversion
 from underskin.physics.charge_response import gain
 from underskin.recordings.campaign import Campaign

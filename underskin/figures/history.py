@@ -7,10 +7,12 @@ from datetime import datetime, timedelta
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.figures.style import COLOURS, MARKERS, label, line, styled
+from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, line, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
 _MOST_POINTS = 600  # of a history that shows each sensor
+_MOST_FAINT = 6000  # of a history that shows their median and spread
+_CHOSEN = COLOURS[2]
 _DAY = timedelta(days=1)
 
 
@@ -30,30 +32,38 @@ def is_summarised(sensors: int, points: int) -> bool:
     return sensors > MOST_NAMED or (points > _MOST_POINTS and sensors > 1)
 
 
-def d33_history(sensors: Sequence[SensorPoints]) -> go.Figure:
-    """A line for each sensor, with standard uncertainties; of many sensors their median, the range of 90 % of them as a
-    band, and by name those that stand apart."""
+def d33_history(sensors: Sequence[SensorPoints], chosen: str | None = None) -> go.Figure:
+    """A line for each sensor, with 95 % intervals, or for the one that is `chosen`; of many sensors their median, the
+    range of 90 % of them as a band, by name those that stand apart, and the chosen one's line."""
     times = [time for entry in sensors for time in entry.times]
+    own = [(number, entry) for number, entry in enumerate(sensors) if chosen in (None, entry.sensor)]
     if is_summarised(len(sensors), len(times)):
-        return _finished(go.Figure(_most(sensors)), f"d33 of {len(sensors)} sensors over time", times, legend=False)
-    figure = go.Figure()
-    for number, entry in enumerate(sensors):
-        figure.add_scatter(
-            x=list(entry.times),
-            y=list(entry.d33_pc_per_n),
-            error_y={"type": "data", "array": list(entry.d33_uncertainty_pc_per_n), "thickness": 1, "width": 3},
-            mode="lines+markers",
-            name=label(entry.sensor),
-            line=line(number, 1.5),
-            marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
-            hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
-            f"± %{{error_y.array:.3g}} pC/N<br>{label(entry.trend)}<extra></extra>",
-        )
-    return _finished(figure, "d33 of each sensor over time", times, legend=len(sensors) > 1)
+        figure = go.Figure(_most(sensors))
+        figure.add_traces([_one(COLOURS.index(_CHOSEN), entry) for _, entry in own if chosen is not None])
+        return _finished(figure, f"d33 of {len(sensors)} sensors over time", times, legend=False)
+    figure = go.Figure([_one(number, entry) for number, entry in own])
+    return _finished(figure, "d33 of each sensor over time", times, legend=len(own) > 1)
+
+
+def _one(number: int, entry: SensorPoints) -> go.Scatter:
+    bars = [SDS_OF_95 * value for value in entry.d33_uncertainty_pc_per_n]
+    return go.Scatter(
+        x=list(entry.times),
+        y=list(entry.d33_pc_per_n),
+        ids=[entry.sensor] * len(entry.times),
+        error_y={"type": "data", "array": bars, "thickness": 1, "width": 3},
+        mode="lines+markers",
+        name=label(entry.sensor),
+        line=line(number, 1.5),
+        marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
+        hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
+        f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(entry.trend)}<extra></extra>",
+    )
 
 
 def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
-    """The band and the median of all sensors at each time, then the points of those that stand apart."""
+    """The band and the median of all sensors at each time, the points of those that stand apart, all points, faint, and
+    a line that is empty until one of them is pointed at."""
     at: dict[str, list[tuple[str, float, float]]] = {}
     for entry in sensors:
         for time, value, uncertainty in zip(
@@ -78,7 +88,8 @@ def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
         go.Scatter(
             x=[time for time, *_ in apart],
             y=[value for _, _, value, _ in apart],
-            error_y={"type": "data", "array": [row[3] for row in apart], "thickness": 1, "width": 3},
+            ids=[row[1] for row in apart],
+            error_y={"type": "data", "array": [SDS_OF_95 * row[3] for row in apart], "thickness": 1, "width": 3},
             mode="markers+text",
             name="stands apart",
             text=[label(sensor) for _, sensor, *_ in apart],
@@ -86,7 +97,32 @@ def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
             marker={"color": COLOURS[1], "symbol": "square", "size": 8},
             hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
         ),
+        *_each(sensors),
     ]  # fmt: skip
+
+
+def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
+    """All points, faint, with their sensors' ids, by which a page draws the line of the one that is pointed at."""
+    points = [
+        (time, value, entry.sensor)
+        for entry in sensors
+        for time, value in zip(entry.times, entry.d33_pc_per_n, strict=True)
+    ]
+    if len(points) > _MOST_FAINT:
+        return []
+    return [
+        go.Scatter(
+            x=[time for time, *_ in points],
+            y=[value for _, value, _ in points],
+            ids=[sensor for *_, sensor in points],
+            mode="markers",
+            name="every sensor",
+            marker={"color": "#8a949e", "size": 4, "opacity": 0.5},
+            text=[label(sensor) for *_, sensor in points],
+            hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
+        ),
+        go.Scatter(x=[], y=[], mode="lines+markers", name="pointed at", line={"color": _CHOSEN, "width": 2.5}),
+    ]
 
 
 def _finished(figure: go.Figure, title: str, times: Sequence[str], *, legend: bool) -> go.Figure:
@@ -94,5 +130,5 @@ def _finished(figure: go.Figure, title: str, times: Sequence[str], *, legend: bo
     moments = sorted(datetime.fromisoformat(time) for time in times)
     if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
         figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
-    figure.update_yaxes(title="d33 [pC/N]")
+    figure.update_yaxes(title="d33, 95 % [pC/N]")
     return styled(figure.update_layout(showlegend=legend), title)

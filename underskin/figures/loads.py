@@ -6,11 +6,11 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.array import Quantity, array_map
+from underskin.figures.array_map import Quantity, array_map
 from underskin.figures.style import styled
 from underskin.units import Floats
 
-_CHARGE = Quantity("charge", "pC")
+_CHARGE = Quantity("charge", "pC", "zero")
 
 
 def loaded_array(

@@ -1,14 +1,21 @@
 """Common style of all figures: the colours of Okabe and Ito, and Cividis, which colour-blind readers can tell apart."""
 
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+
+from underskin.errors import unequal_lengths
+from underskin.units import Floats
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 DASHES = ("solid", "dash", "dot", "dashdot")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
+SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows
 _LONGEST_LABEL = 60
 _AXIS = {
     "gridcolor": GRID,
@@ -58,3 +65,14 @@ def line(number: int, width: float) -> dict[str, Any]:
 def label(text: str) -> str:
     """A name from a campaign for plotly: shortened, with markup escaped."""
     return escape(text if len(text) <= _LONGEST_LABEL else text[: _LONGEST_LABEL - 1] + "…", quote=False)
+
+
+def as_columns(rows: Sequence[str], **columns: ArrayLike) -> list[Floats]:
+    """Columns as arrays (rows,); raises InvalidInput where a length differs from that of `rows`."""
+    arrays = []
+    for name, column in columns.items():
+        array = np.asarray(column, dtype=float)
+        if array.shape != (len(rows),):
+            raise unequal_lengths(name, array.size, len(rows), "rows")
+        arrays.append(array)
+    return arrays

@@ -1,12 +1,12 @@
 """The figures of a campaign's page, and their numbers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from threading import Lock
 from typing import Any
 from urllib.parse import quote
 
-from service.pages.shared.figures import Drawn, columns_of, drawn, drawn_curves, sensors_of
+from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_curves, sensors_of
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
@@ -36,7 +36,7 @@ def figures(
     makers: dict[str, Callable[[], list[Drawn]]] = {
         **({"curves": draw_curves} if curves else {}),
         f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
-        "d33": lambda: _d33(row, answer, numbers),
+        f"d33 {show}": lambda: _d33(row, answer, numbers, show),
     }
     all_figures = []
     for name, make in makers.items():
@@ -97,8 +97,10 @@ def _title(recording: FrfRecording, show: str) -> str:
     return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
 
 
-def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> list[Drawn]:
-    from underskin.figures.array import array_map, frf_versus_preload, response_per_sensor
+def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
+    """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
+    from underskin.figures.array import frf_versus_preload, response_per_sensor
+    from underskin.figures.array_map import array_map, told_apart
 
     if answer["band"] is None:
         return []
@@ -107,7 +109,8 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
     )
     array = answer["array"]
     limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
-    rows = numbers["recordings"]
+    sensor = show if show in names else None
+    rows = _of_sensor(numbers["recordings"], sensor)
     titles = [f"{name}, sensor {sensor}" for name, sensor in zip(rows["recording"], rows["sensor"], strict=True)]
     place, chosen = f"/campaigns/{row.id}", _chosen(answer)
     chosen = f"?{chosen}" if chosen else ""
@@ -115,19 +118,26 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any]) -> 
         drawn(
             "preload",
             frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
-            "FRF in the flat zone against preload, for each sphere; lines are the model with the array's d33.",
+            f"FRF in the flat zone against preload{'' if sensor is None else f' of {sensor}'}, for each sphere, with "
+            "95 % intervals; lines are the model with the array's d33, their dash the sphere's.",
             f"{place}/preload.csv{chosen}",
         ),
         drawn(
             "response",
-            response_per_sensor(names, d33, low, high, limits, reasons),
-            "d33 of each sensor with its 95 % interval.",
+            response_per_sensor(names, d33, low, high, limits, reasons, sensor),
+            f"d33 of each sensor with its 95 % interval. {CLICK}",
             f"{place}/d33.csv{chosen}",
         ),
         drawn(
             "map",
-            array_map(names, x_mm, y_mm, d33, uncertainty, reasons),
-            "Each sensor where it lies, coloured by its d33.",
+            array_map(names, x_mm, y_mm, d33, uncertainty, reasons, chosen=sensor),
+            f"Each sensor where it lies, coloured by its d33. {told_apart(d33, uncertainty)} {CLICK}",
             f"{place}/d33.csv{chosen}",
         ),
     ]
+
+
+def _of_sensor(columns: Mapping[str, Sequence[Any]], sensor: str | None) -> dict[str, list[Any]]:
+    """The rows of one sensor, or all."""
+    kept = [row for row, name in enumerate(columns["sensor"]) if sensor in (None, name)]
+    return {name: [values[row] for row in kept] for name, values in columns.items()}

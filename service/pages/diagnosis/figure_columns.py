@@ -56,7 +56,7 @@ def _where(figure: Mapping[str, Any]) -> FigureColumns:
     places = product(layout["yaxis"]["ticktext"], layout["xaxis"]["ticktext"])
     values = zip(places, _numbers(trace["z"]), _numbers(trace["customdata"]), strict=True)
     rows = [(x, y, None if np.isnan(value) else value, int(count)) for (y, x), value, count in values]
-    return _by_name((*heads, f"{trace['colorbar']['title']['text']}, measured above the model", "points"), rows)
+    return _by_name((*heads, layout["title"]["text"].removeprefix("Where: "), "points"), rows)
 
 
 def _before_after(figure: Mapping[str, Any]) -> FigureColumns:
@@ -80,6 +80,24 @@ def _curve(figure: Mapping[str, Any]) -> FigureColumns:
         for x, y in zip(_numbers(trace["x"]), _numbers(trace["y"]), strict=True):
             rows.append((meta["recording"], meta["shows"], _rounded(x * meta["mm"]), _rounded(y * meta["n"])))
     return _by_name(("recording", "shows", "depth_mm", "force_n"), rows)
+
+
+def _frf(figure: Mapping[str, Any]) -> FigureColumns:
+    """Every recording's lines, what models predict of them and leave, and the band of the noise."""
+    layout, meta = figure["layout"], figure["layout"]["meta"]
+    first = {axis: [trace[axis] for trace in figure["data"]] for axis in ("x", "y")}
+    buttons = [button for menu in layout.get("updatemenus", []) for button in menu["buttons"]]
+    own = [{**first, **button["args"][0]} for button in buttons] or [first]
+    rows: list[tuple[Any, ...]] = []
+    for name, sensor, numbers in zip(meta["recordings"], meta["sensors"], own, strict=True):
+        lines = zip(*map(_numbers, (numbers["x"][0], *numbers["y"])), strict=True)
+        rows += [(name, sensor, *line) for line in lines]
+    return _by_name(("recording", "sensor", "frequency_hz", *map(_with_unit, meta["shows"])), rows)
+
+
+def _with_unit(shows: str) -> str:
+    unit = "deg" if "phase" in shows else "percent" if " " in shows else "pc_per_n"
+    return f"{shows.replace(' ', '_')}_{unit}"
 
 
 def _rounded(value: float) -> float:
@@ -107,6 +125,7 @@ _OF_REPORT: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
 }
 _OF_FIGURE: dict[str, Callable[[Mapping[str, Any]], FigureColumns]] = {
     "where": _where,
+    "frf": _frf,
     "curve": _curve,
     "before_after": _before_after,
 }

@@ -31,16 +31,19 @@ if TYPE_CHECKING:
 router = APIRouter()
 
 _ABOUT = {
-    "where": "Each cell is the mean over the recordings in it, empty where there is none; the outlined region holds "
-    "most of the misfit.",
+    "where": "Each cell is the mean over the recordings in it, empty where there is none; steps of frequency are even "
+    "in its logarithm; the outlined region holds most of the misfit.",
+    "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
+    "predicted on the band that 95 % of the noise stays in. A double click shows residuals beyond the panel.",
     "curve": "One recording with the models before and after, the worst explained one first; below, measured less "
     "predicted. A double click shows all of the air, another one the contact.",
-    "before_after": "Each point a recording, or a part of its lines; the grey band is what noise alone allows.",
+    "before_after": "Each point a recording, or a part of its lines, both axes alike; the grey band holds 95 % of "
+    "the noise.",
     "explanations": "What the recordings say of each explanation, the stated one on top.",
     "sensors": "d33 of the sensors in each campaign, the mechanisms taken into account: each with its 95 % interval, "
     "of many sensors the median, the range of 90 % and those that stand apart.",
     "population": "Each skin's value with its 95 % interval on the grey band in which 95 % of such skins lie.",
-    "parameters": "What is known of each parameter: grey before the recordings, blue after them.",
+    "parameters": "Each parameter's most probable value and 95 % interval; beside it, what was known before.",
 }
 _ODD = (LookupError, TypeError, ValueError, AttributeError, UndefinedError)  # of a report that came with an import
 

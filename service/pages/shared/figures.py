@@ -18,6 +18,7 @@ from underskin.recordings.campaign import FrfRecording, Recording
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+CLICK = "Click a sensor to choose it."
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 

@@ -1,22 +1,21 @@
 """The figures of a skin's page: its array as a map, its sensors over time."""
 
 from collections.abc import Mapping, Sequence
-from statistics import median
 from typing import Any, Literal
 from urllib.parse import quote
 
-from service.pages.shared.figures import Drawn, columns_of, drawn, sensors_of
+from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensors_of
 from service.schemas.skins import History, SensorHistory
 from service.store import AnyRow
 
 Shown = Literal["d33", "uncertainty", "trend"]
 By = Literal["paper", "adopted"]
 
-# Column of the values, column of their uncertainties, name, unit, whether 0 is in the middle of the colours.
-_QUANTITIES = {
-    "d33": ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33", "pC/N", False),
-    "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", False),
-    "trend": ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "trend", "pC/N a year", True),
+# Column of the values, column of their uncertainties, name, unit, what colours are compared against.
+_QUANTITIES: dict[Shown, tuple[str, str, str, str, Literal["others", "zero", "nothing"]]] = {
+    "d33": ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33", "pC/N", "others"),
+    "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", "nothing"),
+    "trend": ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "trend", "pC/N a year", "zero"),
 }
 _RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
 
@@ -27,25 +26,20 @@ def map_rows(row: AnyRow, answer: Mapping[str, Any], history: History) -> list[d
     return [{**sensor, **trends.get(sensor["sensor"], {})} for sensor in sensors_of(row, answer)]
 
 
-def drawn_map(root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By) -> Drawn:
-    """The sensors of `map_rows` where they lie."""
-    from underskin.figures.array import Quantity, array_map
+def drawn_map(
+    root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
+) -> Drawn:
+    """The sensors of `map_rows` where they lie, one of them chosen."""
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
-    value, uncertainty, name, unit, diverging = _QUANTITIES[show]
+    value, uncertainty, name, unit, against = _QUANTITIES[show]
+    quantity = Quantity(name, unit, against)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     values, uncertainties = columns_of(rows, value, uncertainty)
-    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, Quantity(name, unit, diverging))
-    about = f"Each sensor where it lies, coloured by {name}, in the latest campaign, {row.name}, {_RESTS[by]}."
-    known = [entry for entry in rows if entry["d33_pc_per_n"] is not None]
-    if show == "d33" and known:
-        about += f" {_range(known)}"
+    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)
+    about = f"Each sensor where it lies, coloured by {name}, in the latest campaign, {row.name}, {_RESTS[by]}. "
+    about += f"{told_apart(values, uncertainties, quantity)} {CLICK}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
-
-
-def _range(known: Sequence[Mapping[str, Any]]) -> str:
-    """How far apart the ends of the colours are, and how sure each value is."""
-    values, uncertainties = columns_of(known, "d33_pc_per_n", "d33_uncertainty_pc_per_n")
-    return f"They go from {min(values):.3g} to {max(values):.3g} pC/N, each ± {median(uncertainties):.2g}."
 
 
 def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
@@ -53,7 +47,6 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
     from underskin.figures.history import SensorPoints, d33_history, is_summarised
 
     numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
-    chosen = [entry for entry in history.sensors if sensor in (None, entry.sensor)]
     points = [
         SensorPoints(
             entry.sensor,
@@ -62,15 +55,16 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
             [point.d33_uncertainty_pc_per_n for point in entry.points],
             _trend_in_words(entry),
         )
-        for entry in chosen
+        for entry in history.sensors
     ]
-    about = f"d33 of each sensor in every campaign, {_RESTS[by]}, ± its uncertainty."
-    if is_summarised(len(chosen), sum(len(entry.points) for entry in chosen)):
+    whose = "each sensor" if sensor is None else sensor
+    about = f"d33 of {whose} in every campaign, {_RESTS[by]}, with its 95 % interval."
+    if is_summarised(len(points), sum(len(entry.times) for entry in points)):
         about = (
             f"Median d33 over the sensors in each campaign, {_RESTS[by]}, the range of 90 % of them, and by name those "
-            "that stand apart."
+            f"that stand apart{'' if sensor is None else f'; the line is {sensor}'}. Point at a sensor for its line."
         )
-    return drawn("history", d33_history(points), about, numbers)
+    return drawn("history", d33_history(points, sensor), about, numbers)
 
 
 def _trend_in_words(entry: SensorHistory) -> str:

@@ -18,7 +18,7 @@ from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_
 from service.problems import validated
 from service.schemas.campaign_d33 import D33Value
 from service.schemas.diagnoses import AskForSkin, DiagnosisKind
-from service.schemas.skins import Join
+from service.schemas.skins import History, Join
 from service.store import (
     AnyRow,
     Database,
@@ -93,7 +93,7 @@ def skin(
     mapped = by_model if by == "adopted" else answer
     figures = []
     if last is not None and mapped is not None and mapped["sensors"]:
-        figures.append(drawn_map(root, last, map_rows(last, mapped, history), show, by))
+        figures.append(drawn_map(root, last, map_rows(last, mapped, history), show, by, sensor))
     if history.sensors:
         figures.append(drawn_history(root, history, sensor, by))
     path = f"/v1/skins/{quote(root, safe='')}"
@@ -118,6 +118,7 @@ def skin(
         why_not=why_not,
         change=change_percent(overview.of_array(answer), overview.of_array(by_model)),
         by=by,
+        of_sensor=_of_sensor(history, sensor),
         figures=figures,
         show=show,
         sensor=sensor,
@@ -132,6 +133,12 @@ def skin(
     if waiting:
         made.background = BackgroundTask(d33_cache.complete, store, table, root)
     return made
+
+
+def _of_sensor(history: History, sensor: str | None) -> dict[str, float]:
+    """d33 [pC/N] of a sensor in each campaign, by the campaign's id."""
+    chosen = [entry for entry in history.sensors if entry.sensor == sensor]
+    return {point.campaign_id: point.d33_pc_per_n for entry in chosen for point in entry.points}
 
 
 def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[AnyRow]:

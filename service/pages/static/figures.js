@@ -12,7 +12,9 @@ function document_of(plot) {
 function as_chosen(figure, list) {
   if (!list) return figure;
   const [changed, layout] = figure.layout.updatemenus[0].buttons[list.value].args;
-  figure.data.forEach((trace, index) => (trace.visible = changed.visible[index]));
+  for (const [name, values] of Object.entries(changed)) {
+    figure.data.forEach((trace, index) => (trace[name] = values[index]));
+  }
   for (const [path, value] of Object.entries(layout)) {
     const keys = path.split(".");
     const last = keys.pop();
@@ -41,6 +43,29 @@ async function draw(plot) {
   if (plot.dataset.drawn) return;
   plot.dataset.drawn = "yes";
   await redraw(plot);
+  plot.on("plotly_click", ({ points: [point] }) => choose_sensor(point.id));
+  plot.on("plotly_hover", ({ points: [point] }) => point_at(point.id));
+}
+
+// A sensor that is clicked in any figure is the one that the page's list would choose.
+function choose_sensor(id) {
+  const list = document.querySelector("[data-sensors]");
+  if (id === undefined || ![...(list?.options ?? [])].some((option) => option.value === id)) return;
+  list.value = id;
+  submit(list);
+}
+
+// A sensor that is pointed at in any figure gets its line, where a figure shows many.
+function point_at(id) {
+  for (const plot of document.querySelectorAll(".plot[data-drawn]")) {
+    const line = plot.data?.findIndex((trace) => trace.name === "pointed at");
+    if (id === undefined || !(line > -1) || plot.dataset.pointed === id) continue;
+    plot.dataset.pointed = id;
+    const every = plot.data.find((trace) => trace.name === "every sensor");
+    const own = every.ids.flatMap((name, index) => (name === id ? [index] : []));
+    const column = (name) => [own.map((index) => every[name][index])];
+    Plotly.restyle(plot, { x: column("x"), y: column("y"), ids: [own.map(() => id)], text: column("text") }, [line]);
+  }
 }
 
 // With the JSON as it is now.
@@ -85,10 +110,24 @@ function prepare(root) {
     plot.style.minHeight = `${plot.dataset.height}px`;
     seen.observe(plot);
   }
-  for (const list of root.querySelectorAll("[data-choice]")) {
-    list.addEventListener("change", () => redraw(list.closest("figure").querySelector(".plot")));
-  }
+  for (const list of root.querySelectorAll("[data-choice]")) choose(list);
   for (const button of root.querySelectorAll("[data-save]")) button.addEventListener("click", () => save(button));
+}
+
+// One after another, by the list, or by the buttons beside it.
+function choose(list) {
+  const figure = list.closest("figure");
+  const steps = [...figure.querySelectorAll("[data-step]")];
+  list.addEventListener("change", () => {
+    for (const step of steps) step.disabled = !list.options[list.selectedIndex + Number(step.dataset.step)];
+    redraw(figure.querySelector(".plot"));
+  });
+  for (const step of steps) {
+    step.addEventListener("click", () => {
+      list.selectedIndex += Number(step.dataset.step);
+      list.dispatchEvent(new Event("change"));
+    });
+  }
 }
 
 async function save(button) {

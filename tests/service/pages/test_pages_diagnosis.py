@@ -131,7 +131,7 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
     reader.drawn(5)
     reader.require_accessible()
     names = [button.name for button in figure.layout.updatemenus[0].buttons]
-    listed = page.get_by_role("combobox", name="Recording")
+    listed = page.locator("#figure-curve").get_by_role("combobox", name="Recording")
     assert listed.locator("option").all_inner_texts() == names
     of_plot = "document.querySelector('#figure-curve .plot').data.filter((t) => t.visible).map((t) => t.meta.recording)"
     seen = []
@@ -148,6 +148,44 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
     (trace,) = [one for one in figure.data if (one.meta["recording"], one.meta["shows"]) == ("c01", "pull-off")]
     assert float(mark["depth_mm"]) == pytest.approx(float(trace.x[0]) * trace.meta["mm"], rel=1e-5)
     assert float(mark["force_n"]) == pytest.approx(float(trace.y[0]) * trace.meta["n"], rel=1e-5)
+
+
+WIDTHS = [1180, 390]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_models_are_laid_over_one_frf_after_another_with_keys(
+    reader: Visit, idle: Server, made: Made, width: int
+) -> None:
+    page = reader.page
+    page.set_viewport_size({"width": width, "height": 800})
+    place = f"/diagnoses/{keep(idle, resonant(f'frf{width}', lines=LINES), made, f'frf{width}')}"
+    reader.go(place)
+    reader.drawn(5)
+    reader.require_accessible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    figure = page.locator("#figure-frf")
+    assert "95 % of the noise" in figure.inner_text()
+    rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
+    names = list(dict.fromkeys(row["recording"] for row in rows))
+    assert len(names) == 12
+    assert len(rows) == 12 * LINES
+    of_plot = "document.querySelector('#figure-frf .plot').data[0].y[0]"
+    listed, back, on = figure.locator("select"), *(figure.get_by_role("button", name=n) for n in ("Previous", "Next"))
+    assert back.is_disabled()
+    for number, key in ((1, "list"), (2, "Next"), (3, "Next"), (2, "Previous")):
+        if key == "list":
+            listed.focus()
+            page.keyboard.press("ArrowDown")
+        else:
+            (on if key == "Next" else back).focus()
+            page.keyboard.press("Enter")
+        (first, *_) = [row for row in rows if row["recording"] == names[number]]
+        page.wait_for_function(f"Math.abs({of_plot} - {first['measured_pc_per_n']}) < 1e-9")
+        assert listed.locator("option").nth(number).inner_text().startswith(f"{names[number]} ({first['sensor']}, ")
+        assert listed.input_value() == str(number)
+    listed.select_option(str(len(names) - 1))
+    assert on.is_disabled()
 
 
 def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Server) -> None:

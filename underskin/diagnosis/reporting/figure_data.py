@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.data.axes import recording_axes
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
@@ -18,6 +19,8 @@ from underskin.units import Array, Complexes, Floats, Indices
 _MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
+_ALMOST_ALL = 0.9  # of the gaps between neighbouring lines that are no wider than a step
+_SLACK = 1e-9  # of a step, for lines on its edge
 _SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a residual
 
 
@@ -58,12 +61,13 @@ class Thinned:
         self.problem = problem
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(lines.mechanisms[name].needs_lines for name in shown.names)
-        distinct, line = np.unique(np.round(lines.frequency, 6), return_inverse=True)
-        bins = min(len(distinct), max(_MOST_POINTS // lines.recordings, _LEAST_BINS)) if by_line else 1
-        key = lines.recording * bins + line.reshape(-1) * bins // len(distinct)
+        most = max(_MOST_POINTS // lines.recordings, _LEAST_BINS) if by_line else 1
+        place = _steps_of_samples(lines.frequency, most) if lines.curves else _steps_of_lines(lines, most)
+        bins = int(place.max()) + 1
         self.by_line = by_line
-        self._used, self._point = np.unique(key, return_inverse=True)
+        self._used, self._point = np.unique(lines.recording * bins + place, return_inverse=True)
         self.recording = self._used // bins
+        self._bin = self._used % bins
         self._weight = lines.deviation**-2.0
         self._total = np.bincount(self._point, self._weight)
 
@@ -87,12 +91,27 @@ class Thinned:
         """The axis in steps; None where all points lie at one."""
         column = axis_values(self.lines, axis, True)
         assert column is not None
+        if axis == "frequency_hz":
+            return self._of_lines(column)
         if column.dtype.kind != "U":
             column = self._mean(column)
             return _stepped(column) if np.ptp(column) > 0 else None
         first = np.unique(self._point, return_index=True)[1]
         names, step = np.unique(column[first], return_inverse=True)
         return Levels(step.reshape(-1), names.tolist(), names, names) if len(names) > 1 else None
+
+    def _of_lines(self, frequency: Floats) -> Levels | None:
+        """The steps that all recordings have in common, neighbouring ones together where they are too many."""
+        distinct, step = np.unique(self._bin, return_inverse=True)
+        steps = min(len(distinct), _MOST_LEVELS)
+        if steps < 2:
+            return None
+        step = step.reshape(-1) * steps // len(distinct)
+        of_row = step[self._point]
+        low, high = np.full(steps, np.inf), np.zeros(steps)
+        np.minimum.at(low, of_row, frequency)
+        np.maximum.at(high, of_row, frequency)
+        return Levels(step, [_short(np.sqrt(a * b)) for a, b in zip(low, high, strict=True)], low, high)
 
     def axes(self) -> list[str]:
         """The axes that the points can be laid out along, those of the rows first."""
@@ -114,6 +133,26 @@ class Thinned:
 
     def _complex_mean(self, column: Complexes) -> Complexes:
         return self._mean(column.real) + 1j * self._mean(column.imag)
+
+
+def _steps_of_samples(place: Floats, most: int) -> Indices:
+    """Steps of like counts of distinct places, of each sample (rows,)."""
+    distinct, number = np.unique(np.round(place, 6), return_inverse=True)
+    steps: Indices = number.reshape(-1) * min(len(distinct), most) // len(distinct)
+    return steps
+
+
+def _steps_of_lines(lines: Lines, most: int) -> Indices:
+    """Steps even in the logarithm of frequency, the same for all recordings, of each line (rows,): so wide that nearly
+    every recording has a line in each."""
+    positive = lines.frequency[lines.frequency > 0]
+    log = np.log(np.maximum(lines.frequency, np.min(positive, initial=np.inf)))
+    low, high = (log.min(), log.max()) if len(positive) else (0.0, 0.0)
+    same = lines.recording[1:] == lines.recording[:-1]
+    widest = float(np.quantile(np.diff(log)[same], _ALMOST_ALL)) if same.any() else np.inf
+    count = int(min(most, round((high - low) / widest) + 1)) if 0 < widest < np.inf else 1
+    place = np.minimum((log - low) / ((high - low) or 1.0) * count + _SLACK, count - 1).astype(np.intp)
+    return np.unique(place, return_inverse=True)[1].reshape(-1)
 
 
 def _stepped(column: Floats) -> Levels:

@@ -19,9 +19,12 @@ from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.curve_data import shown_curves
 from underskin.diagnosis.reporting.curve_figure import curve_figure
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
+from underskin.diagnosis.reporting.frf_data import shown_frfs
+from underskin.diagnosis.reporting.frf_figure import frf_figure
 from underskin.diagnosis.reporting.numbers import multiple_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
+from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unnamed.laws import in_plain_words
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
@@ -31,11 +34,12 @@ _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#BBBBBB"
 _SIGMAS = 1.96  # of a 95 % interval
 _MOST_LABELLED = 80  # cells of a map that show their number
 _BAND = 60  # points along a band
-_ROW, _BETWEEN = 110, 0.65  # height of a parameter's row [pixels], and the share of it that labels need
+_EDGE, _BESIDE = 0.04, 1.0  # of what is shown: room at an axis' ends, and beside an interval
+_ROW, _BETWEEN = 120, 0.68  # height of a parameter's row [pixels], and the share of it that labels need
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name: where, curve, before_after, explanations, parameters; those that it has. `document`: its report."""
+    """By name, those there are: where, frf or curve, before_after, explanations, parameters. `document`: its report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
     nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
@@ -49,6 +53,9 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
     }
     if diagnosis.curves is not None:
         drawn["curve"] = _curve(diagnosis.problem, diagnosis.curves, nothing, shown)
+    elif not diagnosis.problem.lines.curves:
+        recordings = shown_frfs(diagnosis.problem, nothing, shown)
+        drawn["frf"] = frf_figure(recordings, *_models(diagnosis.problem, shown))
     if any(entry["parameters"] for entry in document["mechanisms"]):
         drawn["parameters"] = parameter_intervals(diagnosis.problem, shown, document)
     return drawn
@@ -56,9 +63,13 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
 
 def _curve(problem: FittingProblem, recorded: Campaign, nothing: Explanation, shown: Explanation) -> go.Figure:
     """Each curve with the model before and after; with one of them where nothing is added."""
+    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, *_models(problem, shown))
+
+
+def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
+    """What the models before and after are called; before empty where nothing is added."""
     simplest = SIMPLEST[problem.kind]
-    before, after = (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
-    return curve_figure(shown_curves(problem, recorded, nothing, shown), problem.kind, before, after)
+    return (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
 
 
 def explanations(document: Mapping[str, Any]) -> go.Figure:
@@ -115,7 +126,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         texttemplate="%{z:+.0f}" if size <= _MOST_LABELLED else None,
         xgap=1,
         ygap=1,
-        colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
+        colorbar={"title": {"text": f"{name}, above +, below − [%]", "side": "right"}},
         hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
     )
     for entry, axis, update in ((x, x_axis, figure.update_xaxes), (y, y_axis, figure.update_yaxes)):
@@ -125,7 +136,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": "#000000", "width": 3})
     figure.update_layout(
-        title=f"Where: measured above {SIMPLEST[thinned.lines.kind]} [%]",
+        title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}, in percent of it",
         height=170 + 40 * max(4, min(len(y.names), 12)),
     )
     return _styled(figure)
@@ -139,8 +150,18 @@ def before_and_after(
         1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"), shared_yaxes=True
     )
     _, name = _part(diagnosis, before.measured)
+    ends = [
+        end
+        for points in (before, after)
+        for column in (points.predicted, points.measured)
+        for end in (_part(diagnosis, column)[0].min(), _part(diagnosis, column)[0].max())
+    ]
+    room = _EDGE * (max(ends) - min(ends))
+    whole = [float(min(ends) - room), float(max(ends) + room)]
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
-    for place, (points, colour, marker) in enumerate(((before, _ORANGE, "square"), (after, _BLUE, "circle")), start=1):
+    for place, (points, colour, marker) in enumerate(
+        ((before, _ORANGE, "square-open"), (after, _BLUE, "circle")), start=1
+    ):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # Where all predictions are alike the band would have no width along the abscissa.
@@ -174,8 +195,11 @@ def before_and_after(
             col=place,
         )
     unit = "force [N]" if thinned.lines.curves else f"FRF, {name} [pC/N]"
-    figure.update_xaxes(title=f"predicted {unit}")
+    figure.update_xaxes(title=f"predicted {unit}", range=whole)
     figure.update_yaxes(title=f"measured {unit}", col=1)
+    for place in (1, 2):
+        figure.update_yaxes(range=whole, scaleanchor=f"x{place}", constrain="domain", row=1, col=place)
+        figure.update_xaxes(constrain="domain", row=1, col=place)
     figure.update_layout(
         title="Measured against predicted",
         height=470,
@@ -186,30 +210,30 @@ def before_and_after(
 
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
-    """Each parameter's 95 % interval (blue) on that of its prior (grey), in its own unit."""
+    """Each parameter's 95 % interval in its own unit, and in words that of its prior, which would hide it."""
     places = own_places(shown.names, problem.lines)
     rows = [
         (entry["name"], parameter, prior, multiple_of(shown, prior))
         for entry in document["mechanisms"]
         for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
     ]
-    titles = [f"{name.replace('_', ' ')}: {_labelled(entry)}" for name, entry, *_ in rows]
+    titles = [
+        f"{name.replace('_', ' ')}: {_labelled(entry)}<br><sup>{_before(prior, scale, entry['unit'])}</sup>"
+        for name, entry, prior, scale in rows
+    ]
     figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
-    for place, (_, entry, prior, scale) in enumerate(rows, start=1):
-        widest = [scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975)]
-        for ends, colour, width, label in (
-            (widest, _GREY, 14, "before the recordings (prior), 95 %"),
-            ([entry["low"], entry["high"]], _BLUE, 8, "after them, 95 %"),
-        ):
-            figure.add_scatter(
-                x=ends, y=[0, 0], mode="lines", line={"color": colour, "width": width}, name=label,
-                showlegend=place == 1, row=place, col=1,
-            )  # fmt: skip
+    for place, (_, entry, *_) in enumerate(rows, start=1):
+        low, high = entry["low"], entry["high"]
+        figure.add_scatter(
+            x=[low, high], y=[0, 0], mode="lines", line={"color": _BLUE, "width": 8}, name="95 % interval",
+            showlegend=place == 1, row=place, col=1,
+        )  # fmt: skip
         figure.add_scatter(
             x=[entry["value"]], y=[0], mode="markers", name="most probable", showlegend=place == 1,
             marker={"color": "#000000", "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=place, col=1,
         )  # fmt: skip
-        figure.update_xaxes(type="log" if prior.scale == "log" else "linear", row=place, col=1)
+        beside = _BESIDE * (high - low) or 0.1 * abs(low) or 1.0
+        figure.update_xaxes(range=[low - beside, high + beside], row=place, col=1)
     figure.update_yaxes(visible=False, range=[-1, 1])
     figure.update_layout(
         title="What the recordings say of the parameters",
@@ -230,6 +254,12 @@ def _labelled(entry: Mapping[str, Any]) -> str:
     unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
     interval = f"{entry['value']:.3g} ({entry['low']:.3g} to {entry['high']:.3g}){unit}"
     return f"{entry['name'].replace('_', ' ')} {interval}"
+
+
+def _before(prior: Parameter, scale: float, unit: str) -> str:
+    """What was known before the recordings, in words."""
+    low, high = (scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975))
+    return f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"
 
 
 def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:

@@ -27,9 +27,22 @@ const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updat
 const label = document.createElement("label"), list = label.appendChild(document.createElement("select"));
 label.prepend("Recording ");
 for (const button of buttons) list.add(new Option(button.name));
-list.addEventListener("change", () => Plotly.update(plot, ...buttons[list.selectedIndex].args));
+const show = () => {
+  Plotly.update(plot, ...buttons[list.selectedIndex].args);
+  steps.forEach((step, index) => (step.disabled = list.selectedIndex === [0, buttons.length - 1][index]));
+};
+const steps = ["Previous", "Next"].map((text, index) => {
+  const step = Object.assign(document.createElement("button"), { type: "button", textContent: text });
+  step.addEventListener("click", () => {
+    list.selectedIndex += [-1, 1][index];
+    show();
+  });
+  return step;
+});
+list.addEventListener("change", show);
+steps[0].disabled = true;
 Plotly.relayout(plot, {"updatemenus[0].visible": false});
-plot.before(label);
+plot.before(label, " ", steps[0], " ", steps[1]);
 """  # stands in for a figure's own menu, which only a pointer can open
 
 _FILTERS = (

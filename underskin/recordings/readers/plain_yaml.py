@@ -61,6 +61,7 @@ def document(stream: BinaryIO) -> dict[str, Any]:
 def _require_plain(written: str) -> None:
     """Refuses references, of which a few lines can stand for any amount of data, and what is nested too deeply."""
     depth = 0
+    event: Any  # marks of the C loader have a type of their own
     for event in yaml.parse(written, Loader=_Base):
         if isinstance(event, yaml.AliasEvent):
             raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", event.start_mark)

@@ -1,0 +1,117 @@
+"""Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference."""
+
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Query, Request, Response
+
+from service.dependencies import Store, Table
+from service.pages.shared import same_request
+from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, sensors_of
+from service.pages.shared.html import page
+from service.store import AnyRow, Database, campaigns
+from service.usecases import d33_cache
+from underskin.surrogate.sigma_table import SigmaTable
+
+router = APIRouter(prefix="/compare")
+
+_MOST_LISTED = 200
+_COLUMNS = (
+    "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
+    "difference_pc_per_n", "difference_uncertainty_pc_per_n",
+)  # fmt: skip
+
+Chosen = Annotated[str, Query(max_length=200)]
+
+
+@router.get("")
+def compare(
+    request: Request, store: Store, table: Table, first: Chosen = "", second: Chosen = "", skin: Chosen = ""
+) -> Response:
+    """Of the campaigns `first` and `second`; where either is not named, the oldest and the latest listed of `skin`."""
+    with store.reading() as connection:
+        filters = campaigns.CampaignFilters(skin=skin or None, state="current")
+        listed = campaigns.listed(connection, filters, None, _MOST_LISTED)
+        if listed:
+            first, second = first or listed[-1].id, second or listed[0].id
+        both = [campaigns.find(connection, one) for one in (first, second) if one]
+    listed = [*listed, *(row for row in both if row.id not in {one.id for one in listed})]
+    answers = [d33_cache.answer(store, table, row, None) for row in both]
+    rows = _rows(answers)
+    return page(
+        request,
+        "compare.html",
+        skin=skin,
+        listed=listed,
+        first=first,
+        second=second,
+        both=both,
+        rows=rows,
+        figures=_figures(both, answers, rows),
+        same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
+    )
+
+
+@router.get("/difference.csv")
+def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Response:
+    """d33 of each sensor in both campaigns, and the second less the first."""
+    return csv_of_rows("difference", _COLUMNS, _rows([_answer(store, table, one) for one in (first, second)]))
+
+
+def _answer(store: Database, table: SigmaTable, campaign_id: str) -> dict[str, Any]:
+    return d33_cache.answer(store, table, store.read(campaigns.find, campaign_id), None)
+
+
+def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Of each sensor of two campaigns; those of one alone have no difference."""
+    if len(answers) < 2:
+        return []
+    of_sensor: dict[str, dict[str, Any]] = {}
+    for which, answer in zip(("first", "second"), answers, strict=True):
+        for entry in answer["sensors"]:
+            row = of_sensor.setdefault(entry["sensor"], dict.fromkeys(_COLUMNS) | {"sensor": entry["sensor"]})
+            row[f"{which}_pc_per_n"] = entry["d33_pc_per_n"]
+            row[f"{which}_uncertainty_pc_per_n"] = entry["d33_uncertainty_pc_per_n"]
+    for row in of_sensor.values():
+        if None not in (row["first_pc_per_n"], row["second_pc_per_n"]):
+            row["difference_pc_per_n"] = row["second_pc_per_n"] - row["first_pc_per_n"]
+            both = row["first_uncertainty_pc_per_n"], row["second_uncertainty_pc_per_n"]
+            row["difference_uncertainty_pc_per_n"] = float(np.hypot(*both))
+    return list(of_sensor.values())
+
+
+def _figures(
+    both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
+) -> list[Drawn]:
+    """The maps of both in the same colours, and that of the difference."""
+    from underskin.figures.array_map import Quantity, array_map, told_apart
+
+    if not rows or not all(answer["sensors"] for answer in answers):
+        return []
+    values = [row[f"{which}_pc_per_n"] for row in rows for which in ("first", "second")]
+    known = [value for value in values if value is not None]
+    ends = min(known), max(known)
+    maps = []
+    for name, row, answer in zip(("first", "second"), both, answers, strict=True):
+        own = sensors_of(row, answer)
+        names, x_mm, y_mm, reasons = columns_of(own, "sensor", "x_mm", "y_mm", "reasons")
+        d33, uncertainty = columns_of(own, "d33_pc_per_n", "d33_uncertainty_pc_per_n")
+        figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, Quantity("d33", "pC/N", "nothing", ends))
+        figure.update_layout(title=f"d33, {name}")
+        maps.append(drawn(f"map-{name}", figure, f"{row.name}, skin {row.skin_id}; colours as on the other map."))
+    places = {sensor["id"]: sensor for row in both for sensor in row.about["skin"]["sensors"]}
+    shared = [row for row in rows if row["difference_pc_per_n"] is not None]
+    if not shared:
+        return maps
+    names, gap, uncertainty = columns_of(
+        shared, "sensor", "difference_pc_per_n", "difference_uncertainty_pc_per_n"
+    )  # by id, since skins of one make have their arrays in common
+    x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
+    quantity = Quantity("difference of d33", "pC/N", "zero")
+    figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity)
+    about = (
+        f"The second's d33 less the first's, 0 in the middle of the colours. {told_apart(gap, uncertainty, quantity)}"
+    )
+    place = f"/compare/difference.csv?first={both[0].id}&second={both[1].id}"
+    return [*maps, drawn("map-difference", figure, about, place)]

@@ -1,0 +1,106 @@
+"""The array as navigation: a sensor that is clicked is the one that FRF, history, table and map show."""
+
+import pytest
+from playwright.sync_api import Locator
+
+from tests.service.pages.conftest import Visit
+from tests.support.diagnosed import sent, table
+from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.store_server import Server
+from underskin.recordings.campaign import to_dict
+
+WIDTHS = [1180, 390]
+
+
+@pytest.fixture(params=WIDTHS)
+def lab(reader: Visit, request: pytest.FixtureRequest) -> Visit:
+    """Somebody on the example's page."""
+    reader.page.set_viewport_size({"width": request.param, "height": 800})
+    reader.go("/")
+    reader.page.get_by_role("button", name="Load the example skin").click()
+    reader.page.wait_for_url("**/skins/example")
+    reader.drawn(2)
+    return reader
+
+
+def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
+    """Where a sensor's disc is drawn in the window [pixels], once it is in view."""
+    plot = figure.locator(".plot")
+    plot.scroll_into_view_if_needed()
+    x, y = plot.evaluate(
+        """(plot, sensor) => {
+        const trace = plot._fullData.find((one) => one.ids?.includes(sensor)), row = trace.ids.indexOf(sensor);
+        const { xaxis, yaxis } = plot._fullLayout, box = plot.getBoundingClientRect();
+        return [box.left + xaxis._offset + xaxis.d2p(trace.x[row]), box.top + yaxis._offset + yaxis.d2p(trace.y[row])];
+        }""",
+        sensor,
+    )
+    return float(x), float(y)
+
+
+def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visit) -> None:
+    page = lab.page
+    page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))
+    page.wait_for_url("**sensor=s03*")
+    lab.drawn(2)
+    lab.require_accessible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= page.evaluate("innerWidth")
+    assert page.get_by_label("Sensor", exact=True).input_value() == "s03"
+    history = page.locator("#figure-history .plot").evaluate("plot => plot.data.map((trace) => trace.name)")
+    assert history == ["s03"]
+    rings = page.locator("#figure-map .plot").evaluate("plot => plot.layout.shapes.map((disc) => disc.line.width)")
+    assert [number for number, width in enumerate(rings) if width == max(rings)] == [2]
+    assert page.get_by_role("columnheader", name="d33 of s03").count() == 1
+    page.get_by_role("link", name="example, after six months").click()
+    page.wait_for_url("**show=s03*")
+    lab.drawn(4)
+    lab.require_accessible()
+    assert page.locator("#figure-frf .legend .traces").count() == 8
+    assert page.locator("tr.chosen th").all_inner_texts() == ["s03"]
+    points = page.locator("#figure-preload .plot").evaluate("plot => plot.data.flatMap((one) => one.text ?? [])")
+    assert {text.rpartition(" ")[2] for text in points} == {"s03"}
+    page.mouse.click(*place_of(page.locator("#figure-map"), "s05"))
+    page.wait_for_url("**show=s05*")
+    page.get_by_role("link", name="History of s05").click()
+    page.wait_for_url("**sensor=s05*")
+
+
+def test_the_map_says_who_differs_and_prints_who_is_who(lab: Visit) -> None:
+    figure = lab.page.locator("#figure-map")
+    assert "beyond chance" in figure.locator("figcaption").inner_text()
+    drawn = figure.locator(".plot .textpoint").all_text_contents()
+    assert sorted(drawn) == [f"s{number:02d}" for number in range(1, 9)]
+
+
+def test_the_same_is_chosen_with_keys(lab: Visit) -> None:
+    page = lab.page
+    page.get_by_label("Sensor", exact=True).focus()
+    page.keyboard.press("s")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    page.wait_for_url("**sensor=s01*")
+
+
+def test_every_page_says_that_its_bars_are_95_percent(lab: Visit) -> None:
+    page = lab.page
+    title = "plot => plot.layout.yaxis.title.text"
+    assert "95 %" in page.locator("#figure-history .plot").evaluate(title)
+    page.get_by_role("link", name="example, after six months").click()
+    lab.drawn(4)
+    for name in ("preload", "response"):
+        assert "95 %" in page.locator(f"#figure-{name} .plot").evaluate(title)
+
+
+def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit, idle: Server) -> None:
+    made = Made(sensors=14, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6)
+    sent(idle, to_dict(campaign(made, table())), "many")
+    page = reader.page
+    reader.go("/skins/many")
+    reader.drawn(2)
+    history = page.locator("#figure-history .plot")
+    assert history.evaluate("plot => plot.layout.showlegend") is False
+    pointed = "document.querySelector('#figure-history .plot').data.find((one) => one.name === 'pointed at')"
+    assert page.evaluate(f"{pointed}.x.length") == 0
+    for sensor in ("s4", "s9"):
+        page.mouse.move(*place_of(page.locator("#figure-map"), sensor))
+        page.wait_for_function(f"{pointed}.ids?.[0] === {sensor!r}")

@@ -1,0 +1,183 @@
+"""The map of an array: a disc for each sensor where it lies, coloured by d33 or another quantity, with its id."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any, Literal
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
+from plotly.colors import sample_colorscale
+
+from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
+from underskin.inversion.beyond_chance import differ_from_others, differ_from_zero, threshold
+from underskin.units import Floats, Mask
+
+_SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
+_ALONE_MM = 1.0  # radius where there is no other
+_ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
+_MOST_WITH_ID, _LONGEST_ID = 100, 6
+_DARK = 0.45  # luminance below which an id is written in white
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a map shows of each sensor.
+
+    `against`: `others` greys what does not differ from the others beyond chance, and the colours reach at least as far
+    as chance does; `zero` the same from 0, with 0 in the middle of the colours; `nothing` colours from 0 upwards, or
+    between `ends`, which several maps may have in common.
+    """
+
+    name: str
+    unit: str
+    against: Literal["others", "zero", "nothing"] = "others"
+    ends: tuple[float, float] | None = None
+
+
+D33 = Quantity("d33", "pC/N")
+
+
+def array_map(
+    sensors: Sequence[str],
+    x_mm: ArrayLike,
+    y_mm: ArrayLike,
+    values: ArrayLike,
+    uncertainties: ArrayLike,
+    reasons: Sequence[str],
+    quantity: Quantity = D33,
+    chosen: str | None = None,
+) -> go.Figure:
+    """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor stands out, empty otherwise,
+    `chosen` is ringed.
+
+    Raises InvalidInput where a column's length differs from that of `sensors`.
+    """
+    x, y, value, uncertainty = as_columns(sensors, x_mm=x_mm, y_mm=y_mm, values=values, uncertainties=uncertainties)
+    coloured = _coloured(value, uncertainty, quantity)
+    scale, low, high = _scale(value, uncertainty, quantity)
+    place = np.clip((value - low) / ((high - low) or 1.0), 0.0, 1.0)
+    colours = [
+        sample_colorscale(scale, [float(place[row])])[0] if coloured[row] else _ALIKE if known else _UNKNOWN
+        for row, known in enumerate(np.isfinite(value).tolist())
+    ]
+    plain = np.array([not reason for reason in reasons])
+    figure = go.Figure()
+    for name, own in (("differs", coloured & plain), ("alike", ~coloured & plain), ("stands out", ~plain)):
+        if own.any():
+            rows = np.flatnonzero(own).tolist()
+            figure.add_scatter(
+                x=x[own],
+                y=y[own],
+                ids=[sensors[row] for row in rows],
+                mode="markers+text" if len(sensors) <= _MOST_WITH_ID else "markers",
+                name=_names(quantity)[name],
+                text=[_id(sensors[row]) for row in rows],
+                textfont={"size": 12 if len(sensors) <= 16 else 9, "color": [_ink(colours[row]) for row in rows]},
+                customdata=[_told(sensors[row], reasons[row], value[row], uncertainty[row], quantity) for row in rows],
+                hovertemplate="%{customdata}<br>x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
+                # In the middle of its disc, in the disc's colour: it carries the colours' scale and the legend.
+                marker={
+                    "size": 6,
+                    "color": value[own] if name == "differs" else [colours[row] for row in rows],
+                    **({"colorscale": scale, "cmin": low, "cmax": high} if name == "differs" else {}),
+                    **({"colorbar": _bar(quantity)} if name == "differs" else {}),
+                    "symbol": "circle" if name != "stands out" else "x",
+                    "line": {"width": 0},
+                },
+            )
+    radius = _radius(x, y)
+    discs = []
+    for row, name in enumerate(sensors):
+        ring = (
+            {"color": INK, "width": 4}
+            if name == chosen
+            else {"color": COLOURS[1], "width": 3}
+            if reasons[row]
+            else None
+        )
+        disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
+        line = ring or {"color": "#5b6670", "width": 1}
+        discs.append({"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", **disc})
+    figure.update_layout(shapes=discs, showlegend=len(figure.data) > 1)
+    for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
+        update(range=[float(along.min()) - 1.3 * radius, float(along.max()) + 1.3 * radius])
+    figure.update_xaxes(title="x [mm]", constrain="domain")
+    figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain")
+    return styled(figure, f"{quantity.name} over the array")
+
+
+def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity = D33) -> str:
+    """A sentence: how many sensors differ beyond chance, and what grey means; empty where nothing is compared."""
+    value, uncertainty = np.asarray(values, dtype=float), np.asarray(uncertainties, dtype=float)
+    count, known = int(_coloured(value, uncertainty, quantity).sum()), int(np.isfinite(value).sum())
+    if quantity.against == "nothing" or known < 2:
+        return ""
+    what = "the others" if quantity.against == "others" else "0"
+    if count == 0:
+        return f"Grey: no sensor's differs from {what} beyond chance (5 % over the whole array)."
+    return f"{count} of {known} differ from {what} beyond chance (5 % over the whole array); the others are grey."
+
+
+def _names(quantity: Quantity) -> dict[str, str]:
+    what = "the others" if quantity.against == "others" else "0"
+    alike = "not known" if quantity.against == "nothing" else f"not different from {what}"
+    return {"differs": quantity.name, "alike": alike, "stands out": "stands out"}
+
+
+def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
+    if quantity.against == "nothing":
+        return np.isfinite(value)
+    return (differ_from_others if quantity.against == "others" else differ_from_zero)(value, uncertainty)
+
+
+def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str, float, float]:
+    """The colours' scale, and the values at its ends: as far as the values go, and at least as far as chance does."""
+    known = value[np.isfinite(value)]
+    if quantity.ends is not None:
+        return "Cividis", *quantity.ends
+    if len(known) == 0:
+        return "Cividis", 0.0, 1.0
+    if quantity.against == "nothing":
+        return "Cividis", 0.0, float(known.max()) or 1.0
+    middle = 0.0 if quantity.against == "zero" else float(np.median(known))
+    sure = uncertainty[np.isfinite(uncertainty)]
+    by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
+    reach = max(float(np.abs(known - middle).max()), by_chance) or 1.0
+    return "PuOr_r" if quantity.against == "zero" else "Cividis", middle - reach, middle + reach
+
+
+def _radius(x: Floats, y: Floats) -> float:
+    """Of all discs [mm]."""
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    apart = apart[apart > 0]
+    return _SHARE * float(apart.min()) if len(apart) else _ALONE_MM
+
+
+def _bar(quantity: Quantity) -> dict[str, Any]:
+    return {"title": {"text": f"{quantity.name} [{quantity.unit}]", "side": "right"}}
+
+
+def _id(name: str) -> str:
+    return label(name if len(name) <= _LONGEST_ID else name[: _LONGEST_ID - 1] + "…")
+
+
+def _told(name: str, reason: str, value: float, uncertainty: float, quantity: Quantity) -> str:
+    """What is said of a sensor under the pointer."""
+    text = f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)
+    if not np.isfinite(value):
+        return f"{text}<br>{quantity.name} not known"
+    text += f"<br>{quantity.name} {value:.5g} {quantity.unit}"
+    if quantity.against == "nothing" or not np.isfinite(uncertainty):
+        return text
+    half = SDS_OF_95 * uncertainty
+    return f"{text}<br>95 %: {value - half:.4g} to {value + half:.4g}"
+
+
+def _ink(colour: str) -> str:
+    """In which an id can be read on a colour."""
+    if colour.startswith("#"):
+        return INK
+    red, green, blue = (float(part) / 255 for part in colour.removeprefix("rgb(").removesuffix(")").split(","))
+    return "#ffffff" if 0.2126 * red + 0.7152 * green + 0.0722 * blue < _DARK else INK
