@@ -61,14 +61,14 @@ def document(stream: BinaryIO) -> dict[str, Any]:
 def _require_plain(written: str) -> None:
     """Refuses references, of which a few lines can stand for any amount of data, and what is nested too deeply."""
     depth = 0
-    event: Any  # marks of the C loader have a type of their own
     for event in yaml.parse(written, Loader=_Base):
+        mark: Any = event.start_mark  # of the C loader, of another type than of Python's
         if isinstance(event, yaml.AliasEvent):
-            raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", event.start_mark)
+            raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", mark)
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > _MOST_NESTED:
             problem = f"lists and mappings are nested more than {_MOST_NESTED} deep"
-            raise yaml.composer.ComposerError(None, None, problem, event.start_mark)
+            raise yaml.composer.ComposerError(None, None, problem, mark)
 
 
 def _as_json(value: Any) -> Any:
