@@ -28,8 +28,8 @@ from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Floats
 
 SEED, COUNT = 53961, 500
-_FIRST = 76  # campaigns in which every slip is committed
-_SELDOM = ("all conjugated", "a third conjugated", "warm-up, falling")
+_FIRST = 90  # campaigns in which every slip is committed
+_SELDOM = ("labels exchanged", "cables exchanged", "all conjugated", "a third conjugated", "warm-up, falling")
 _SINGLE = (7, 12)  # of so many campaigns hide one effect: only some effects turn a phase that can be conjugated
 _PLACES = 24  # draws of places
 _SLIPS = {reason for _, reasons in SLIPS.values() for reason in reasons}
