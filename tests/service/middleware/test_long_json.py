@@ -127,7 +127,8 @@ def test_a_batch_in_all_digits_is_answered(server: Server) -> None:
     short = httpx.post(
         server.url + "/v1/sigma", json={"a_over_h": [0.30000000000000004, 1.7000000000000002], "rt_over_h": 0.6}
     )
-    assert found["sigma"] == short.json()["sigma"] * (LARGE // 42)
+    assert found["sigma"][:2] == pytest.approx(short.json()["sigma"], rel=1e-12)
+    assert found["sigma"] == found["sigma"][:2] * (LARGE // 42)
     assert set(found["status"]) == {"ok"}
 
 
