@@ -48,8 +48,9 @@ independent finite-element code is compared in `tests/surrogate/test_felupe.py`.
 writes JSON by orjson and calls SciPy's `NdBSpline` on the same table (`bench/peers/plain_sigma.py`).""",
     "requests": """8 connections, the server on one core and the load on the other, against the `umbridge` package's own
 server and Tesseract Core's runtime, each serving the same spline.""",
-    "bodies": """One body of JSON after another, answered or refused, the server and the processes that it starts on one core;
-every 10 ms `/health` is asked. Memory is what the server and these processes take beyond what the server had before.""",
+    "bodies": """One body of JSON after another, answered or refused, the server and what it starts on one core; every
+10 ms `/health` is asked. Memory is what the server and its processes take beyond what the server had before. Processor
+time is what the server itself spent within one of these requests: it does not depend on other work of the machine.""",
     "start": "From starting the process to the first answer of `/ready`; resident memory after load.",
     "newton": "One Newton step at equal unknowns, on one core.",
     "orderings": "Factors of one step's matrix, on one core.",

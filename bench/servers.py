@@ -55,6 +55,12 @@ class Server:
         return json.loads(text)
 
 
+def processor_s(pid: int) -> float:
+    """Processor time of a process so far, without the processes that it started."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 @contextmanager
 def underskin(data: Path | None = None) -> Iterator[Server]:
     """Our service as `make serve` starts it; what it keeps is in `data`, or gone at the end."""

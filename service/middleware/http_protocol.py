@@ -68,8 +68,8 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         super().on_message_complete()
 
     def waits_for_client_s(self) -> float | None:
-        """As `Connection`; a client that does not take its answer keeps the server waiting, too."""
-        if self._is_at_work() or self.flow.read_paused or self.transport.is_closing():
+        """As `Connection`."""
+        if self._is_turn_of_server() or self.transport.is_closing():
             return None
         return self.loop.time() - self._heard
 
@@ -84,9 +84,11 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         else:
             self.transport.close()
 
-    def _is_at_work(self) -> bool:
-        """Whether a request is being answered."""
-        return self.cycle is not None and not self.cycle.response_complete and not self._in_body
+    def _is_turn_of_server(self) -> bool:
+        """Whether a request is being answered, or the server does not take more of its body now."""
+        if self.cycle is None or self.cycle.response_complete:
+            return False
+        return not self._in_body or self.flow.read_paused or self.cycle.waiting_for_100_continue
 
     def _others(self) -> list["LimitedHttpProtocol"]:
         """The other connections that are open."""
@@ -115,7 +117,7 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         """End the connection where the client has made no progress for too long."""
         now = self.loop.time()
         unsent = self.transport.get_write_buffer_size()
-        if unsent != self._unsent:
+        if unsent != self._unsent or (not unsent and self._is_turn_of_server()):
             self._unsent, self._progress = unsent, now
         if now - self._progress <= self.limits.idle_s:
             return
@@ -123,9 +125,9 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             self._end("idle_answer", "takes no part of its answer")
         elif self.transport.is_closing():
             return
-        elif self._in_head and not self._is_at_work():
+        elif self._in_head:
             self._end("idle_headers", "does not end its headers")
-        elif self._in_body and not self.flow.read_paused:
+        elif self._in_body:
             if self.limits.is_body_too_slow(self._body_bytes):
                 self._end("idle_body", "sends next to nothing of its body")
             else:
@@ -135,11 +137,12 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self.limits.reached(
             limit, f"a client {what} for {self.limits.idle_s:g} s (UNDERSKIN_IDLE_SECONDS): disconnected"
         )
-        if limit != "idle_answer" and not (self.cycle is not None and self.cycle.response_started):
-            self.transport.write(b"".join((STATUS_LINE[408], b"connection: close\r\ncontent-length: 0\r\n\r\n")))
-            self.transport.close()
-        else:
+        if limit == "idle_answer" or (self.cycle is not None and self.cycle.response_started):
             self.transport.abort()
+            return
+        if self._in_body or self._head_bytes:  # who has said nothing is told nothing
+            self.transport.write(b"".join((STATUS_LINE[408], b"connection: close\r\ncontent-length: 0\r\n\r\n")))
+        self.transport.close()
 
 
 def limited(limits: ConnectionLimits) -> type[LimitedHttpProtocol]:

@@ -1,5 +1,6 @@
 """Long bodies of JSON are parsed in a process of their own: in this one they would hold up all other requests."""
 
+import sys
 import tempfile
 from typing import Any, BinaryIO
 
@@ -11,7 +12,7 @@ from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.recordings.readers.sandbox import call_apart
 
 LONG_BYTES = 1_000_000  # beyond which a body is parsed apart: up to here it takes some hundredths of a second
-MOST_NUMBERS = 2_000_000  # in one list: an answer takes many times the memory of a column
+_MOST_NUMBERS = 2_000_000  # in one list of a body: its answer takes many times the memory of a column
 _READ = "underskin.recordings.readers.long_json:read"
 _MOST_PLAIN_BYTES = 12_000_000  # beside long lists of numbers: this part goes through this process's parser
 _MEMORY_TIMES, _LEAST_MEMORY_BYTES = 5, 150_000_000  # of the parsing process; the body itself is held here
@@ -22,15 +23,15 @@ class NotJson(Exception):
 
 
 def document_of(body: bytes) -> Any:
-    """What a JSON body holds, long lists of numbers as arrays; raises as `read`."""
+    """What a JSON body holds, long lists of numbers as arrays; raises as `read`, and 413 where a list is too long."""
     with tempfile.TemporaryFile() as stream:
         stream.write(body)
         stream.flush()
-        return read(stream)
+        return read(stream, _MOST_NUMBERS)
 
 
-def read(stream: BinaryIO) -> Any:
-    """What an open JSON file holds, long lists of numbers as arrays.
+def read(stream: BinaryIO, most_numbers: int = sys.maxsize) -> Any:
+    """What an open JSON file holds, long lists of numbers as arrays; `most_numbers` may be in one.
 
     Raises NotJson, Refusal 422 where a key comes twice, and 413 where it takes too much memory or time.
     """
@@ -38,13 +39,16 @@ def read(stream: BinaryIO) -> Any:
     memory_bytes = max(_LEAST_MEMORY_BYTES, _MEMORY_TIMES * size)
     limits = ParsingLimits(memory_bytes, ParsingLimits.from_environment().seconds)
     try:
-        found = call_apart(_READ, stream, "body", str(_MOST_PLAIN_BYTES), what="JSON", limits=limits)
+        most = str(_MOST_PLAIN_BYTES), str(most_numbers)
+        found = call_apart(_READ, stream, "body", *most, what="JSON", limits=limits)
     except FileError as error:
         raise _too_large(f"cannot be read: {error.reason}") from None
     if "plain" in found:
         raise _too_large(
             f"has {found['plain'] / 1e6:.1f} MB beside its long lists of numbers; {_MOST_PLAIN_BYTES / 1e6:g} MB may be"
         )
+    if "numbers" in found:
+        raise _too_large(f"has a list of {found['numbers']:,} numbers; {most_numbers:,} may be in one")
     if "invalid" in found:
         line, column, wrong = found["invalid"]
         raise NotJson(f"line {line}, column {column}: {wrong}")
@@ -54,21 +58,12 @@ def read(stream: BinaryIO) -> Any:
 
 
 def as_lists(value: Any) -> Any:
-    """The same with lists in place of arrays; raises Refusal 413 where one is too long for that."""
+    """The same with lists in place of arrays."""
     if isinstance(value, dict):
         return {name: as_lists(entry) for name, entry in value.items()}
     if isinstance(value, list):
         return [as_lists(entry) for entry in value]
-    if isinstance(value, np.ndarray):
-        require_few(value)
-        return value.tolist()
-    return value
-
-
-def require_few(column: np.ndarray[Any, Any]) -> None:
-    """Refuses an array of more numbers than can be answered at once."""
-    if column.size > MOST_NUMBERS:
-        raise _too_large(f"has a list of {column.size:,} numbers; {MOST_NUMBERS:,} may be in one")
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _too_large(reason: str) -> Refusal:

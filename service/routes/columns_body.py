@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic_core import from_json
 
-from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of, require_few
+from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
@@ -91,9 +91,7 @@ def _long_json(kind: type[ColumnsRequest], body: bytes) -> Any:
     if not isinstance(document, dict):
         return as_lists(document)
     for name, value in document.items():
-        if isinstance(value, np.ndarray) and kind.is_column(name):
-            require_few(value)
-        else:
+        if not kind.is_column(name):
             document[name] = as_lists(value)
     return document
 

@@ -23,12 +23,16 @@ _NO_MEMORY = "Not enough memory"  # how orjson says it
 _DEEPEST = 200  # lists and objects in each other, which is what can be answered
 
 
-def read(stream: BinaryIO, most_plain: str) -> dict[str, Any]:
+def read(stream: BinaryIO, most_plain: str, most_numbers: str) -> dict[str, Any]:
     """One of: `document`; `invalid`, the line, the column and what is wrong there; `repeated`, a key and its second
-    place; `plain`, the bytes beside long lists of numbers where they are more than `most_plain`."""
+    place; `plain`, the bytes beside long lists of numbers where they are more than `most_plain`; `numbers`, how many
+    are in a list that has more than `most_numbers`."""
     body = stream.read().removeprefix(_BOM)
     mark = secrets.token_hex(16)  # nothing in the document can pass for a list that was cut out
-    text, arrays = _cut(body, mark)
+    try:
+        text, arrays = _cut(body, mark, int(most_numbers))
+    except _TooMany as error:
+        return {"numbers": error.count}
     if len(text) > int(most_plain):
         return {"plain": len(text)}
     try:
@@ -42,15 +46,20 @@ def read(stream: BinaryIO, most_plain: str) -> dict[str, Any]:
     return {"document": _with_arrays(document, mark, arrays, 0)}
 
 
-def _cut(body: bytes, mark: str) -> tuple[bytes, list[Floats]]:
-    """The document with a string in place of each long list of numbers, and these lists."""
+class _TooMany(Exception):
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+
+def _cut(body: bytes, mark: str, most_numbers: int) -> tuple[bytes, list[Floats]]:
+    """The document with a string in place of each long list of numbers, and these lists; raises _TooMany."""
     kept: list[bytes] = []
     arrays: list[Floats] = []
     behind = 0
     for part in _PARTS.finditer(body):
         if part[0] == b'"':
             break
-        array = None if part[1] is None else _numbers(body, *part.span(1))
+        array = None if part[1] is None else _numbers(body, *part.span(1), most_numbers)
         if array is not None:
             kept += body[behind : part.start()], b'"%b:%d"' % (mark.encode(), len(arrays))
             arrays.append(array)
@@ -58,9 +67,12 @@ def _cut(body: bytes, mark: str) -> tuple[bytes, list[Floats]]:
     return b"".join((*kept, body[behind:])), arrays
 
 
-def _numbers(body: bytes, start: int, end: int) -> Floats | None:
-    """The numbers between two commas each; None where the list is not as JSON has it."""
-    numbers = np.empty(body.count(b",", start, end) + 1)
+def _numbers(body: bytes, start: int, end: int, most: int) -> Floats | None:
+    """The numbers between two commas each; None where the list is not as JSON has it. Raises _TooMany."""
+    count = body.count(b",", start, end) + 1
+    if count > most:
+        raise _TooMany(count)
+    numbers = np.empty(count)
     filled = 0
     while start <= end:
         comma = body.find(b",", min(start + _PIECE, end), end)

@@ -62,13 +62,16 @@ def _require_plain(written: str) -> None:
     """Refuses references, of which a few lines can stand for any amount of data, and what is nested too deeply."""
     depth = 0
     for event in yaml.parse(written, Loader=_Base):
-        mark: Any = event.start_mark  # of the C loader, of another type than of Python's
         if isinstance(event, yaml.AliasEvent):
-            raise yaml.composer.ComposerError(None, None, "references (*name) are not allowed", mark)
+            raise _refused(event, "references (*name) are not allowed")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > _MOST_NESTED:
-            problem = f"lists and mappings are nested more than {_MOST_NESTED} deep"
-            raise yaml.composer.ComposerError(None, None, problem, mark)
+            raise _refused(event, f"lists and mappings are nested more than {_MOST_NESTED} deep")
+
+
+def _refused(event: yaml.Event, problem: str) -> FileError:
+    place = f"line {event.start_mark.line + 1}" if event.start_mark else ""
+    return FileError("", place, f"not YAML: {problem}")
 
 
 def _as_json(value: Any) -> Any:
