@@ -11,7 +11,7 @@ import pytest
 from service.routes.columns_body import XLSM, XLSX
 from tests.service.routes.test_service_columns import SKIN
 
-POINTS = [["a_over_h", "rt_over_h"], [0.3, 0.6], [0.5, 0.6], [99.0, 0.6]]
+POINTS: list[list[Any]] = [["a_over_h", "rt_over_h"], [0.3, 0.6], [0.5, 0.6], [99.0, 0.6]]
 MEASURED: list[list[Any]] = [
     ["id", *SKIN, "preload_n", "frf_pc_per_n"],
     ["p1", *SKIN.values(), 1.0, 6.8],
