@@ -74,11 +74,13 @@ def newest(folder: Path) -> Kept | None:
 
 
 def foreign(store: Database, folder: Path) -> str:
-    """That a folder is for the backups of another store, in words; empty where it is not."""
+    """That a folder is for the backups of another store, or perhaps is, in words; empty where it is not."""
     try:
         owner = (folder / OWNER).read_text().strip()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return ""
+    except OSError as error:
+        return f"whose backups {folder} holds cannot be read ({OWNER}: {error.strerror})"
     own = store.read(identity.find)
     if owner == own:
         return ""

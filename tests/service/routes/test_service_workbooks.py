@@ -11,7 +11,7 @@ import pytest
 from service.routes.columns_body import XLSM, XLSX
 from tests.service.routes.test_service_columns import SKIN
 
-POINTS = [["a_over_h", "rt_over_h"], [0.3, 0.6], [0.5, 0.6], [99.0, 0.6]]
+POINTS: list[list[Any]] = [["a_over_h", "rt_over_h"], [0.3, 0.6], [0.5, 0.6], [99.0, 0.6]]
 MEASURED: list[list[Any]] = [
     ["id", *SKIN, "preload_n", "frf_pc_per_n"],
     ["p1", *SKIN.values(), 1.0, 6.8],
@@ -62,7 +62,7 @@ def test_of_several_sheets_one_must_be_named(http: httpx.Client) -> None:
 
 
 def test_what_is_wrong_in_a_cell_is_said_as_of_csv(http: httpx.Client) -> None:
-    for rows in ([POINTS[0], POINTS[1], ["much", 0.6]], [["a_over_h", "b_over_h"], [0.3, 1.0]]):
+    for rows in ([POINTS[0], POINTS[1], ["much", 0.6]], [["a_over_h", "b_over_h"], [0.3, 1.5]]):
         of_csv = send(http, "/v1/sigma", as_csv(rows), "text/csv")
         of_sheet = send(http, "/v1/sigma", workbook({"Only": rows}), XLSX)
         assert of_csv.status_code == of_sheet.status_code == 422
