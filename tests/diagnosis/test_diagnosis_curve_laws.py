@@ -1,6 +1,7 @@
 """Laws that nobody listed on indentation curves: found, with their numbers, where they are; quiet where nothing is."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -83,11 +84,27 @@ LAWS: Mapping[str, tuple[dict[str, Change], str, str, set[str], dict[str, float]
 }  # fmt: skip
 
 
+SOFTER: Mapping[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}  # on the way back
+
+
+@pytest.fixture(scope="module")
+def reports(table: SigmaTable) -> Callable[[str], dict[str, Any]]:
+    """The report on a campaign with a law of `LAWS`, or with `SOFTER` (by no name), made once for all tests here."""
+
+    def made(name: str) -> dict[str, Any]:
+        whole = campaign(LAWS[name][0]) if name else campaign(SOFTER, held_s=5.0)
+        return diagnosis_report(parse(whole), table)
+
+    return cache(made)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
-def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(name: str, table: SigmaTable) -> None:
-    changes, acts_on, axis, forms, true = LAWS[name]
-    report = diagnosis_report(parse(campaign(changes)), table)
+def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(
+    name: str, reports: Callable[[str], dict[str, Any]]
+) -> None:
+    _, acts_on, axis, forms, true = LAWS[name]
+    report = reports(name)
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
     law = report["unnamed"]
@@ -114,9 +131,10 @@ def turned(travel: Floats) -> Floats:
 
 
 @pytest.mark.slow
-def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(table: SigmaTable) -> None:
-    softer: dict[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}
-    report = diagnosis_report(parse(campaign(softer, held_s=5.0)), table)
+def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(
+    reports: Callable[[str], dict[str, Any]],
+) -> None:
+    report = reports("")
     law = report["unnamed"]
     assert (law["acts_on"], law["axis"], law["form"]) == ("modulus", "time_s", "step")
     assert law["expression"].startswith("F = F0·(1 − 0.0")
@@ -180,11 +198,14 @@ def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: Sig
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_of_curves_is_kept_and_recognised_by_name(
-    name: str, table: SigmaTable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    reports: Callable[[str], dict[str, Any]],
+    table: SigmaTable,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     changes = LAWS[name][0]
-    found = diagnosis_report(parse(campaign(changes)), table)
-    (tmp_path / "kept.yaml").write_text(document(found, "our_law"), encoding="utf-8")
+    (tmp_path / "kept.yaml").write_text(document(reports(name), "our_law"), encoding="utf-8")
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
     CATALOGUE.reload()
     try:
@@ -200,11 +221,11 @@ def test_a_law_of_curves_is_kept_and_recognised_by_name(
 
 
 @pytest.mark.slow
-def test_a_step_where_the_sphere_turns_back_cannot_be_kept(table: SigmaTable) -> None:
-    softer: dict[str, Change] = {"factor": lambda travel, _: -0.04 * turned(travel)}
-    report = diagnosis_report(parse(campaign(softer, held_s=5.0)), table)
+def test_a_step_where_the_sphere_turns_back_cannot_be_kept(
+    reports: Callable[[str], dict[str, Any]],
+) -> None:
     with pytest.raises(InvalidInput, match="turns back is no expression"):
-        document(report, "softer_back")
+        document(reports(""), "softer_back")
 
 
 def indentations(whole: Campaign) -> list[IndentationRecording]:

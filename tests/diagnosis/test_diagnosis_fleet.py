@@ -21,6 +21,8 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
+pytestmark = pytest.mark.usefixtures("skins_diagnosed_once")
+
 
 def population(fleet: dict[str, Any], parameter: str) -> dict[str, Any]:
     (entry,) = [one for one in fleet["population"] if one["parameter"] == parameter]

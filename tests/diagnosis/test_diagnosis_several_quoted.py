@@ -80,6 +80,7 @@ def test_a_skin_in_which_the_fleet_finds_more_than_its_own_diagnosis_is_not_quot
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("skins_diagnosed_once")
 def test_of_a_skin_of_two_recordings_alone_no_d33_is_quoted(table: SigmaTable) -> None:
     skins = {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(3)}
     whole = made("few", seed=60)
@@ -88,6 +89,7 @@ def test_of_a_skin_of_two_recordings_alone_no_d33_is_quoted(table: SigmaTable) -
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("skins_diagnosed_once")
 def test_the_statement_of_a_fleet_ends_with_it_and_names_quantities_in_words(table: SigmaTable) -> None:
     skins = {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(3)}
     fleet = diagnose_fleet(skins | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")

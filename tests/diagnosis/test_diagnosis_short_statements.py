@@ -1,7 +1,8 @@
 """Statements have three sentences at most, whatever there is to say; what they leave out stands elsewhere."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 SEED = 940501
 
 Report = dict[str, Any]
+Making = Callable[[SigmaTable], Iterator[Report]]
 
 
 def sentences(statement: str) -> list[str]:
@@ -71,18 +73,24 @@ def by_skin(campaigns: list[Campaign]) -> dict[str, list[Campaign]]:
     return {str(one.skin.id): [other for other in campaigns if other.skin.id == one.skin.id] for one in campaigns}
 
 
+@pytest.fixture(scope="module")
+def made(table: SigmaTable) -> Callable[[Making], list[Report]]:
+    """The reports of one of the functions above, which several tests read and none changes."""
+    return cache(lambda making: list(making(table)))
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("reports", [of_lines, with_slips, of_curves, of_several])
-def test_a_statement_has_three_sentences_at_most(reports: Any, table: SigmaTable) -> None:
-    seen = list(reports(table))
+@pytest.mark.parametrize("making", [of_lines, with_slips, of_curves, of_several])
+def test_a_statement_has_three_sentences_at_most(making: Making, made: Callable[[Making], list[Report]]) -> None:
+    seen = made(making)
     assert len(seen) >= 6
     long = [report["statement"] for report in seen if not 1 <= len(sentences(report["statement"])) <= 3]
     assert long == []
 
 
 @pytest.mark.slow
-def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None:
-    begun = [report for report in with_slips(table) if report["verdict"] != "insufficient_data"]
+def test_a_slip_that_decides_comes_before_the_verdict(made: Callable[[Making], list[Report]]) -> None:
+    begun = [report for report in made(with_slips) if report["verdict"] != "insufficient_data"]
     decided = [report for report in begun if "apart from that, " in sentences(report["statement"])[0]]
     assert len(decided) >= 5
     for report in decided:
@@ -91,8 +99,8 @@ def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None
 
 
 @pytest.mark.slow
-def test_what_a_statement_does_not_say_stands_on_the_page(table: SigmaTable) -> None:
-    for report in of_lines(table):
+def test_what_a_statement_does_not_say_stands_on_the_page(made: Callable[[Making], list[Report]]) -> None:
+    for report in made(of_lines):
         shown = " ".join(re.sub(r"<[^>]+>", " ", page(report)).replace("&#39;", "'").replace("&#34;", '"').split())
         assert all(" ".join(CATALOGUE[entry["name"]].plain.split()) in shown for entry in report["mechanisms"])
         if report["d33"] is not None:
