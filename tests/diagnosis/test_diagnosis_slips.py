@@ -93,16 +93,17 @@ def test_a_sensor_at_a_tenth_is_left_out_and_a_spread_of_sensors_is_not(good: Ca
     assert named(inspect(changed(good, lambda entry, _: times(entry, spread[entry.sensor])), table)) == []
 
 
-@pytest.mark.parametrize(("share", "word"), [(0.75, "weak"), (1.35, "strong")])
+@pytest.mark.parametrize(("share", "word"), [(0.75, "weak"), (1.35, "strong"), (2.0, "strong")])
 def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float, word: str, table: SigmaTable) -> None:
     six = campaign(Made(sensors=6), table)
     wrong = changed(six, lambda entry, _: times(entry, share if entry.sensor == "s3" else 1.0))
     report = diagnosis_report(wrong, table)
     (finding,) = [entry for entry in report["findings"] if entry["code"] in ("weak", "strong")]
     assert finding["code"] == word
-    told = re.match(r"sensor 's3' responds with ([0-9.]+) of the others' charge", finding["statement"])
+    told = re.match(r"sensor 's3' responds with ([0-9.]+) times the others' charge", finding["statement"])
     assert told
     assert float(told[1]) == pytest.approx(share, rel=0.04)
+    assert ("peak-to-peak beside amplitudes" in finding["statement"]) == (share == 2.0)
     assert report["verdict"] == "no_mismatch"
     assert report["statement"].startswith("Sensor 's3' responds with ")
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]

@@ -108,6 +108,13 @@ def test_a_heading_of_its_own_is_guessed_by_its_unit_from_what_the_table_lacks(
     )
 
 
+def test_a_table_of_frfs_without_its_skin_is_told_what_is_missing() -> None:
+    rows = "".join(f"r1,s01,4,1.0,0.09,{hz},7.1,-0.5\n" for hz in range(10, 40, 5))
+    assert "the first of them schema,campaign/1" in refusal(HEADINGS + rows).reason
+    block = "Stroke [mm];Load [N]\n0;0\n0,1;5\n0,2;10\n"
+    assert "schema,campaign/1" not in refusal(block).reason
+
+
 @pytest.mark.parametrize("said", ["p-p", "peak-to-peak", "pp", "RMS"])
 def test_a_force_that_is_no_amplitude_is_not_taken_for_one(said: str) -> None:
     reason = refusal(changed("dynamic_force_n", f"Dynamic force {said} [N]")).reason

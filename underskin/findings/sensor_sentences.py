@@ -1,15 +1,20 @@
 """Sentences of findings on sensors: one that stands alone, exchanged labels and cables, two that fail together."""
 
+import math
 from collections.abc import Sequence
 
 from underskin.findings.sentences import listed
 
+_AS_A_SLIP = 0.05  # of the logarithm of a factor beside that of 2 or of a half
+
 
 def sensor_alone(sensor: str, share: float, recordings: int) -> str:
     """A sensor at another level than all others, which are alike."""
+    doubled = min(abs(math.log(share / 2)), abs(math.log(2 * share))) < _AS_A_SLIP
+    causes = "its own d33, its cable, or peak-to-peak beside amplitudes" if doubled else "its own d33 or its cable"
     return (
-        f"sensor {sensor!r} responds with {share:.2f} of the others' charge, and they are alike: its own d33 or its "
-        f"cable; taken to their level by this factor ({recordings} recordings)"
+        f"sensor {sensor!r} responds with {share:.2f} times the others' charge, and they are alike: {causes}; "
+        f"taken to their level by this factor ({recordings} recordings)"
     )
 
 

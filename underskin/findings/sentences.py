@@ -83,8 +83,8 @@ def all_conjugated(lag_us: float | None) -> str:
             "changed"
         )
     return (
-        "the phase over frequency is one that no sensor or amplifier can have unless it is turned: the FRFs look "
-        "conjugated, in the convention e^(-iωt); all were conjugated back"
+        "the phase over frequency is one that no sensor or amplifier can have unless its sign is reversed: the FRFs "
+        "look conjugated, in the convention e^(-iωt); all were conjugated back"
     )
 
 

@@ -13,12 +13,13 @@ from underskin.recordings import rig_mapping
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, RecordingProblem, from_dict
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.readers import formats
+from underskin.recordings.readers import formats, template_columns
 from underskin.recordings.readers.sandbox import call_apart, parse_apart
 from underskin.recordings.rig_description import RigDescription
 
 _SHEET_TEXT = "underskin.recordings.readers.xlsx_file:sheet_text"
 _LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
+_TEMPLATE = "; below lines about the skin, the first of them schema,campaign/1, it would be the CSV template"
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,16 @@ def understood(contents: Contents | Document, name: str, rig: RigDescription | N
     if rig is None:
         layout = f" ({contents.layout})" if contents.layout else ""
         reason = f"a rig description must say what its channels are; it has {contents.described()}{layout}"
-        raise FileError(name, "", reason)
+        raise FileError(name, "", f"{reason}{_TEMPLATE}" if _holds_frfs(contents) else reason)
     mapped = rig_mapping.apply(rig, contents, name)
     return Reading(*from_dict(mapped.document), mapped.warnings, mapped.taken)
+
+
+def _holds_frfs(contents: Contents) -> bool:
+    """Whether a channel is headed as the FRF of the CSV template is."""
+    names = {channel.name for block in contents.blocks for channel in block.channels}
+    meant = [template_columns.field_of(one, template_columns.PARTS) for one in names]
+    return any(one is not None and one[0] in (template_columns.MAGNITUDE, *template_columns.PARTS) for one in meant)
 
 
 def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
