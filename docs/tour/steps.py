@@ -51,10 +51,8 @@ def _diagnosis(page: Page) -> None:
 
 
 def _better(page: Page) -> None:
-    drawn(page, "before_after")
-    page.get_by_role("heading", name="How much better").evaluate(
-        "heading => heading.scrollIntoView({ behavior: 'instant' })"
-    )
+    drawn(page, "frf")
+    page.locator("#figure-frf .choice").evaluate("list => list.scrollIntoView({ behavior: 'instant' })")
 
 
 def _adopted(page: Page) -> None:
@@ -100,9 +98,10 @@ STEPS = (
     TourStep(
         "skin",
         "A skin",
-        "*Load the example skin* leads here: the array as a map, coloured by d33, its uncertainty or its trend, and "
-        "each sensor over time. Point at anything for exact values. Every figure is saved as SVG or PNG, its numbers "
-        "as CSV; *The same by request*, at the foot of each page, is what your own program would send.",
+        "*Load the example skin* leads here: the array as a map, coloured by d33, its uncertainty or its trend, "
+        "grey where it differs by chance, and each sensor over time. Click a sensor to choose it. Point at "
+        "anything for exact values. Every figure is saved as SVG or PNG, its numbers as CSV; *The same by "
+        "request*, at the foot of each page, is what your own program would send.",
         _example,
     ),
     TourStep(
@@ -132,10 +131,12 @@ STEPS = (
     TourStep(
         "better",
         "How much better",
-        "The error with the explanation and without, on recordings that it was not fitted to, beside what noise alone "
-        "gives; measured against predicted, before and after. Then what to measure next, where something is left open, "
-        "also within the limits of your own rig: the spheres at hand, the preloads it holds. The whole is printed, "
-        "saved as PDF from the browser's print dialog, or saved as one HTML file that opens anywhere.",
+        "The error with the explanation and without, on recordings that it was not fitted to, beside what noise "
+        "alone gives. Recording by recording, magnitude and phase as measured, with the paper's model and the "
+        "explanation laid over them; below, what either leaves, on the band in which 95 % of the noise lies. Then "
+        "what to measure next, where something is left open, also within the limits of your own rig: the spheres "
+        "at hand, the preloads it holds. The whole is printed, saved as PDF from the browser's print dialog, or "
+        "saved as one HTML file that opens anywhere.",
         _better,
     ),
     TourStep(

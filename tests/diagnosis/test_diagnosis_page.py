@@ -254,6 +254,29 @@ def test_the_map_shows_where_the_misfit_is(found: DiagnosisResult, document: dic
     assert lowest == pytest.approx(document["location"]["region"]["frequency_hz"][0], rel=5e-3)
 
 
+def unevenly_recorded() -> Campaign:
+    """A resonant campaign whose recordings have lines at frequencies of their own."""
+    table = load_table()
+    recordings = []
+    for number in range(12):
+        own = campaign(replace(RESONANT, highest_hz=1000.0 * 1.01**number), table).recordings[number]
+        recordings.append(own)
+    return replace(campaign(RESONANT, table), recordings=tuple(recordings))
+
+
+@pytest.mark.slow
+def test_steps_of_frequency_are_common_and_even_in_its_logarithm() -> None:
+    found = diagnose(unevenly_recorded(), load_table())
+    drawn = figures(found, report(found))["where"]
+    steps = np.array([float(text) for text in drawn.layout.xaxis.ticktext])
+    assert len(steps) > 4
+    ratios = steps[1:] / steps[:-1]
+    assert ratios.min() > 1.2
+    assert ratios.max() < 1.6 * ratios.min()
+    assert np.isfinite(np.asarray(drawn.data[0].z, dtype=float)).all()  # no gap
+    assert "the paper's model" in drawn.layout.title.text
+
+
 def curves() -> Campaign:
     """A thin layer's indentation."""
     table, empty = load_table(), indentation_campaign()

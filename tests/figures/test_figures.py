@@ -92,7 +92,9 @@ def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_sta
     assert figure.layout.showlegend is False
     upper, lower, median, apart, every, pointed = figure.data
     assert (len(every.x), len(pointed.x)) == (120, 0)
-    assert [value for sensor, value in zip(every.ids, every.y, strict=True) if sensor == "s17"] == d33[17].tolist()
+    assert [value for sensor, value in zip(every.customdata, every.y, strict=True) if sensor == "s17"] == d33[
+        17
+    ].tolist()
     np.testing.assert_allclose(median.y, np.median(d33, axis=0))
     for number in range(2):
         inside = (d33[:, number] > lower.y[number]) & (d33[:, number] < upper.y[number])

@@ -18,7 +18,7 @@ _SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so 
 _ALONE_MM = 1.0  # radius where there is no other
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
-_DARK = 0.45  # luminance below which an id is written in white
+_DARK = 0.55  # luminance below which an id is written in white
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,10 @@ def array_map(
     figure.update_layout(shapes=discs, showlegend=len(figure.data) > 1)
     for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
         update(range=[float(along.min()) - 1.3 * radius, float(along.max()) + 1.3 * radius])
-    figure.update_xaxes(title="x [mm]", constrain="domain")
-    figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain")
+    figure.update_xaxes(title="x [mm]", constrain="domain", showgrid=False, zeroline=False)
+    figure.update_yaxes(
+        title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
+    )
     return styled(figure, f"{quantity.name} over the array")
 
 
@@ -117,7 +119,8 @@ def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity =
     what = "the others" if quantity.against == "others" else "0"
     if count == 0:
         return f"Grey: no sensor's differs from {what} beyond chance (5 % over the whole array)."
-    return f"{count} of {known} differ from {what} beyond chance (5 % over the whole array); the others are grey."
+    told = f"{count} of {known} differ from {what} beyond chance (5 % over the whole array)"
+    return f"{told}{'' if count == known else '; the rest is grey'}."
 
 
 def _names(quantity: Quantity) -> dict[str, str]:

@@ -50,7 +50,7 @@ def _one(number: int, entry: SensorPoints) -> go.Scatter:
     return go.Scatter(
         x=list(entry.times),
         y=list(entry.d33_pc_per_n),
-        ids=[entry.sensor] * len(entry.times),
+        customdata=[entry.sensor] * len(entry.times),
         error_y={"type": "data", "array": bars, "thickness": 1, "width": 3},
         mode="lines+markers",
         name=label(entry.sensor),
@@ -88,7 +88,7 @@ def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
         go.Scatter(
             x=[time for time, *_ in apart],
             y=[value for _, _, value, _ in apart],
-            ids=[row[1] for row in apart],
+            customdata=[row[1] for row in apart],
             error_y={"type": "data", "array": [SDS_OF_95 * row[3] for row in apart], "thickness": 1, "width": 3},
             mode="markers+text",
             name="stands apart",
@@ -102,7 +102,7 @@ def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
 
 
 def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
-    """All points, faint, with their sensors' ids, by which a page draws the line of the one that is pointed at."""
+    """All points, faint, with their sensors, by which a page draws the line of the one that is pointed at."""
     points = [
         (time, value, entry.sensor)
         for entry in sensors
@@ -114,7 +114,7 @@ def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
         go.Scatter(
             x=[time for time, *_ in points],
             y=[value for _, value, _ in points],
-            ids=[sensor for *_, sensor in points],
+            customdata=[sensor for *_, sensor in points],
             mode="markers",
             name="every sensor",
             marker={"color": "#8a949e", "size": 4, "opacity": 0.5},

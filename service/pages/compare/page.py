@@ -110,6 +110,7 @@ def _figures(
     x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
     quantity = Quantity("difference of d33", "pC/N", "zero")
     figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity)
+    figure.update_layout(title="Difference of d33")
     about = (
         f"The second's d33 less the first's, 0 in the middle of the colours. {told_apart(gap, uncertainty, quantity)}"
     )

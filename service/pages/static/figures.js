@@ -43,9 +43,12 @@ async function draw(plot) {
   if (plot.dataset.drawn) return;
   plot.dataset.drawn = "yes";
   await redraw(plot);
-  plot.on("plotly_click", ({ points: [point] }) => choose_sensor(point.id));
-  plot.on("plotly_hover", ({ points: [point] }) => point_at(point.id));
+  plot.on("plotly_click", ({ points: [point] }) => choose_sensor(sensor_of(point)));
+  plot.on("plotly_hover", ({ points: [point] }) => point_at(sensor_of(point)));
 }
+
+// Its id where points are sensors, else what it holds beside its place: ids must differ within a figure.
+const sensor_of = (point) => point.id ?? point.customdata;
 
 // A sensor that is clicked in any figure is the one that the page's list would choose.
 function choose_sensor(id) {
@@ -62,9 +65,9 @@ function point_at(id) {
     if (id === undefined || !(line > -1) || plot.dataset.pointed === id) continue;
     plot.dataset.pointed = id;
     const every = plot.data.find((trace) => trace.name === "every sensor");
-    const own = every.ids.flatMap((name, index) => (name === id ? [index] : []));
+    const own = every.customdata.flatMap((name, index) => (name === id ? [index] : []));
     const column = (name) => [own.map((index) => every[name][index])];
-    Plotly.restyle(plot, { x: column("x"), y: column("y"), ids: [own.map(() => id)], text: column("text") }, [line]);
+    Plotly.restyle(plot, { x: column("x"), y: column("y"), customdata: [own.map(() => id)], text: column("text") }, [line]);
   }
 }
 

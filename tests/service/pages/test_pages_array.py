@@ -48,6 +48,7 @@ def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visi
     assert page.get_by_label("Sensor", exact=True).input_value() == "s03"
     history = page.locator("#figure-history .plot").evaluate("plot => plot.data.map((trace) => trace.name)")
     assert history == ["s03"]
+    assert page.locator("#figure-history .yerror").count() == 4  # a bar at each campaign
     rings = page.locator("#figure-map .plot").evaluate("plot => plot.layout.shapes.map((disc) => disc.line.width)")
     assert [number for number, width in enumerate(rings) if width == max(rings)] == [2]
     assert page.get_by_role("columnheader", name="d33 of s03").count() == 1
@@ -103,4 +104,4 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit,
     assert page.evaluate(f"{pointed}.x.length") == 0
     for sensor in ("s4", "s9"):
         page.mouse.move(*place_of(page.locator("#figure-map"), sensor))
-        page.wait_for_function(f"{pointed}.ids?.[0] === {sensor!r}")
+        page.wait_for_function(f"{pointed}.customdata?.[0] === {sensor!r}")

@@ -107,7 +107,7 @@ def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_role("link", name="example, as built").click()
     page.get_by_text("Average over another band").click()
-    page.get_by_label("from").fill("5")
+    page.get_by_label("from", exact=True).fill("5")
     page.get_by_label("to", exact=True).fill("50")
     page.get_by_role("button", name="Average").click()
     page.get_by_text("Averaged over your own band, 5 to 50").wait_for()

@@ -126,7 +126,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         texttemplate="%{z:+.0f}" if size <= _MOST_LABELLED else None,
         xgap=1,
         ygap=1,
-        colorbar={"title": {"text": f"{name}, above +, below − [%]", "side": "right"}},
+        colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
         hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
     )
     for entry, axis, update in ((x, x_axis, figure.update_xaxes), (y, y_axis, figure.update_yaxes)):
@@ -147,7 +147,10 @@ def before_and_after(
 ) -> go.Figure:
     """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
     figure = make_subplots(
-        1, 2, subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"), shared_yaxes=True
+        1,
+        2,
+        subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"),
+        horizontal_spacing=0.12,
     )
     _, name = _part(diagnosis, before.measured)
     ends = [

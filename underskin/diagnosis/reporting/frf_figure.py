@@ -19,7 +19,7 @@ from underskin.units import Floats
 
 _MEASURED, _BEFORE, _AFTER, _BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
-_HEIGHT = 820  # pixels
+_HEIGHT = 700  # pixels
 _WIDE = 3.0  # largest magnitude over the median, from which on its axis is logarithmic
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _ROOM = 0.08  # at either end of an axis
@@ -84,7 +84,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         template="plotly_white",
         font={"size": 14, "color": "#222222"},
         height=_HEIGHT,
-        margin={"l": 90, "t": 80, "b": 120},
+        margin={"l": 90, "t": 80, "b": 100},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
         meta={
             "recordings": [one.name for one in recordings],
