@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, case, exists, func, insert, select, update
 
 from service.schemas.campaigns import State
 from service.store import codec, skins
@@ -19,6 +19,7 @@ from underskin.recordings.repeats import digest
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 _AT_A_TIME = 8  # recordings read at once for a document
+TIME = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)  # of recording; of arrival without one
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
 _IN_STATE = {
     "current": CURRENT,
@@ -145,9 +146,36 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
 
 
+def by_time(connection: Connection, root: str, before: int | None, limit: int) -> Sequence[AnyRow]:
+    """Rows of all campaigns of a skin, the one recorded last first, those before the campaign numbered `before`."""
+    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root)))
+    if before is not None:
+        time_before = select(TIME).where(campaigns.c.number == before).scalar_subquery()
+        query = query.where((time_before > TIME) | ((time_before == TIME) & (campaigns.c.number < before)))
+    return connection.execute(query.order_by(TIME.desc(), campaigns.c.number.desc()).limit(limit)).all()
+
+
 def latest(connection: Connection, skin_id: str) -> AnyRow | None:
-    """The row of a skin's current campaign that arrived last; None where none is current."""
-    return next(iter(listed(connection, CampaignFilters(skin=skin_id, state="current"), None, 1)), None)
+    """The row of a skin's current campaign that was recorded last; None where none is current."""
+    return _first_current(connection, skin_id)
+
+
+def describing(connection: Connection, skin_id: str) -> AnyRow | None:
+    """The row of a skin's current campaign that describes it: the latest with FRFs, which need geometry and sensors;
+    else the latest with indentations, of which the thickness may be known; else the latest. None where none is
+    current."""
+    return _first_current(connection, skin_id, case((_has("frf"), 0), (_has("indentation"), 1), else_=2))
+
+
+def _has(kind: str) -> ColumnElement[bool]:
+    own = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
+    return exists(select(recordings.c.kind).where(own).correlate(campaigns))
+
+
+def _first_current(connection: Connection, skin_id: str, *rank: ColumnElement[int]) -> AnyRow | None:
+    of_skin = campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
+    query = select(campaigns).where(of_skin, CURRENT).order_by(*rank, TIME.desc(), campaigns.c.number.desc())
+    return connection.execute(query.limit(1)).first()
 
 
 def state(row: AnyRow) -> State:

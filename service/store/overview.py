@@ -29,7 +29,8 @@ class Glance:
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign
     model: AnyRow | None = None  # in force
-    # d33 of the array [pC/N] in the last campaign by the model in force, and by the paper's; None where not kept
+    # d33 of the array [pC/N] in the last campaign that has one, by the model in force, and by the paper's; None where
+    # not kept
     adopted_d33: float | None = None
     paper_d33: float | None = None
 
@@ -60,19 +61,21 @@ def glances(
             glance.diagnosis = diagnosed.get(glance.last.number)
         glance.model = adopted.get(glance.skin_id)
         if glance.model is not None and glance.last is not None:
-            by_model = inversions.find_adopted(connection, glance.last, glance.model.model_id, table_sha256)
+            own = [row for row in recent if row.root_id == glance.skin_id and row.number in values]
+            of_model = own[-1] if own else glance.last
+            by_model = inversions.find_adopted(connection, of_model, glance.model.model_id, table_sha256)
             glance.adopted_d33 = of_array(by_model)
-            glance.paper_d33 = of_array(inversions.find(connection, glance.last, table_sha256))
+            glance.paper_d33 = of_array(inversions.find(connection, of_model, table_sha256))
     return list(by_skin.values())
 
 
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
     """The last few current campaigns of each skin, the oldest first."""
-    time = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)
-    place = func.row_number().over(partition_by=skins.c.root_id, order_by=(time.desc(), campaigns.c.number.desc()))
+    order = (kept.TIME.desc(), campaigns.c.number.desc())
+    place = func.row_number().over(partition_by=skins.c.root_id, order_by=order)
     columns = [campaigns.c[name] for name in _OF_CAMPAIGNS]
     ranked = (
-        select(skins.c.root_id, time.label("time"), place.label("place"), *columns)
+        select(skins.c.root_id, kept.TIME.label("time"), place.label("place"), *columns)
         .join(skins, skins.c.id == campaigns.c.skin_id)
         .where(kept.CURRENT, skins.c.root_id.in_(roots))
         .subquery()

@@ -31,7 +31,7 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Described:
-    """What a form says of the array: as it was sent, or else as the skin's latest campaign or the prototype has it."""
+    """What a form says of the array: as it was sent, or else as the skin's campaigns or the prototype have it."""
 
     skin_id: str | None
     values: Mapping[str, str]
@@ -118,9 +118,9 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
 
 
 def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
-    """The skin as its latest campaign declares it."""
+    """The skin as the campaign that describes it declares it."""
     with store.reading() as connection:
-        latest = campaigns.latest(connection, skins.require_root(connection, skin_id))
+        latest = campaigns.describing(connection, skins.require_root(connection, skin_id))
     skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
     if not skin["sensors"]:
         raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")

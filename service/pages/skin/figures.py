@@ -35,7 +35,9 @@ def drawn_map(root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: S
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     values, uncertainties = columns_of(rows, value, uncertainty)
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, Quantity(name, unit, diverging))
-    about = f"Each sensor where it lies, coloured by {name}, in the latest campaign, {row.name}, {_RESTS[by]}."
+    about = (
+        f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {_RESTS[by]}."
+    )
     known = [entry for entry in rows if entry["d33_pc_per_n"] is not None]
     if show == "d33" and known:
         about += f" {_range(known)}"

@@ -65,12 +65,12 @@ def skin(
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
     """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on: without it the
-    one in force, or the paper's where that tells nothing of the latest campaign."""
+    one in force, or the paper's where that tells nothing of the latest campaign with FRFs."""
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
-        filters = campaigns.CampaignFilters(skin=root, state=None)
-        rows = campaigns.listed(connection, filters, number_of_cursor(before), _ON_A_PAGE + 1)
-        last = campaigns.latest(connection, root)
+        rows = campaigns.by_time(connection, root, number_of_cursor(before), _ON_A_PAGE + 1)
+        last = campaigns.describing(connection, root)
+        is_latest = last is None or campaigns.latest(connection, root) == last
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
@@ -103,6 +103,7 @@ def skin(
         skin_id=root,
         last=last,
         answer=answer,
+        is_latest=is_latest,
         described=None if last is None else last.about["skin"],
         rows=[
             (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))
@@ -172,10 +173,10 @@ def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
 
 @router.get("/map.csv")
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
-    """d33 of each sensor in the latest campaign, and its trend."""
+    """d33 of each sensor in the latest campaign with FRFs, and its trend."""
     root, _ = _completed(store, table, skin_id)
     history = usecase.history_by_model(store, table, root, by)
-    row = store.read(campaigns.latest, root)
+    row = store.read(campaigns.describing, root)
     rows = [] if row is None else map_rows(row, d33_cache.by_model(store, table, row, by), history)
     return csv_of_rows("map", _MAP_COLUMNS, rows)
 

@@ -236,8 +236,8 @@ def _look(request: Request, pending: PendingUpload) -> None:
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
-    """What the latest campaign of a skin says of it."""
-    row = None if skin is None else store.read(campaigns.latest, skin)
+    """What the campaigns of a skin say of it."""
+    row = None if skin is None else store.read(campaigns.describing, skin)
     return {} if row is None else dict(row.about["skin"])
 
 
