@@ -22,7 +22,16 @@ from service.pages.upload import exported_skin, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of, worth_knowing
+from service.pages.upload.keep import (
+    CORRECTS,
+    SKIN_FIELD,
+    counts_pressing_negative,
+    field_errors,
+    keep_good,
+    rig_in_use,
+    skin_of,
+    worth_knowing,
+)
 from service.pages.upload.mapping import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.problems import Refusal
@@ -163,6 +172,15 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     return see(f"/upload/{pending.id}")
 
 
+@router.post("/{upload_id}/signs", dependencies=WRITE)
+async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
+    """Reads the files again, curves that count pressing negative turned, or as they came."""
+    pending.turned = sent.get("turned") == "yes"
+    async with READING_SLOTS:
+        await run_in_threadpool(_look, request, pending)
+    return see(f"/upload/{pending.id}")
+
+
 @router.post("/{upload_id}/keep", dependencies=WRITE)
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
@@ -213,7 +231,10 @@ def frf_csv(request: Request, pending: Pending, file: int) -> Response:
 def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
-    return look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    if not pending.turned:
+        return inspected
+    return replace(inspected, campaigns=[one.with_curves_turned() for one in inspected.campaigns])
 
 
 def _look(request: Request, pending: PendingUpload) -> None:
@@ -221,10 +242,12 @@ def _look(request: Request, pending: PendingUpload) -> None:
     summaries: list[FileSummary] = []
     drawn: list[Drawn] = []
     recordings = 0
+    pending.negative = False
     for number, upload in enumerate(pending.files):
         inspected = _looked(request, pending, number)
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
+        pending.negative |= counts_pressing_negative(inspected)
         known = worth_knowing(request, inspected, pending.skin, pending.corrects)
         summary = seen(upload, inspected, known)
         mapped = mapped_file(inspected, summary, pending.rig)

@@ -48,6 +48,8 @@ class PendingUpload:
     corrects: str | None = None  # the campaign whose place it takes
     reason: str = ""  # why it does
     skin_summary: SkinSummary | None = None  # where it is an exported skin
+    negative: bool = False  # whether curves of it count pressing negative
+    turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)
 
