@@ -10,7 +10,7 @@ from markupsafe import Markup
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned
 from service.pages.shared import same_request
-from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
@@ -110,11 +110,11 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     elif any(ends):
         raise required("preload_n", "give both, or leave both empty")
     for name in _SEVERAL:
-        parts = given.get(name, "").replace(",", " ").split()
-        if len(parts) > _MOST_VALUES:
-            raise out_of_range(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
-        if parts:
-            limits[name] = [number(name, part) for part in parts]
+        values = numbers(name, given.get(name, ""))
+        if len(values) > _MOST_VALUES:
+            raise out_of_range(name, len(values), f"must be at most {_MOST_VALUES} numbers")
+        if values:
+            limits[name] = values
     count = given.get(_RECORDINGS, "").strip()
     if count:
         if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):

@@ -4,6 +4,7 @@ words: the labels that the reader sees, not the fields of the request behind the
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated
 from urllib.parse import parse_qs
 
@@ -12,6 +13,7 @@ from fastapi.responses import RedirectResponse
 
 from service.auth import session
 from service.problems import Refusal
+from service.store import Conflict, Missing
 from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, UnderskinError, out_of_range, wrong_type
 from underskin.recordings.readers import text
 
@@ -23,6 +25,7 @@ _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma withou
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
+_LABELS = {"reason": "Reason", "skin_id": "Id of the other skin"}  # of forms that change what is kept
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -64,12 +67,45 @@ def see(path: str) -> RedirectResponse:
     return RedirectResponse(path, 303)
 
 
-def number(name: str, typed: str) -> float:
-    """A number that somebody typed; raises InvalidInput."""
+@dataclass(frozen=True)
+class RefusedForm:
+    """A form that was refused: which one of its page, why, what was typed into it, and the status of the answer."""
+
+    form: str
+    why: str
+    sent: Mapping[str, str]
+    status: int
+
+
+def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
+    """Do what a form was sent for; where it cannot be done, the form with the reason."""
     try:
-        return float(typed)
-    except ValueError:
-        raise wrong_type(name, typed[:80]) from None
+        do()
+    except InvalidInput as error:
+        return RefusedForm(form, in_form_words(error, _LABELS), sent, 422)
+    except (Conflict, Missing) as error:
+        return RefusedForm(form, str(error.args[0]), sent, 409 if isinstance(error, Conflict) else 404)
+    except Refusal as refusal:
+        return RefusedForm(form, refusal.detail, sent, refusal.status)
+    return None
+
+
+def number(name: str, typed: str) -> float:
+    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput."""
+    value = _value(typed)
+    if value is None:
+        raise wrong_type(name, typed.strip()[:80])
+    return value
+
+
+def number_or_text(typed: str) -> float | str | None:
+    """The same; what is no number is left to later checks, which name it. None: nothing was typed."""
+    value = _value(typed)
+    return typed.strip() or None if value is None else value
+
+
+def _value(typed: str) -> float | None:
+    return text.number(typed, "," if "," in typed else ".")
 
 
 def numbers(name: str, line: str) -> list[float]:

@@ -34,7 +34,6 @@ from service.pages.upload.keep import (
 )
 from service.pages.upload.mapping import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
-from service.problems import Refusal
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
@@ -64,10 +63,18 @@ def form(
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """Asks for files; `corrects`: the campaign whose place they take."""
+    return _form(request, store, skin, corrects)
+
+
+def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
     return page(
         request,
         "upload.html",
+        waiting=pending_uploads.waiting(session.cookie_in(dict(request.scope["headers"]))),
+        status=200 if error is None else 422,
+        error=error,
         skin=skin,
         corrects=corrects,
         known=known,
@@ -87,7 +94,9 @@ async def send(request: Request, store: Store) -> Response:
         given = [one for one in sent if one.label and one.field != RIG]
         rig = next((one for one in sent if one.field == RIG and one.label), None)
         if not given:
-            raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
+            error = "No file came. Choose one, or drop it on the page."
+            filled = fields.get(SKIN_FIELD, ""), fields.get(CORRECTS, "")
+            return await run_in_threadpool(_form, request, store, *filled, error)
         corrects = fields.get(CORRECTS) or None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
         rig_and_errors = await run_in_threadpool(rig_in_use, store, rig, skin)
