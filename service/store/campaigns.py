@@ -8,7 +8,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Connection, case, exists, func, insert, select, update
 
 from service.schemas.campaigns import State
-from service.store import codec, skins
+from service.store import changes, codec, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recording_digests, recordings
@@ -231,13 +231,16 @@ def documents(store: Database, number: int) -> Iterator[dict[str, Any]]:
         start += _AT_A_TIME
 
 
-def withdraw(connection: Connection, campaign_id: str, reason: str) -> None:
+def withdraw(connection: Connection, campaign_id: str, reason: str, withdrawn_from: str | None) -> None:
     """Take a campaign out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
-    _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason)
+    _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason, withdrawn_from=withdrawn_from)
+    changes.record(connection, "withdraw", row.skin_id, withdrawn_from, campaign_id=campaign_id, reason=reason)
 
 
-def exclude(connection: Connection, campaign_id: str, recording_id: str, reason: str) -> None:
+def exclude(
+    connection: Connection, campaign_id: str, recording_id: str, reason: str, excluded_from: str | None
+) -> None:
     """Leave a recording out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
@@ -246,8 +249,18 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
         raise Missing(f"Campaign {campaign_id!r} has no recording {recording_id!r}.")
     if recording.excluded_at is not None:
         raise Conflict(f"Recording {recording_id!r} is excluded already: {recording.exclude_reason}")
-    connection.execute(update(recordings).where(this).values(excluded_at=now(), exclude_reason=reason))
+    values = {"excluded_at": now(), "exclude_reason": reason, "excluded_from": excluded_from}
+    connection.execute(update(recordings).where(this).values(**values))
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
+    changes.record(
+        connection,
+        "exclude",
+        row.skin_id,
+        excluded_from,
+        campaign_id=campaign_id,
+        recording=recording_id,
+        reason=reason,
+    )
 
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:

@@ -10,6 +10,7 @@ from sqlalchemy import Connection, func, select
 from service.store import campaigns as kept
 from service.store import inversions
 from service.store import models as adopted_models
+from service.store import skins as kept_skins
 from service.store.tables import AnyRow, campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
@@ -33,6 +34,8 @@ class Glance:
     # not kept
     adopted_d33: float | None = None
     paper_d33: float | None = None
+    title: str | None = None
+    tags: str | None = None
 
 
 def glances(
@@ -41,9 +44,12 @@ def glances(
     """Skins by their latest arrival, those that arrived before the number `before`."""
     last = func.max(campaigns.c.number)
     query = select(skins.c.root_id, func.count(), last).join(skins, skins.c.id == campaigns.c.skin_id)
+    put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
+    query = query.where(skins.c.root_id.not_in(put_away))
     query = query.group_by(skins.c.root_id).order_by(last.desc()).limit(limit)
     if contains is not None:
-        query = query.where(func.lower(skins.c.root_id).contains(contains.lower(), autoescape=True))
+        named = select(skins.c.id).where(kept_skins.called(contains)).correlate(None)
+        query = query.where(skins.c.root_id.in_(named))
     if before is not None:
         query = query.having(last < before)
     by_skin = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
@@ -66,6 +72,9 @@ def glances(
             by_model = inversions.find_adopted(connection, of_model, glance.model.model_id, table_sha256)
             glance.adopted_d33 = of_array(by_model)
             glance.paper_d33 = of_array(inversions.find(connection, of_model, table_sha256))
+    titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
+    for skin_id, title, tags in connection.execute(titles):
+        by_skin[skin_id].title, by_skin[skin_id].tags = title, tags
     return list(by_skin.values())
 
 

@@ -13,7 +13,7 @@ from service.pages.shared.forms import RefusedForm, in_form_words, number
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import Database, campaigns, diagnoses
-from service.usecases import d33_cache
+from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
@@ -21,7 +21,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
 
-_MOST_LISTED = 60
+_MOST_LISTED = 60  # recordings on a page of the list
+_MOST_OFFERED = 1000  # recordings, to be excluded
 _MOST_DIAGNOSES = 5
 _LABELS = {"band_low_hz": "from [Hz]", "band_high_hz": "to [Hz]", "band_hz": "band [Hz]"}
 _EndText = Annotated[str, Query(max_length=40)]
@@ -38,10 +39,18 @@ BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
 
 
 @router.get("")
-def campaign(request: Request, campaign_id: CampaignId, store: Store, table: Table, show: str = "") -> Response:
-    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn. The band of the address is
-    averaged; where it is refused, the flat zone, and the form says why."""
-    return shown(request, campaign_id, store, table, show)
+def campaign(
+    request: Request,
+    campaign_id: CampaignId,
+    store: Store,
+    table: Table,
+    show: str = "",
+    first: Annotated[int, Query(ge=0, le=10**9)] = 0,
+) -> Response:
+    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `first` the recording that the
+    list begins with, from 0. The band of the address is averaged; where it is refused, the flat zone, and the form says
+    why."""
+    return shown(request, campaign_id, store, table, show, first=first)
 
 
 def shown(
@@ -51,6 +60,7 @@ def shown(
     table: SigmaTable,
     show: str = "",
     refused: RefusedForm | None = None,
+    first: int = 0,
 ) -> Response:
     """The page; `refused`: a form of it that was sent and cannot be used."""
     typed = [request.query_params.get(name, "")[:40] for name in ("band_low_hz", "band_high_hz")]
@@ -59,6 +69,7 @@ def shown(
         recordings = campaigns.recordings_of(connection, row.number)
         latest = diagnoses.listed(connection, diagnoses.DiagnosisFilters(campaign=campaign_id), None, _MOST_DIAGNOSES)
         verdict_of = verdicts.of_rows(connection, latest)
+        changed = changes.of_campaign(connection, campaign_id)
     try:
         band = _band(*typed)
         answer, numbers = d33_cache.with_numbers(store, table, row, band)
@@ -75,12 +86,16 @@ def shown(
         status=200 if refused is None else refused.status,
         refused=refused,
         band_typed=typed,
+        changes=changed,
         row=row,
         state=campaigns.state(row),
         answer=answer,
         described=row.about["skin"],
         recordings=recordings,
+        first=first if first < len(recordings) else 0,
         most_listed=_MOST_LISTED,
+        most_offered=_MOST_OFFERED,
+        listed="first" in request.query_params,
         sensors=sensors,
         diagnoses=list(verdict_of.values()),
         figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),

@@ -25,7 +25,15 @@ _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma withou
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
-_LABELS = {"reason": "Reason", "skin_id": "Id of the other skin"}  # of forms that change what is kept
+_LONGEST_REMARK, _LONGEST_TAGS = 10_000, 500
+_LABELS = {
+    "name": "Name",
+    "title": "Name",
+    "remark": "Notes",
+    "tags": "Tags",
+    "reason": "Reason",
+    "skin_id": "Id of the other skin",
+}  # of forms that change what is kept
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -60,6 +68,18 @@ def reason(sent: dict[str, str]) -> str:
     if not 0 < len(why) <= 1000:
         raise out_of_range("reason", why[:80], "must say why in 1 to 1000 characters")
     return why
+
+
+def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:
+    """Remark and tags of a form, the tags once each with commas between them; None where empty. Raises InvalidInput."""
+    remark = sent.get("remark", "").replace("\r\n", "\n").strip()
+    tags = ", ".join(dict.fromkeys(tag for part in sent.get("tags", "").split(",") if (tag := " ".join(part.split()))))
+    for name, typed, most in (("remark", remark, _LONGEST_REMARK), ("tags", tags, _LONGEST_TAGS)):
+        if len(typed) > most or "\x00" in typed:
+            raise out_of_range(
+                name, f"{len(typed)} characters", f"must have at most {most} characters, none of them null"
+            )
+    return {"remark": remark or None, "tags": tags or None}
 
 
 def see(path: str) -> RedirectResponse:

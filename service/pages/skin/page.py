@@ -20,6 +20,7 @@ from service.schemas.diagnoses import DiagnosisKind
 from service.store import (
     AnyRow,
     Database,
+    annotations,
     campaigns,
     diagnosed_together,
     diagnoses,
@@ -29,7 +30,7 @@ from service.store import (
     skin_changes,
     skins,
 )
-from service.usecases import d33_cache
+from service.usecases import changes, d33_cache
 from service.usecases import skins as usecase
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -86,6 +87,9 @@ def shown(
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
+        about = skins.find(connection, root)
+        changed = changes.of_skin(connection, root)
+        used = annotations.in_use(connection, root)
         mark = skin_changes.mark(connection, root, table.sha256)
         together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
         may_be_together = diagnosed_together.count_usable(connection, root) > 1
@@ -114,6 +118,9 @@ def shown(
         "skin.html",
         status=200 if refused is None else refused.status,
         refused=refused,
+        about=about,
+        changes=changed,
+        may_be_discarded=about is not None and about.discarded_at is None and not used,
         skin_id=root,
         last=last,
         answer=answer,
