@@ -8,7 +8,7 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import UNLIKELY, in_form_words, number
+from service.pages.shared.forms import UNLIKELY, in_form_words, label_of, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
@@ -70,6 +70,12 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     """An error in the words of these forms; `lines`: of the loads in their text."""
     return in_form_words(error, _LABELS, lines, UNLIKELY)
+
+
+def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
+    """What looks wrong, each with what it is about in the words of these forms; `lines` as for `refused`."""
+    found = [] if answer is None else answer.findings
+    return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
 
 
 def tried(

@@ -18,7 +18,7 @@ from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, 
 from underskin.recordings.readers import text
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
-UNLIKELY = "or tick “Take unlikely magnitudes as they are”"
+UNLIKELY = "or tick “These values are right, unusual as they are”"
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
@@ -149,9 +149,9 @@ def in_form_words(
     the form takes an unlikely magnitude, where it does."""
     if not isinstance(error, InvalidInput):
         return str(error)
-    allowed = worded(error.allowed, lambda field: _label(field, labels, lines), unlikely)
+    allowed = worded(error.allowed, lambda field: label_of(field, labels, lines), unlikely)
     value = "" if error.value is None else f": {error.value}"
-    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
+    return f"{label_of(error.field, labels, lines)}{value} – {allowed}"
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
@@ -165,7 +165,7 @@ def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
     return allowed.worded(word) if isinstance(allowed, Requirement) else allowed
 
 
-def _label(field: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:
+def label_of(field: str, labels: Mapping[str, str], lines: Sequence[int] = ()) -> str:
     """A field as the form calls it; of a path its known parts."""
     load = _LOAD_PATH.fullmatch(field)
     return _load(load, lines) if load else ".".join(labels.get(part, part) for part in field.split("."))
