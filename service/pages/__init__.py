@@ -12,7 +12,7 @@ from service.pages.diagnosis import plan
 from service.pages.fleet import page as fleet
 from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
-from service.pages.shared import assets
+from service.pages.shared import assets, workbooks
 from service.pages.skin import changes as skin_changes
 from service.pages.skin import page as skin
 from service.pages.start import example, login
@@ -25,6 +25,7 @@ _PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms,
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:
+    workbooks.add_to(_page.router)
     router.include_router(_page.router)
 
 

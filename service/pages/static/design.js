@@ -46,8 +46,7 @@ async function answer() {
     const place = document.getElementById(`figure-${name}`);
     place.querySelector('script[type="application/json"]').textContent = figure;
     await redraw(place.querySelector(".plot"));
-    const numbers = place.querySelector(".tools a");
-    numbers.search = query;
+    for (const numbers of place.querySelectorAll(".tools a")) numbers.search = query;
   }
   document.querySelectorAll(".same code").forEach((code, index) => (code.textContent = design.same[index]));
 }
