@@ -47,9 +47,8 @@ def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample:
 
 def counted_negative(fields: Sequence[str], more: int) -> str:
     """Force, displacement or both fall while a curve is pressed."""
-    names = {"force_n": "force", "displacement_mm": "displacement"}
+    named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
     are = "are" if len(fields) > 1 else "is"
-    named = " and ".join(names[name] for name in fields)
     pulled = ": right for a sample that is pulled" if len(fields) > 1 else ""
     return (
         f"{named} {are} counted negative as it is pressed, where compression and depth count positive{pulled}; "
