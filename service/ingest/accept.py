@@ -37,6 +37,7 @@ class IngestOptions:
     sender: str | None
     most_json_bytes: int
     estimator: Estimator | None = None
+    turn_curves: bool = False  # that count pressing negative
 
     def __post_init__(self) -> None:
         """Raises InvalidInput."""
@@ -123,6 +124,7 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     for upload in uploads:
         if upload.field != RIG:
             more = look(upload, rig, options.most_json_bytes).campaigns
+            more = [one.with_curves_turned() for one in more] if options.turn_curves else more
             files += [one.with_estimator(options.estimator) for one in more]
             recordings += sum(one.recordings for one in more)
             require_few(len(files), recordings)

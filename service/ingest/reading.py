@@ -55,6 +55,10 @@ class ReadCampaign:
         """The same with the FRFs of its time series estimated so."""
         return replace(self, reading=None if self.reading is None else self.reading.with_estimator(estimator))
 
+    def with_curves_turned(self) -> "ReadCampaign":
+        """The same with curves that count pressing negative turned."""
+        return replace(self, reading=None if self.reading is None else self.reading.with_curves_turned())
+
 
 @dataclass(frozen=True)
 class CheckedCampaign:

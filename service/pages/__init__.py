@@ -4,6 +4,7 @@ from fastapi import APIRouter
 from fastapi.routing import APIRoute
 
 from service.pages.array import loads, pressure_map
+from service.pages.campaign import changes as campaign_changes
 from service.pages.campaign import page as campaign
 from service.pages.compare import page as compare
 from service.pages.design import page as design
@@ -12,18 +13,22 @@ from service.pages.diagnosis import plan
 from service.pages.fleet import page as fleet
 from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
-from service.pages.shared import assets
+from service.pages.shared import assets, workbooks
+from service.pages.skin import changes as skin_changes
 from service.pages.skin import page as skin
 from service.pages.start import example, login, sessions
 from service.pages.start import page as start
 from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
-_OF_SKINS = (start, example, skin, campaign, compare, fleet, diagnosis, plan, upload)
+_OF_SKINS = (
+    start, example, skin, skin_changes, campaign, campaign_changes, compare, fleet, diagnosis, plan, upload
+)  # fmt: skip
 _PAGES = (*_OF_SKINS, design, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets)
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:
+    workbooks.add_to(_page.router)
     router.include_router(_page.router)
 
 

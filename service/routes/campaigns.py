@@ -222,10 +222,12 @@ def d33(
 @router.post(
     "/campaigns/{campaign_id}/withdraw", operation_id="withdraw_campaign", summary="Withdraw it", dependencies=WRITE
 )
-def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store) -> models.CampaignDetail:
+def withdraw(
+    request: Request, campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Store
+) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read."""
     with store.writing() as connection:
-        campaigns.withdraw(connection, campaign_id, withdrawal.reason)
+        campaigns.withdraw(connection, campaign_id, withdrawal.reason, sender(request))
         return usecase.detail(connection, campaign_id)
 
 
@@ -235,9 +237,11 @@ def withdraw(campaign_id: CampaignId, withdrawal: models.Withdrawal, store: Stor
     summary="Exclude a recording",
     dependencies=WRITE,
 )
-def exclude(campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table) -> models.CampaignDetail:
+def exclude(
+    request: Request, campaign_id: CampaignId, exclusion: models.Exclusion, store: Store, table: Table
+) -> models.CampaignDetail:
     """Figures no longer use it; it can still be read. A correction is the way back."""
-    usecase.exclude(store, table, campaign_id, exclusion.recording, exclusion.reason)
+    usecase.exclude(store, table, campaign_id, exclusion.recording, exclusion.reason, sender(request))
     return store.read(usecase.detail, campaign_id)
 
 

@@ -2,9 +2,9 @@
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
 
-from service.dependencies import WRITE, SkinId, Store, Table
+from service.dependencies import WRITE, SkinId, Store, Table, sender
 from service.middleware.unique_keys import JsonRoute
 from service.schemas import skins as models
 from service.store import skins
@@ -34,9 +34,9 @@ def one(skin_id: SkinId, store: Store) -> models.SkinDetail:
 
 
 @router.post("/skins/{skin_id}/join", operation_id="join_skins", summary="Join another skin to it", dependencies=WRITE)
-def join(skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
+def join(request: Request, skin_id: SkinId, join: models.Join, store: Store) -> models.SkinDetail:
     """Two ids turned out to mean one skin: from now on figures of this one use the campaigns of both."""
-    usecase.join(store, skin_id, join.skin_id, join.reason)
+    usecase.join(store, skin_id, join.skin_id, join.reason, sender(request))
     return store.read(usecase.detail, skin_id)
 
 

@@ -109,6 +109,7 @@ class CampaignEntry(BaseModel):
     corrected_by: str | None = Field(description="The campaign that replaces it.")
     withdrawn_at: str | None = Field(description="When it was withdrawn, UTC.")
     withdraw_reason: str | None = Field(description="Why.")
+    withdrawn_from: str | None = Field(description="Name of the API key that withdrew it.")
 
 
 class CampaignList(BaseModel):
@@ -127,6 +128,7 @@ class RecordingEntry(BaseModel):
     recorded_at: str | None = Field(description="When it was made, UTC.")
     excluded_at: str | None = Field(description="When it was excluded, UTC; null where figures use it.")
     exclude_reason: str | None = Field(description="Why it was excluded.")
+    excluded_from: str | None = Field(description="Name of the API key that excluded it.")
     scalars: dict[str, Any] = Field(description="Its fields that are single values, as in campaign/1.")
 
 

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, case, exists, func, insert, select, update
 
 from service.schemas.campaigns import State
-from service.store import codec, skins
+from service.store import changes, codec, skins
 from service.store.engine import Database
 from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recording_digests, recordings
@@ -19,6 +19,7 @@ from underskin.recordings.repeats import digest
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 _AT_A_TIME = 8  # recordings read at once for a document
+TIME = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)  # of recording; of arrival without one
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
 _IN_STATE = {
     "current": CURRENT,
@@ -145,9 +146,36 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
     return connection.execute(query.order_by(campaigns.c.number.desc()).limit(limit)).all()
 
 
+def by_time(connection: Connection, root: str, before: int | None, limit: int) -> Sequence[AnyRow]:
+    """Rows of all campaigns of a skin, the one recorded last first, those before the campaign numbered `before`."""
+    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root)))
+    if before is not None:
+        time_before = select(TIME).where(campaigns.c.number == before).scalar_subquery()
+        query = query.where((time_before > TIME) | ((time_before == TIME) & (campaigns.c.number < before)))
+    return connection.execute(query.order_by(TIME.desc(), campaigns.c.number.desc()).limit(limit)).all()
+
+
 def latest(connection: Connection, skin_id: str) -> AnyRow | None:
-    """The row of a skin's current campaign that arrived last; None where none is current."""
-    return next(iter(listed(connection, CampaignFilters(skin=skin_id, state="current"), None, 1)), None)
+    """The row of a skin's current campaign that was recorded last; None where none is current."""
+    return _first_current(connection, skin_id)
+
+
+def describing(connection: Connection, skin_id: str) -> AnyRow | None:
+    """The row of a skin's current campaign that describes it: the latest with FRFs, which need geometry and sensors;
+    else the latest with indentations, of which the thickness may be known; else the latest. None where none is
+    current."""
+    return _first_current(connection, skin_id, case((_has("frf"), 0), (_has("indentation"), 1), else_=2))
+
+
+def _has(kind: str) -> ColumnElement[bool]:
+    own = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
+    return exists(select(recordings.c.kind).where(own).correlate(campaigns))
+
+
+def _first_current(connection: Connection, skin_id: str, *rank: ColumnElement[int]) -> AnyRow | None:
+    of_skin = campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
+    query = select(campaigns).where(of_skin, CURRENT).order_by(*rank, TIME.desc(), campaigns.c.number.desc())
+    return connection.execute(query.limit(1)).first()
 
 
 def state(row: AnyRow) -> State:
@@ -203,13 +231,16 @@ def documents(store: Database, number: int) -> Iterator[dict[str, Any]]:
         start += _AT_A_TIME
 
 
-def withdraw(connection: Connection, campaign_id: str, reason: str) -> None:
+def withdraw(connection: Connection, campaign_id: str, reason: str, withdrawn_from: str | None) -> None:
     """Take a campaign out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
-    _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason)
+    _change(connection, row.number, withdrawn_at=now(), withdraw_reason=reason, withdrawn_from=withdrawn_from)
+    changes.record(connection, "withdraw", row.skin_id, withdrawn_from, campaign_id=campaign_id, reason=reason)
 
 
-def exclude(connection: Connection, campaign_id: str, recording_id: str, reason: str) -> None:
+def exclude(
+    connection: Connection, campaign_id: str, recording_id: str, reason: str, excluded_from: str | None
+) -> None:
     """Leave a recording out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
@@ -218,8 +249,18 @@ def exclude(connection: Connection, campaign_id: str, recording_id: str, reason:
         raise Missing(f"Campaign {campaign_id!r} has no recording {recording_id!r}.")
     if recording.excluded_at is not None:
         raise Conflict(f"Recording {recording_id!r} is excluded already: {recording.exclude_reason}")
-    connection.execute(update(recordings).where(this).values(excluded_at=now(), exclude_reason=reason))
+    values = {"excluded_at": now(), "exclude_reason": reason, "excluded_from": excluded_from}
+    connection.execute(update(recordings).where(this).values(**values))
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
+    changes.record(
+        connection,
+        "exclude",
+        row.skin_id,
+        excluded_from,
+        campaign_id=campaign_id,
+        recording=recording_id,
+        reason=reason,
+    )
 
 
 def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:

@@ -12,12 +12,12 @@ from typing import Any
 
 from sqlalchemy import Connection, insert, select, update
 
-from service.store import campaigns, diagnosis_export, skins
+from service.store import campaigns, diagnosis_export, import_checks, skins
 from service.store.codec import unpack
 from service.store.engine import Database, holds
 from service.store.errors import Conflict
 from service.store.import_checks import CheckedOverview, ImportedCampaign, SkinRow
-from service.store.tables import AnyRow, recordings, rigs
+from service.store.tables import AnyRow, changes, recordings, rigs
 from service.store.tables import campaigns as campaigns_table
 from service.store.tables import skins as skins_table
 from underskin.recordings.skin_export import ExportedCampaign, Overview, write_campaign, writing
@@ -29,6 +29,7 @@ def export(connection: Connection, root: str, file: Path) -> None:
     """Write the skin `root`, and all joined to it, one campaign in memory at a time."""
     of_root = select(skins_table).where(skins_table.c.root_id == root).order_by(skins_table.c.id)
     of_rigs = select(rigs).where(rigs.c.skin_id.in_(skins.members(root))).order_by(rigs.c.number)
+    of_changes = select(changes).where(changes.c.skin_id.in_(skins.members(root))).order_by(changes.c.number)
     rows = campaigns.of_skin(connection, root)
     diagnoses, models = diagnosis_export.exported(connection, root)
     overview = Overview(
@@ -38,6 +39,7 @@ def export(connection: Connection, root: str, file: Path) -> None:
         campaigns=[row.id for row in rows],
         diagnoses=diagnoses,
         models=models,
+        changes=[_without(row, "number") for row in connection.execute(of_changes)],
     )
     with writing(file, overview) as target:
         for row in rows:
@@ -56,8 +58,10 @@ def exported(connection: Connection, row: AnyRow) -> ExportedCampaign:
 
 
 def _without(row: AnyRow, *names: str) -> dict[str, Any]:
-    """A row by its columns' names, as plain text: SQLAlchemy's own are of a type that JSON writers refuse."""
-    return {str(name): value for name, value in row._mapping.items() if name not in names}
+    """A row by its columns' names, as plain text: SQLAlchemy's own are of a type that JSON writers refuse. Columns that
+    older files lack are in it where they hold something."""
+    held = {str(name): value for name, value in row._mapping.items() if name not in names}
+    return {name: value for name, value in held.items() if name not in import_checks.NEWER or value is not None}
 
 
 def otherwise_joined(connection: Connection, skins: Sequence[SkinRow]) -> list[str]:
@@ -99,6 +103,9 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
         for rig in (row.model_dump() for row in checked.rigs):
             if not holds(connection, rigs, **rig):
                 connection.execute(insert(rigs), rig)
+        for change in checked.changes:
+            if not holds(connection, changes, id=change.id):
+                connection.execute(insert(changes), change.model_dump())
 
 
 def add(store: Database, checked: ImportedCampaign) -> None:

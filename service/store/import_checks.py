@@ -5,7 +5,7 @@ Every check raises InvalidInput, or pydantic's ValidationError, KeyError or Type
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
@@ -14,13 +14,21 @@ from service.schemas.campaigns import RecordingResult
 from service.store import codec
 from service.store.skins import require_usable
 from underskin.errors import conflicting, unreadable
-from underskin.recordings import rig_description
+from underskin.recordings import rig_description, validation
 from underskin.recordings.campaign import SCHEMA, Campaign, parse
 from underskin.recordings.skin_export import ExportedCampaign, Overview
 
 Text = Annotated[str, StringConstraints(max_length=1000, pattern=r"^[^\x00]*$")]
 CampaignId = Annotated[str, StringConstraints(pattern=r"^c-[0-9a-f]{16}$")]
+ChangeId = Annotated[str, StringConstraints(pattern=r"^ch-[0-9a-f]{16}$")]
+Remark = Annotated[str, StringConstraints(max_length=10_000, pattern=r"^[^\x00]*$")]
 Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
+
+
+NEWER = (  # columns that files of older versions lack
+    "withdrawn_from", "excluded_from", "joined_from", "title", "remark", "tags", "discarded_at"
+)  # fmt: skip
+_CHANGED = {"name", "title", "remark", "tags", "discarded_at", "skin_id", "members"}  # of changes, before and after
 
 
 class ImportedRow(BaseModel):
@@ -38,6 +46,11 @@ class SkinRow(ImportedRow):
     joined_to: str | None
     joined_at: Time | None
     join_reason: Text | None
+    joined_from: Text | None = None
+    title: Text | None = None
+    remark: Remark | None = None
+    tags: Text | None = None
+    discarded_at: Time | None = None
 
 
 class RigRow(ImportedRow):
@@ -68,6 +81,9 @@ class CampaignRow(ImportedRow):
     corrected_by: CampaignId | None
     withdrawn_at: Time | None
     withdraw_reason: Text | None
+    withdrawn_from: Text | None = None
+    remark: Remark | None = None
+    tags: Text | None = None
 
 
 class ExclusionRow(ImportedRow):
@@ -75,14 +91,32 @@ class ExclusionRow(ImportedRow):
 
     excluded_at: Time | None
     exclude_reason: Text | None
+    excluded_from: Text | None = None
+
+
+class ChangeRow(ImportedRow):
+    """A row of changes, but for its number."""
+
+    id: ChangeId
+    action: Literal["annotate", "withdraw", "exclude", "join", "discard", "undo"]
+    skin_id: str
+    campaign_id: CampaignId | None
+    recording: str | None
+    at: Time
+    made_from: Text | None
+    reason: Text | None
+    before: dict[str, Any]
+    after: dict[str, Any]
+    undoes: ChangeId | None
 
 
 @dataclass(frozen=True)
 class CheckedOverview:
-    """Rows of the skins and their rigs, ready to be kept."""
+    """Rows of the skins, their rigs and what was changed, ready to be kept."""
 
     skins: list[SkinRow]
     rigs: list[RigRow]
+    changes: list[ChangeRow]
 
 
 @dataclass(frozen=True)
@@ -106,7 +140,16 @@ def overview(exported: Overview) -> CheckedOverview:
             rig_description.from_dict(orjson.loads(rig.document))
         except orjson.JSONDecodeError as error:
             raise unreadable("rigs", None, f"must be JSON: {error.msg}") from None
-    return CheckedOverview(rows, rigs)
+    changes = [ChangeRow.model_validate(row) for row in exported.changes]
+    for change in changes:
+        _require(change.skin_id in ids, "changes", change.skin_id, "must be of a skin in the file")
+        _require(
+            all(values.keys() <= _CHANGED for values in (change.before, change.after)),
+            "changes",
+            change.id,
+            "must be of what can be changed",
+        )
+    return CheckedOverview(rows, rigs, changes)
 
 
 def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) -> ImportedCampaign:
@@ -118,12 +161,13 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
     _require_together(state, "withdrawn_at", "withdraw_reason")
     for entry in state.refused:
         RecordingResult.model_validate(entry)
-    exclusions = [ExclusionRow(**{key: row[key] for key in ExclusionRow.model_fields}) for row in exported.recordings]
+    own = ("excluded_at", "exclude_reason", "excluded_from")
+    exclusions = [ExclusionRow(**{key: row.get(key) for key in own}) for row in exported.recordings]
     for exclusion in exclusions:
         _require_together(exclusion, "excluded_at", "exclude_reason")
     entries = [{**row["scalars"], **arrays} for row, arrays in zip(exported.recordings, exported.arrays, strict=True)]
     parsed = parse({**state.about, "schema": SCHEMA, "recordings": entries})
-    _require(state.name == parsed.name, "name", state.name, f"must be {parsed.name!r}, as the campaign says")
+    validation.name("name", state.name, False)
     row = {
         **state.model_dump(),
         "about": codec.about(parsed),

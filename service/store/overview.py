@@ -10,6 +10,7 @@ from sqlalchemy import Connection, func, select
 from service.store import campaigns as kept
 from service.store import inversions
 from service.store import models as adopted_models
+from service.store import skins as kept_skins
 from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
@@ -29,9 +30,12 @@ class Glance:
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign: of it alone, else of it with others
     model: AnyRow | None = None  # in force
-    # d33 of the array [pC/N] in the last campaign by the model in force, and by the paper's; None where not kept
+    # d33 of the array [pC/N] in the last campaign that has one, by the model in force, and by the paper's; None where
+    # not kept
     adopted_d33: float | None = None
     paper_d33: float | None = None
+    title: str | None = None
+    tags: str | None = None
 
 
 def glances(
@@ -40,9 +44,12 @@ def glances(
     """Skins by their latest arrival, those that arrived before the number `before`."""
     last = func.max(campaigns.c.number)
     query = select(skins.c.root_id, func.count(), last).join(skins, skins.c.id == campaigns.c.skin_id)
+    put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
+    query = query.where(skins.c.root_id.not_in(put_away))
     query = query.group_by(skins.c.root_id).order_by(last.desc()).limit(limit)
     if contains is not None:
-        query = query.where(func.lower(skins.c.root_id).contains(contains.lower(), autoescape=True))
+        named = select(skins.c.id).where(kept_skins.called(contains)).correlate(None)
+        query = query.where(skins.c.root_id.in_(named))
     if before is not None:
         query = query.having(last < before)
     by_skin = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
@@ -61,19 +68,24 @@ def glances(
             glance.diagnosis = diagnosed.get(glance.last.number)
         glance.model = adopted.get(glance.skin_id)
         if glance.model is not None and glance.last is not None:
-            by_model = inversions.find_adopted(connection, glance.last, glance.model.model_id, table_sha256)
+            own = [row for row in recent if row.root_id == glance.skin_id and row.number in values]
+            of_model = own[-1] if own else glance.last
+            by_model = inversions.find_adopted(connection, of_model, glance.model.model_id, table_sha256)
             glance.adopted_d33 = of_array(by_model)
-            glance.paper_d33 = of_array(inversions.find(connection, glance.last, table_sha256))
+            glance.paper_d33 = of_array(inversions.find(connection, of_model, table_sha256))
+    titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
+    for skin_id, title, tags in connection.execute(titles):
+        by_skin[skin_id].title, by_skin[skin_id].tags = title, tags
     return list(by_skin.values())
 
 
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
     """The last few current campaigns of each skin, the oldest first."""
-    time = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)
-    place = func.row_number().over(partition_by=skins.c.root_id, order_by=(time.desc(), campaigns.c.number.desc()))
+    order = (kept.TIME.desc(), campaigns.c.number.desc())
+    place = func.row_number().over(partition_by=skins.c.root_id, order_by=order)
     columns = [campaigns.c[name] for name in _OF_CAMPAIGNS]
     ranked = (
-        select(skins.c.root_id, time.label("time"), place.label("place"), *columns)
+        select(skins.c.root_id, kept.TIME.label("time"), place.label("place"), *columns)
         .join(skins, skins.c.id == campaigns.c.skin_id)
         .where(kept.CURRENT, skins.c.root_id.in_(roots))
         .subquery()

@@ -4,8 +4,9 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, ScalarSelect, Select, func, insert, select, update
+from sqlalchemy import ColumnElement, Connection, ScalarSelect, Select, func, insert, or_, select, update
 
+from service.store import changes
 from service.store.engine import upsert
 from service.store.errors import Missing
 from service.store.tables import AnyRow, campaigns, rigs, skins
@@ -23,10 +24,12 @@ def require_usable(field: str, skin_id: str) -> None:
 
 
 def require(connection: Connection, skin_id: str | None) -> str:
-    """`skin_id`, or a new one where there is none; the skin is there afterwards."""
+    """`skin_id`, or a new one where there is none; the skin is there afterwards, also where it was put away."""
     skin_id = skin_id or f"skin-{secrets.token_hex(6)}"
     row = {"id": skin_id, "root_id": skin_id, "created_at": now()}
     connection.execute(upsert(connection, skins).on_conflict_do_nothing(), row)
+    root = require_root(connection, skin_id)
+    connection.execute(update(skins).where(skins.c.id == root).values(discarded_at=None))
     return skin_id
 
 
@@ -75,17 +78,27 @@ def listed(connection: Connection, contains: str | None, after: str | None, limi
         .scalar_subquery()
     )
     query = select(skins, counted.label("campaigns")).where(skins.c.root_id == skins.c.id)
+    query = query.where(skins.c.discarded_at.is_(None))
     if contains is not None:
-        query = query.where(func.lower(skins.c.id).contains(contains.lower(), autoescape=True))
+        query = query.where(called(contains))
     if after is not None:
         query = query.where(skins.c.id > after)
     return connection.execute(query.order_by(skins.c.id).limit(limit)).all()
 
 
-def join(connection: Connection, skin_id: str, other: str, reason: str) -> None:
+def called(contains: str) -> ColumnElement[bool]:
+    """Whether a skin's id, title or tags contain a text, in capitals or not."""
+    texts = (skins.c.id, skins.c.title, skins.c.tags)
+    return or_(*(func.lower(text).contains(contains.lower(), autoescape=True) for text in texts))
+
+
+def join(connection: Connection, skin_id: str, other: str, reason: str, joined_from: str | None) -> None:
     """Count `other`, and all joined to it, as `skin_id` from now on; both are their own roots."""
+    counted = list(connection.execute(members(other)).scalars())
+    before = {"skin_id": other, "members": counted}
+    changes.record(connection, "join", skin_id, joined_from, reason=reason, before=before)
     connection.execute(update(skins).where(skins.c.root_id == other).values(root_id=skin_id))
-    joined = {"joined_to": skin_id, "joined_at": now(), "join_reason": reason}
+    joined = {"joined_to": skin_id, "joined_at": now(), "join_reason": reason, "joined_from": joined_from}
     connection.execute(update(skins).where(skins.c.id == other).values(**joined))
 
 

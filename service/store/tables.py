@@ -1,8 +1,8 @@
 """The tables of the store. What a table of an older version lacks is added by service/store/migrations.
 
 Times are text, ISO 8601 in UTC with microseconds (`2017-05-03T09:00:00.000000Z`): they sort as text on every database.
-Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another, a model
-withdrawn, each with the reason, and the rows stay.
+Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another or put away, a
+model withdrawn, each with who, when and why, and the rows stay.
 """
 
 from typing import Any, TypeAlias
@@ -39,6 +39,11 @@ skins = Table(
     Column("joined_to", String, ForeignKey("skins.id")),
     Column("joined_at", String),
     Column("join_reason", Text),
+    Column("joined_from", Text),  # name of the API key
+    Column("title", Text),  # what the lab calls it, beside its id
+    Column("remark", Text),
+    Column("tags", Text),  # with commas between them
+    Column("discarded_at", String),  # in no list from then on, until a campaign of it arrives
 )
 
 rigs = Table(
@@ -73,6 +78,9 @@ campaigns = Table(
     Column("corrected_by", String),  # id of the campaign that replaces this one
     Column("withdrawn_at", String),
     Column("withdraw_reason", Text),
+    Column("withdrawn_from", Text),  # name of the API key
+    Column("remark", Text),
+    Column("tags", Text),  # with commas between them
     Index("campaigns_of_skin", "skin_id", "number"),
 )
 
@@ -87,9 +95,29 @@ recordings = Table(
     Column("recorded_at", String),
     Column("excluded_at", String),
     Column("exclude_reason", Text),
+    Column("excluded_from", Text),  # name of the API key
     Column("scalars", JSON, nullable=False),  # the recording's document without its arrays
     Column("arrays", LargeBinary, nullable=False),  # service/store/codec.py; last, so that lists never read it
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
+)
+
+# Every change of what is kept, by service/store/changes.py; rows are added, never altered.
+changes = Table(
+    "changes",
+    metadata,
+    Column("number", _Number, primary_key=True),  # the order of the changes
+    Column("id", String, nullable=False, unique=True),
+    Column("action", String, nullable=False),
+    Column("skin_id", String, ForeignKey("skins.id"), nullable=False),
+    Column("campaign_id", String),  # null for a change of the skin itself
+    Column("recording", Text),
+    Column("at", String, nullable=False),
+    Column("made_from", Text),  # name of the API key
+    Column("reason", Text),
+    Column("before", JSON, nullable=False),  # columns by name
+    Column("after", JSON, nullable=False),
+    Column("undoes", String),  # id of the change that it takes back
+    Index("changes_of_skin", "skin_id", "number"),
 )
 
 # Derived from what a recording holds: identical ones have the same (underskin.recordings.repeats).

@@ -8,7 +8,7 @@ import orjson
 from sqlalchemy import Connection
 
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, RecordingEntry, RecordingResult
-from service.store import AnyRow, Database, campaigns, codec
+from service.store import AnyRow, Database, campaigns, codec, undo
 from service.usecases import d33_cache
 from underskin.recordings.campaign import to_dict
 from underskin.recordings.readers import hdf5_file
@@ -34,10 +34,19 @@ def detail(connection: Connection, campaign_id: str) -> CampaignDetail:
     )
 
 
-def exclude(store: Database, table: SigmaTable, campaign_id: str, recording: str, reason: str) -> None:
+def exclude(
+    store: Database, table: SigmaTable, campaign_id: str, recording: str, reason: str, excluded_from: str | None
+) -> None:
     """Leave a recording out of all figures, and compute the d33 of its campaign anew; raises Missing, Conflict."""
-    store.write(campaigns.exclude, campaign_id, recording, reason)
+    store.write(campaigns.exclude, campaign_id, recording, reason, excluded_from)
     d33_cache.derive(store, table, [campaign_id])
+
+
+def take_back(store: Database, table: SigmaTable, change_id: str, made_from: str | None) -> None:
+    """Undo a change, and compute d33 anew where it changes figures; raises Missing, Conflict."""
+    change = store.write(undo.undo, change_id, made_from)
+    if change.campaign_id is not None and change.action != "annotate":
+        d33_cache.derive(store, table, [change.campaign_id])
 
 
 def json_parts(store: Database, row: AnyRow) -> Iterator[bytes]:

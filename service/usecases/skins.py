@@ -23,7 +23,7 @@ _LEAST_SPAN_S = 86400.0
 _SensorPoint = tuple[str, models.Point]
 
 
-def join(store: Database, skin_id: str, other: str, reason: str) -> None:
+def join(store: Database, skin_id: str, other: str, reason: str, joined_from: str | None) -> None:
     """Count `other` as `skin_id` from now on; raises InvalidInput, Missing, or Refusal where one was joined before."""
     if skin_id == other:
         raise conflicting("skin_id", other, "must be another skin")
@@ -34,7 +34,7 @@ def join(store: Database, skin_id: str, other: str, reason: str) -> None:
                 raise Missing(f"There is no skin {name!r}.")
             if rows[name].root_id != name:
                 raise Refusal(409, f"Skin {name!r} was joined to {rows[name].joined_to!r}: use {rows[name].root_id!r}.")
-        skins.join(connection, skin_id, other, reason)
+        skins.join(connection, skin_id, other, reason, joined_from)
 
 
 def detail(connection: Connection, skin_id: str) -> SkinDetail:

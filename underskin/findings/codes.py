@@ -118,6 +118,7 @@ class Reason(StrEnum):
     UNUSUAL_MAGNITUDE = "unusual_magnitude"
     UNUSUAL_MEDIAN_FRF = "unusual_magnitude.median_frf"
     CURVE_REVERSED = "sign_flipped.curve"
+    CURVE_COUNTED_NEGATIVE = "sign_flipped.counted_negative"
     TWO_SIGNS = "sign_flipped.two_recordings"
     ALL_REVERSED = "sign_flipped.campaign"
     SENSOR_REVERSED = "sign_flipped.sensor"

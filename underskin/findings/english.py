@@ -134,6 +134,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.UNUSUAL_MAGNITUDE: sentences.unusual,
     Reason.UNUSUAL_MEDIAN_FRF: lambda **arguments: f"FRF, median of the recordings: {sentences.unusual(**arguments)}",
     Reason.CURVE_REVERSED: "its force falls as it is pressed, where compression counts positive: reversed",
+    Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
     Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
     Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "
     "inverts)",

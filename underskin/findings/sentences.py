@@ -45,6 +45,17 @@ def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample:
     return f"{defect(kind, channel, samples, first_sample)}{others}: those parts were left out"
 
 
+def counted_negative(fields: Sequence[str], more: int) -> str:
+    """Force, displacement or both fall while a curve is pressed."""
+    named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
+    are = "are" if len(fields) > 1 else "is"
+    pulled = ": right for a sample that is pulled" if len(fields) > 1 else ""
+    return (
+        f"{named} {are} counted negative as it is pressed, where compression and depth count positive{pulled}; "
+        f"the sign -1 turns a channel round{more_alike(more, 'recording')}"
+    )
+
+
 def size(too_large: bool) -> str:
     """The direction of a slip."""
     return "large" if too_large else "small"

@@ -88,6 +88,8 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
                 result = of_indentation(recording, campaign.skin.poisson_ratio)
             else:
                 continue
+            if not result.modulus > 0:
+                raise unusable("force_n", None, "must rise with the displacement: no modulus follows from a fall")
         except InvalidInput as error:
             result = error
         moduli.append(RecordingModulus(recording.id, recording.kind, result))

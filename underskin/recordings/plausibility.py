@@ -1,4 +1,5 @@
-"""Findings on the times of recordings and the places of sensors that a campaign states; both are used all the same.
+"""Findings on the times of recordings, the places of sensors and the signs of curves that a campaign states; all are
+used all the same.
 
 They are the same with the d33 of a campaign, on its import and in its diagnosis. The clock is only used to see whether
 a recording lies in the future by more than time zones differ. No statement holds today's date, so that a campaign whose
@@ -13,6 +14,7 @@ from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.recordings import curve_signs
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.conditions import Sensor
 from underskin.units import Floats
@@ -24,8 +26,8 @@ _LARGEST_IN_METRES_MM = 0.1
 
 
 def implausible(campaign: Campaign) -> list[Finding]:
-    """Times that no recording has, and sensors that would lie in each other."""
-    return [*_times(campaign), *overlapping_sensors(campaign)]
+    """Times that no recording has, sensors that would lie in each other, and curves that count pressing negative."""
+    return [*_times(campaign), *overlapping_sensors(campaign), *curve_signs.findings(campaign)]
 
 
 def _times(campaign: Campaign) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from underskin.errors import FileError
-from underskin.recordings import rig_mapping
+from underskin.recordings import curve_signs, rig_mapping
 from underskin.recordings.campaign import Campaign, FrfRecording, Recording, RecordingProblem, from_dict
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
@@ -50,6 +50,14 @@ class Reading:
         told = [f"{estimator} is for time series, which {others} of {len(recordings)} recordings are not"]
         campaign = replace(self.campaign, recordings=tuple(recordings))
         return replace(self, campaign=campaign, warnings=[*self.warnings, *(told if others else [])])
+
+    def with_curves_turned(self) -> "Reading":
+        """The same with force and displacement turned in curves that count pressing negative; a warning says so."""
+        campaign, changed = curve_signs.turned(self.campaign)
+        if not changed:
+            return self
+        told = f"force or displacement of {changed} recordings, counted negative as they were pressed, were turned"
+        return replace(self, campaign=campaign, warnings=[*self.warnings, told])
 
 
 def read_file(source: Path | str | bytes, name: str, rig: RigDescription | None = None) -> Reading:

@@ -3,6 +3,7 @@
 /                     attributes schema, skin
 /skins, /rigs         JSON text: what is kept of skins and their rigs, a list of objects
 /diagnoses, /models   JSON text: diagnoses with their reports, and adopted models; absent in older files
+/changes              JSON text: what was changed since, who did it and why; absent in older files
 /campaigns/<id>       JSON text `about` (an object) and `recordings` (a list of objects, without arrays); for each
                       array the values of all recordings one behind another in `arrays/<name>`, how many of them
                       are whose in `lengths/<name>`, 0 for a recording without it
@@ -49,7 +50,7 @@ class ExportedCampaign:
 
 @dataclass(frozen=True)
 class Overview:
-    """The skin, what is kept of it and of those joined to it, their rigs, diagnoses, models, and ids of campaigns."""
+    """The skin, what is kept of it and of those joined to it, and ids of their campaigns."""
 
     skin: str
     skins: list[dict[str, Any]]
@@ -57,6 +58,7 @@ class Overview:
     campaigns: list[str]
     diagnoses: list[dict[str, Any]] = field(default_factory=list)
     models: list[dict[str, Any]] = field(default_factory=list)
+    changes: list[dict[str, Any]] = field(default_factory=list)
 
 
 @contextmanager
@@ -64,7 +66,7 @@ def writing(file: Path, overview: Overview) -> Iterator[Any]:
     """A new file; the block adds the campaigns by `write_campaign`, one in memory at a time."""
     with h5py.File(file, "w", libver="latest") as target:
         target.attrs["schema"], target.attrs["skin"] = SCHEMA, overview.skin
-        for name in ("skins", "rigs", "diagnoses", "models"):
+        for name in ("skins", "rigs", "diagnoses", "models", "changes"):
             _write_text(target, name, getattr(overview, name))
         target.create_group("campaigns", track_order=True)
         yield target
@@ -120,7 +122,7 @@ def _is_export(stream: BinaryIO) -> dict[str, Any]:
 def _overview(stream: BinaryIO) -> dict[str, Any]:
     with _opened(stream) as source:
         rows = {name: _text(source, name) for name in ("skins", "rigs")}
-        rows |= {name: _text(source, name) for name in ("diagnoses", "models") if name in source}
+        rows |= {name: _text(source, name) for name in ("diagnoses", "models", "changes") if name in source}
         return {"skin": str(source.attrs["skin"]), **rows, "campaigns": list(source["campaigns"])}
 
 

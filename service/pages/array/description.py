@@ -8,13 +8,13 @@ import numpy as np
 from fastapi import Request
 
 from service.pages.shared.figures import Drawn, drawn
-from service.pages.shared.forms import UNLIKELY, in_form_words, number
+from service.pages.shared.forms import UNLIKELY, in_form_words, label_of, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
-from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
+from underskin.errors import UnderskinError, out_of_range, wrong_type
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
@@ -31,7 +31,7 @@ _LABELS = {
 
 @dataclass(frozen=True)
 class Described:
-    """What a form says of the array: as it was sent, or else as the skin's latest campaign or the prototype has it."""
+    """What a form says of the array: as it was sent, or else as the skin's campaigns or the prototype have it."""
 
     skin_id: str | None
     values: Mapping[str, str]
@@ -58,9 +58,11 @@ class Described:
 
 
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
-    """The array of a form's fields; raises InvalidInput where the skin has no campaign with sensors."""
-    sensors = None if skin_id is None else _latest(store, skin_id)["sensors"]
+    """The array of a form's fields; a grid of the form's where no campaign of the skin names sensors."""
+    sensors = None if skin_id is None else _sensors(store, skin_id)
     values, taken = shown(store, table, given, skin_id)
+    if skin_id is not None and sensors is None:
+        taken = [*taken, "No campaign of the skin names its sensors, so they are a grid here"]
     values |= {name: given.get(name) or default for name, default in _DEFAULTS.items()}
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
@@ -68,6 +70,12 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
 def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
     """An error in the words of these forms; `lines`: of the loads in their text."""
     return in_form_words(error, _LABELS, lines, UNLIKELY)
+
+
+def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
+    """What looks wrong, each with what it is about in the words of these forms; `lines` as for `refused`."""
+    found = [] if answer is None else answer.findings
+    return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
 
 
 def tried(
@@ -117,11 +125,8 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
     ]
 
 
-def _latest(store: Database, skin_id: str) -> Mapping[str, Any]:
-    """The skin as its latest campaign declares it."""
+def _sensors(store: Database, skin_id: str) -> Sequence[Mapping[str, Any]] | None:
+    """Those of the campaign that describes the skin; None where there are none."""
     with store.reading() as connection:
-        latest = campaigns.latest(connection, skins.require_root(connection, skin_id))
-    skin: dict[str, Any] = {"sensors": []} if latest is None else latest.about["skin"]
-    if not skin["sensors"]:
-        raise InvalidInput("skin", skin_id, "must have a current campaign that names its sensors")
-    return skin
+        row = campaigns.describing(connection, skins.require_root(connection, skin_id))
+    return None if row is None else row.about["skin"]["sensors"] or None

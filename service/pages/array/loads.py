@@ -6,7 +6,15 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.array.description import Described, answered, charge_columns, charge_figure, described, tried
+from service.pages.array.description import (
+    Described,
+    answered,
+    charge_columns,
+    charge_figure,
+    described,
+    findings,
+    tried,
+)
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer
 from service.pages.shared.forms import numbers
@@ -36,6 +44,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         loads=loads,
         error=error,
         answer=answer,
+        findings=findings(answer, lines),
         figures=[] if answer is None else [_figure(request, document, answer)],
         same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
     )

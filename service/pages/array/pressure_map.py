@@ -75,6 +75,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
         example=_EXAMPLE,
         error=error,
         answer=answer,
+        findings=description.findings(answer),
         figures=[] if answer is None else _figures(document, answer),
         body=None if answer is None else _inside("application/json", orjson.dumps(document)),
         same=same_request.from_file(request, "/v1/stress", "request.json", "client.stress({})"),

@@ -5,37 +5,34 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from service.dependencies import WRITE, CampaignId, Store, Table
+from service.dependencies import CampaignId, Store, Table
 from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_answer, csv_of_rows
-from service.pages.shared.forms import Form, reason, see
+from service.pages.shared.forms import RefusedForm, in_form_words, number
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import Database, campaigns, diagnoses
-from service.usecases import d33_cache
-from service.usecases.campaigns import exclude as exclude_recording
+from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
-from underskin.errors import wrong_type
+from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/campaigns/{campaign_id}")
 
-_MOST_LISTED = 60
+_MOST_LISTED = 60  # recordings on a page of the list
+_MOST_OFFERED = 1000  # recordings, to be excluded
 _MOST_DIAGNOSES = 5
+_LABELS = {"band_low_hz": "from [Hz]", "band_high_hz": "to [Hz]", "band_hz": "band [Hz]"}
+_EndText = Annotated[str, Query(max_length=40)]
 
 
-def _band(
-    band_low_hz: Annotated[str, Query(max_length=40)] = "", band_high_hz: Annotated[str, Query(max_length=40)] = ""
-) -> d33_cache.BandHz | None:
-    """The band that the reader chose; None: the flat zone."""
+def _band(band_low_hz: _EndText = "", band_high_hz: _EndText = "") -> d33_cache.BandHz | None:
+    """The band that the reader chose; None: the flat zone. Raises InvalidInput."""
     if not band_low_hz and not band_high_hz:
         return None
-    try:
-        low, high = float(band_low_hz), float(band_high_hz)
-    except ValueError:
-        raise wrong_type("band_low_hz", band_low_hz, "band_low_hz and band_high_hz must both be numbers") from None
-    return low, high
+    return number("band_low_hz", band_low_hz), number("band_high_hz", band_high_hz)
 
 
 BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
@@ -43,27 +40,62 @@ BandOfQuery = Annotated[d33_cache.BandHz | None, Depends(_band)]
 
 @router.get("")
 def campaign(
-    request: Request, campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery, show: str = ""
+    request: Request,
+    campaign_id: CampaignId,
+    store: Store,
+    table: Table,
+    show: str = "",
+    first: Annotated[int, Query(ge=0, le=10**9)] = 0,
 ) -> Response:
-    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `band` what is averaged."""
+    """All at a glance; `show` picks the sensor, or the recording, whose lines are drawn, `first` the recording that the
+    list begins with, from 0. The band of the address is averaged; where it is refused, the flat zone, and the form says
+    why."""
+    return shown(request, campaign_id, store, table, show, first=first)
+
+
+def shown(
+    request: Request,
+    campaign_id: str,
+    store: Database,
+    table: SigmaTable,
+    show: str = "",
+    refused: RefusedForm | None = None,
+    first: int = 0,
+) -> Response:
+    """The page; `refused`: a form of it that was sent and cannot be used."""
+    typed = [request.query_params.get(name, "")[:40] for name in ("band_low_hz", "band_high_hz")]
     with store.reading() as connection:
         row = campaigns.find(connection, campaign_id)
         recordings = campaigns.recordings_of(connection, row.number)
         latest = diagnoses.listed(connection, diagnoses.DiagnosisFilters(campaign=campaign_id), None, _MOST_DIAGNOSES)
         verdict_of = verdicts.of_rows(connection, latest)
-    answer, numbers = d33_cache.with_numbers(store, table, row, band)
+        changed = changes.of_campaign(connection, campaign_id)
+    try:
+        band = _band(*typed)
+        answer, numbers = d33_cache.with_numbers(store, table, row, band)
+    except InvalidInput as error:
+        band = None
+        answer, numbers = d33_cache.with_numbers(store, table, row, band)
+        refused = refused or RefusedForm("band", in_form_words(error, _LABELS), {}, 200)
     sensors = sorted({entry.sensor for entry in recordings if entry.sensor is not None})
     show = show if show in {"", *sensors, *(entry.id for entry in recordings)} else ""
     path = f"/v1/campaigns/{quote(row.id, safe='')}/d33" + (f"?{band_query(band)}" if band else "")
     return page(
         request,
         "campaign.html",
+        status=200 if refused is None else refused.status,
+        refused=refused,
+        band_typed=typed,
+        changes=changed,
         row=row,
         state=campaigns.state(row),
         answer=answer,
         described=row.about["skin"],
         recordings=recordings,
+        first=first if first < len(recordings) else 0,
         most_listed=_MOST_LISTED,
+        most_offered=_MOST_OFFERED,
+        listed="first" in request.query_params,
         sensors=sensors,
         diagnoses=list(verdict_of.values()),
         figures=figures(store, row, answer, numbers, show, curves=any(entry.kind != "frf" for entry in recordings)),
@@ -105,20 +137,6 @@ def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
             columns["displacement_mm"] += recording.displacement_mm.tolist()
             columns["force_n"] += recording.force_n.tolist()
     return csv_answer("curves", columns)
-
-
-@router.post("/exclude", dependencies=WRITE)
-def exclude(campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
-    """Leave a recording out of all figures."""
-    exclude_recording(store, table, campaign_id, sent.get("recording", ""), reason(sent))
-    return see(f"/campaigns/{quote(campaign_id, safe='')}")
-
-
-@router.post("/withdraw", dependencies=WRITE)
-def withdraw(campaign_id: CampaignId, sent: Form, store: Store) -> Response:
-    """Leave the campaign out of all figures."""
-    store.write(campaigns.withdraw, campaign_id, reason(sent))
-    return see(f"/campaigns/{quote(campaign_id, safe='')}")
 
 
 def _loaded(store: Database, campaign_id: str) -> Campaign:

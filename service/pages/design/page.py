@@ -1,7 +1,7 @@
 """The design view: sliders, and at once what the skin would tell."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
@@ -13,13 +13,13 @@ from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.formats import short_and_exact
-from service.pages.shared.forms import in_form_words
+from service.pages.shared.forms import in_form_words, number
 from service.pages.shared.html import compress, page
-from service.pages.shared.skin_values import PROTOTYPE, start
+from service.pages.shared.skin_values import start
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
-from underskin.errors import UnderskinError, wrong_type
+from underskin.errors import InvalidInput, UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/design")
@@ -42,20 +42,30 @@ BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes uns
 
 @dataclass(frozen=True)
 class Sliders:
-    """Where they start and stand; `taken`: in sentences what of it, beyond what the address gives, nobody declared."""
+    """Where they start and stand, as they were `typed` and as numbers, and what is wrong with what was typed; `taken`:
+    in sentences what of it, beyond what the address gives, nobody declared."""
 
     skin_id: str | None
     own: Mapping[str, float]
+    typed: Mapping[str, str]
     values: Mapping[str, float]
+    error: InvalidInput | None
     taken: Sequence[str]
 
 
 def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
-    given = _given(request)
+    given = {name: text for name, *_ in SLIDERS if (text := request.query_params.get(name))}
     own, taken = start(store, table, skin, {name: words for name, words in _WORDS.items() if name not in given})
     own = {name: own[name] for name, *_ in SLIDERS}
-    return Sliders(skin, own, {**own, **given}, taken)
+    values, error = dict(own), None
+    for name, text in given.items():
+        try:
+            values[name] = number(name, text)
+        except InvalidInput as wrong:
+            error = error or wrong
+    typed = {name: given.get(name) or f"{own[name]:g}" for name, *_ in SLIDERS}
+    return Sliders(skin, own, typed, values, error, taken)
 
 
 SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
@@ -64,16 +74,17 @@ SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
 @router.get("")
 def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
     """The page."""
-    shown, figures, error = _tried(table, sliders)
+    shown = _tried(table, sliders)
     return page(
         request,
         "design.html",
         skin_id=sliders.skin_id,
-        values=sliders.values,
+        typed=sliders.typed,
         sliders=SLIDERS,
-        results=shown,
-        figures=figures,
-        error=error,
+        results=shown.results,
+        outside=shown.outside,
+        figures=shown.figures,
+        error=shown.error,
         taken=sliders.taken,
         same=_same(request, sliders.values),
     )
@@ -82,23 +93,24 @@ def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
 @router.get("/answer")
 def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
     """What changes in the page when a slider moves, as JSON."""
-    shown, figures, error = _tried(table, sliders)
+    shown = _tried(table, sliders)
     same = _same(request, sliders.values)
     changed = {
-        "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in shown},
-        "figures": {figure.name: figure.json for figure in figures},
+        "results": {entry.name: [entry.text, entry.exact, entry.note] for entry in shown.results},
+        "figures": {figure.name: figure.json for figure in shown.figures},
+        "outside": shown.outside,
         "same": [same.curl, same.python],
     }
-    content = orjson.dumps(changed if error is None else {"error": error})
+    content = orjson.dumps(changed if shown.error is None else {"error": shown.error})
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
     compress(request, answer)
     return answer
 
 
 @router.get("/sweeps.csv")
-def sweeps_csv(request: Request, table: Table) -> Response:
+def sweeps_csv(table: Table, sliders: SlidersOfQuery) -> Response:
     """σ and γ along each axis."""
-    answer = _computed(request, table)
+    answer = _computed(table, sliders)
     columns: dict[str, list[Any]] = {name: [] for name in ("axis", "value", "sigma", "gamma")}
     for sweep in answer.sweeps:
         columns["axis"] += [sweep.axis] * len(sweep.value)
@@ -109,9 +121,9 @@ def sweeps_csv(request: Request, table: Table) -> Response:
 
 
 @router.get("/response.csv")
-def response_csv(request: Request, table: Table) -> Response:
+def response_csv(table: Table, sliders: SlidersOfQuery) -> Response:
     """A sensor's response against the place of the load."""
-    return csv_answer("response", _computed(request, table).response.model_dump())
+    return csv_answer("response", _computed(table, sliders).response.model_dump())
 
 
 @dataclass(frozen=True)
@@ -143,7 +155,7 @@ def results(answer: DesignAnswer) -> list[DesignResult]:
     blind = answer.response_amid_percent is not None and answer.response_amid_percent < BLIND_PERCENT
     point = f"a/h {answer.a_over_h:.3g}, rT/h {answer.rt_over_h:.3g}, L {answer.load_parameter:.2g}"
     anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
-    return [
+    entries = [
         DesignResult("sigma", "transmission σ", answer.sigma, "", 4, point),
         DesignResult("frf", "FRF", answer.frf_pc_per_n, "pC/N", 4, "what an instrument should show above the sensor"),
         DesignResult("gamma", "γ of a point load", answer.gamma, "", 4, "above the sensor, linear layer"),
@@ -157,34 +169,41 @@ def results(answer: DesignAnswer) -> list[DesignResult]:
         DesignResult("amid", "response amid four sensors", answer.response_amid_percent, "%", 3,
              "of that above one" + (": blind spots" if blind else "")),
     ]  # fmt: skip
+    if answer.status == "ok":
+        return entries
+    return [replace(entry, note="outside the table") if entry.value is None else entry for entry in entries]
 
 
-def _given(request: Request) -> dict[str, float]:
-    """The numbers of the address."""
-    names = {name for name, *_ in SLIDERS}
-    try:
-        return {name: float(value) for name, value in request.query_params.items() if name in names}
-    except ValueError:
-        raise wrong_type("address", request.url.query[:80], "must have numbers") from None
+@dataclass(frozen=True)
+class ShownDesign:
+    """What a design tells, in numbers and figures; the limit of the table that it exceeds; or what is wrong with it."""
+
+    results: Sequence[DesignResult]
+    figures: Sequence[Drawn]
+    outside: str | None = None
+    error: str | None = None
 
 
-def _computed(request: Request, table: SigmaTable) -> DesignAnswer:
-    asked = parsed(DesignRequest, {**{name: PROTOTYPE[name] for name, *_ in SLIDERS}, **_given(request)})
+def _computed(table: SigmaTable, sliders: Sliders) -> DesignAnswer:
+    if sliders.error is not None:
+        raise sliders.error
+    asked = parsed(DesignRequest, sliders.values)
     return design_answer(table, asked, design_of(table, asked))
 
 
-def _tried(table: SigmaTable, sliders: Sliders) -> tuple[list[DesignResult], list[Drawn], str | None]:
-    """What the design tells, in numbers and figures, or what is wrong with it."""
+def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
     from underskin.figures.design import Mark, array_response, design_overview
 
     try:
+        if sliders.error is not None:
+            raise sliders.error
         asked = parsed(DesignRequest, sliders.values)
         with np.errstate(all="ignore"):
             designed = design_of(table, asked)
             start = design_of(table, parsed(DesignRequest, sliders.own)).contact
-        shown = results(design_answer(table, asked, designed))
+        answer = design_answer(table, asked, designed)
     except UnderskinError as refused:
-        return [], [], in_form_words(refused, _LABELS)
+        return ShownDesign([], [], error=in_form_words(refused, _LABELS))
     name = "the paper's prototype" if sliders.skin_id is None else "the skin as it is"
     mark = Mark(name, float(start.a_over_h), float(start.rt_over_h), float(start.load_parameter), float(start.sigma))
     query = urlencode({name: getattr(asked, name) for name, *_ in SLIDERS})
@@ -203,7 +222,7 @@ def _tried(table: SigmaTable, sliders: Sliders) -> tuple[list[DesignResult], lis
             f"/design/response.csv?{query}",
         ),
     ]
-    return shown, figures, None
+    return ShownDesign(results(answer), figures, answer.limit)
 
 
 def _same(request: Request, values: Mapping[str, float]) -> same_request.SameRequest:

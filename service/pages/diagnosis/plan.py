@@ -1,19 +1,23 @@
 """What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
-from fastapi import APIRouter, Request, Response
+import yaml
+from fastapi import APIRouter, Path, Request, Response
 from fastapi.responses import JSONResponse
-from markupsafe import Markup
 
 from service.dependencies import DiagnosisId, PlannerInUse, Store
-from service.jobs.planner import Planned
+from service.jobs.planner import Planned, Planner
 from service.pages.shared import same_request
-from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.figures import attachment, csv_of_rows
+from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
+from service.usecases import planned_recordings
+from underskin.diagnosis.reporting.wording import axis, readable
 from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:
@@ -37,6 +41,7 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
+_HEADS = {"position_mm": "place x, y [mm]"}
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
@@ -57,10 +62,12 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
     error: str | None = None
     planned: Planned | None = None
     same: same_request.SameRequest | None = None
+    rows: list[PlannedRow] = []
     try:
         limits = _limits(request.query_params)
         same = _same(request, row.campaign_id, limits)
         planned = planner.plan(row, _checked(limits))
+        rows = _rows(store, row, planned.plan or {})
     except UnderskinError as wrong:
         error = in_form_words(wrong, _LABELS)
     except Refusal as busy:
@@ -76,10 +83,75 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
         given=request.query_params,
         error=error,
         planned=planned,
-        shown=None if planned is None or not planned.plan else _worded(planned.plan),
+        statement=None if planned is None or not planned.plan else readable(planned.plan["statement"]),
+        axes={name: _HEADS.get(name) or axis(name) for one in rows for name in one.values},
+        rows=rows,
         query=request.url.query,
         same=same,
     )
+
+
+@router.get("/recordings.csv")
+def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
+    """The planned recordings, a row each, and how many of each have arrived."""
+    rows = _planned_rows(request, diagnosis_id, planner, store)
+    names = list(dict.fromkeys(name for one in rows for name in one.values))
+    told = [{**one.values, "repeats": one.repeats, "arrived": one.arrived} for one in rows]
+    return csv_of_rows("plan", [*names, "repeats", "arrived"], [{**one, **_place(one)} for one in told])
+
+
+@router.get("/{number}/rig.yaml")
+def rig_yaml(
+    request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store, number: Annotated[int, Path(ge=1)]
+) -> Response:
+    """The rig description of one planned recording, with which its file can be sent."""
+    rows = _planned_rows(request, diagnosis_id, planner, store)
+    if number > len(rows):
+        raise Refusal(404, f"The plan has {len(rows)} recordings.")
+    with store.reading() as connection:
+        campaign = campaigns.find(connection, diagnoses.find(connection, diagnosis_id).campaign_id)
+        document = planned_recordings.rig_description(connection, campaign, rows[number - 1].values)
+    content = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+    return attachment(f"rig-{number}.yaml", content, "application/yaml")
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """A planned recording: its conditions by field, how often it is to be made, and how many have arrived."""
+
+    values: Mapping[str, Any]
+    repeats: int
+    arrived: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether all are there."""
+        return self.arrived >= self.repeats
+
+
+def _planned_rows(request: Request, diagnosis_id: str, planner: Planner, store: Database) -> list[PlannedRow]:
+    """Those of the limits in the address, once they are planned."""
+    row, _ = _diagnosed(store, diagnosis_id)
+    planned = planner.plan(row, _checked(_limits(request.query_params)))
+    if planned.state != "done":
+        raise Refusal(409, f"The plan is not there yet: its state is {planned.state}.")
+    return _rows(store, row, planned.plan or {})
+
+
+def _rows(store: Database, row: AnyRow, plan: Mapping[str, Any]) -> list[PlannedRow]:
+    entries = plan.get("recordings", [])
+    counts = store.read(planned_recordings.arrived, row, entries)
+    return [
+        PlannedRow(
+            {name: value for name, value in entry.items() if name != "repeats" and value != []}, entry["repeats"], count
+        )
+        for entry, count in zip(entries, counts, strict=True)
+    ]
+
+
+def _place(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A position as a cell has it."""
+    return {"position_mm": " ".join(map(str, row["position_mm"]))} if "position_mm" in row else {}
 
 
 @router.get("/progress")
@@ -110,11 +182,11 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     elif any(ends):
         raise required("preload_n", "give both, or leave both empty")
     for name in _SEVERAL:
-        parts = given.get(name, "").replace(",", " ").split()
-        if len(parts) > _MOST_VALUES:
-            raise out_of_range(name, len(parts), f"must be at most {_MOST_VALUES} numbers")
-        if parts:
-            limits[name] = [number(name, part) for part in parts]
+        values = numbers(name, given.get(name, ""))
+        if len(values) > _MOST_VALUES:
+            raise out_of_range(name, len(values), f"must be at most {_MOST_VALUES} numbers")
+        if values:
+            limits[name] = values
     count = given.get(_RECORDINGS, "").strip()
     if count:
         if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):
@@ -127,13 +199,6 @@ def _checked(limits: Mapping[str, Any]) -> "RigLimits":
     from underskin.diagnosis.planning.rig_limits import RigLimits
 
     return RigLimits(**limits)
-
-
-def _worded(planned: Mapping[str, Any]) -> Markup:
-    """A plan as the report words it."""
-    from underskin.diagnosis.reporting.html_report import plan_of
-
-    return Markup(plan_of(planned))  # noqa: S704 -- every text in it is escaped where it is made
 
 
 def _same(request: Request, campaign_id: str, limits: Mapping[str, Any]) -> same_request.SameRequest:

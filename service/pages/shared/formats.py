@@ -19,6 +19,37 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
     return _with_unit(shown, exact, unit)
 
 
+def interval(value: float | None, low: float | None, high: float | None, unit: str = "") -> Markup:
+    """A number with its 95 % interval, all to the digits that the width tells: 13.25 (95 %: 13.11 to 13.39)."""
+    if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
+        return number(value, unit)
+    shown = [_to_places(one, _places(low, high)) for one in (value, low, high)]
+    text = Markup('<b><span class="number" title="{}">{}</span></b>').format(f"{value!r} {unit}".strip(), shown[0])
+    if unit:
+        text += Markup('&nbsp;<span class="unit">{}</span>').format(unit)
+    ends = Markup(
+        ' <span class="quiet" title="with a probability of 95 % it lies between these">(95 %: {} to {})</span>'
+    )
+    return text + ends.format(*shown[1:])
+
+
+def end_of(value: float | None, low: float | None, high: float | None) -> Markup:
+    """One of the three numbers of `interval`, to the same digits."""
+    if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
+        return number(value)
+    return _with_unit(_to_places(value, _places(low, high)), repr(value), "")
+
+
+def _places(low: float, high: float) -> int:
+    """Decimal places that show two digits of half an interval's width."""
+    half = (high - low) / 2
+    return 3 if not half > 0 else min(9, max(0, 1 - math.floor(math.log10(half))))
+
+
+def _to_places(value: float, places: int) -> str:
+    return f"{value:.{places}f}".replace("-", "−")
+
+
 def given(value: float | None, unit: str = "") -> Markup:
     """A number as somebody gave it, with its unit."""
     return _with_unit("–" if value is None else f"{value:.6g}", "" if value is None else repr(value), unit)
@@ -65,7 +96,13 @@ def short(text: str, most: int = 60) -> Markup:
     return Markup('<span title="{}">{}…</span>').format(text[:1000], text[: most - 1])
 
 
+def capitalize_first(text: str) -> str:
+    """A text as a sentence begins."""
+    return text[:1].upper() + text[1:]
+
+
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
-    "in_percent": in_percent,
+    "in_percent": in_percent, "interval": interval, "end_of": end_of,
+    "capitalize_first": capitalize_first,
 }  # fmt: skip

@@ -4,6 +4,7 @@ words: the labels that the reader sees, not the fields of the request behind the
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated
 from urllib.parse import parse_qs
 
@@ -12,17 +13,27 @@ from fastapi.responses import RedirectResponse
 
 from service.auth import session
 from service.problems import Refusal
+from service.store import Conflict, Missing
 from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, UnderskinError, out_of_range, wrong_type
 from underskin.recordings.readers import text
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
-UNLIKELY = "or tick “Take unlikely magnitudes as they are”"
+UNLIKELY = "or tick “These values are right, unusual as they are”"
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
+_LONGEST_REMARK, _LONGEST_TAGS = 10_000, 500
+_LABELS = {
+    "name": "Name",
+    "title": "Name",
+    "remark": "Notes",
+    "tags": "Tags",
+    "reason": "Reason",
+    "skin_id": "Id of the other skin",
+}  # of forms that change what is kept
 
 
 async def _fields(request: Request) -> dict[str, str]:
@@ -59,17 +70,62 @@ def reason(sent: dict[str, str]) -> str:
     return why
 
 
+def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:
+    """Remark and tags of a form, the tags once each with commas between them; None where empty. Raises InvalidInput."""
+    remark = sent.get("remark", "").replace("\r\n", "\n").strip()
+    tags = ", ".join(dict.fromkeys(tag for part in sent.get("tags", "").split(",") if (tag := " ".join(part.split()))))
+    for name, typed, most in (("remark", remark, _LONGEST_REMARK), ("tags", tags, _LONGEST_TAGS)):
+        if len(typed) > most or "\x00" in typed:
+            raise out_of_range(
+                name, f"{len(typed)} characters", f"must have at most {most} characters, none of them null"
+            )
+    return {"remark": remark or None, "tags": tags or None}
+
+
 def see(path: str) -> RedirectResponse:
     """After a form, the page that shows what it did."""
     return RedirectResponse(path, 303)
 
 
-def number(name: str, typed: str) -> float:
-    """A number that somebody typed; raises InvalidInput."""
+@dataclass(frozen=True)
+class RefusedForm:
+    """A form that was refused: which one of its page, why, what was typed into it, and the status of the answer."""
+
+    form: str
+    why: str
+    sent: Mapping[str, str]
+    status: int
+
+
+def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> RefusedForm | None:
+    """Do what a form was sent for; where it cannot be done, the form with the reason."""
     try:
-        return float(typed)
-    except ValueError:
-        raise wrong_type(name, typed[:80]) from None
+        do()
+    except InvalidInput as error:
+        return RefusedForm(form, in_form_words(error, _LABELS), sent, 422)
+    except (Conflict, Missing) as error:
+        return RefusedForm(form, str(error.args[0]), sent, 409 if isinstance(error, Conflict) else 404)
+    except Refusal as refusal:
+        return RefusedForm(form, refusal.detail, sent, refusal.status)
+    return None
+
+
+def number(name: str, typed: str) -> float:
+    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput."""
+    value = _value(typed)
+    if value is None:
+        raise wrong_type(name, typed.strip()[:80])
+    return value
+
+
+def number_or_text(typed: str) -> float | str | None:
+    """The same; what is no number is left to later checks, which name it. None: nothing was typed."""
+    value = _value(typed)
+    return typed.strip() or None if value is None else value
+
+
+def _value(typed: str) -> float | None:
+    return text.number(typed, "," if "," in typed else ".")
 
 
 def numbers(name: str, line: str) -> list[float]:
@@ -93,9 +149,9 @@ def in_form_words(
     the form takes an unlikely magnitude, where it does."""
     if not isinstance(error, InvalidInput):
         return str(error)
-    allowed = worded(error.allowed, lambda field: _label(field, labels, lines), unlikely)
+    allowed = worded(error.allowed, lambda field: label_of(field, labels, lines), unlikely)
     value = "" if error.value is None else f": {error.value}"
-    return f"{_label(error.field, labels, lines)}{value} – {allowed}"
+    return f"{label_of(error.field, labels, lines)}{value} – {allowed}"
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
@@ -109,7 +165,7 @@ def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:
     return allowed.worded(word) if isinstance(allowed, Requirement) else allowed
 
 
-def _label(field: str, labels: Mapping[str, str], lines: Sequence[int]) -> str:
+def label_of(field: str, labels: Mapping[str, str], lines: Sequence[int] = ()) -> str:
     """A field as the form calls it; of a path its known parts."""
     load = _LOAD_PATH.fullmatch(field)
     return _load(load, lines) if load else ".".join(labels.get(part, part) for part in field.split("."))

@@ -35,8 +35,8 @@ PROTOTYPE = {
 def start(
     store: Database, table: SigmaTable, skin_id: str | None, words: Mapping[str, tuple[str, str]]
 ) -> tuple[dict[str, float], list[str]]:
-    """Where the view starts: what the latest campaign says of the skin, of the sphere that pressed it and, where no d33
-    is declared, its measured one; else the paper's prototype.
+    """Where the view starts: what the campaign that describes the skin says, of the sphere that pressed it and, where
+    no d33 is declared, its measured one; else the paper's prototype.
 
     And in sentences, of the fields in `words` (each with its words and unit), what nobody declared.
     """
@@ -44,7 +44,7 @@ def start(
         return dict(PROTOTYPE), []
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        latest = campaigns.latest(connection, root)
+        latest = campaigns.describing(connection, root)
         if latest is None:
             return dict(PROTOTYPE), ["The skin has no campaign in use: all values are those of the paper's prototype"]
         recordings = campaigns.recordings_of(connection, latest.number)

@@ -8,20 +8,19 @@ from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy import Connection
 from starlette.background import BackgroundTask
 
-from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, number_of_cursor, sender
+from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_of_rows
-from service.pages.shared.forms import OWN_FORM, Form, reason, see
+from service.pages.shared.forms import RefusedForm
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
 from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_rows
-from service.problems import validated
 from service.schemas.campaign_d33 import D33Value
-from service.schemas.diagnoses import AskForSkin, DiagnosisKind
-from service.schemas.skins import History, Join
+from service.schemas.diagnoses import DiagnosisKind
 from service.store import (
     AnyRow,
     Database,
+    annotations,
     campaigns,
     diagnosed_together,
     diagnoses,
@@ -31,8 +30,7 @@ from service.store import (
     skin_changes,
     skins,
 )
-from service.usecases import d33_cache
-from service.usecases import diagnoses as diagnosis_usecase
+from service.usecases import changes, d33_cache
 from service.usecases import skins as usecase
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -65,15 +63,33 @@ def skin(
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
     """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on: without it the
-    one in force, or the paper's where that tells nothing of the latest campaign."""
+    one in force, or the paper's where that tells nothing of the latest campaign with FRFs."""
+    return shown(request, skin_id, store, table, show, sensor, before, by)
+
+
+def shown(
+    request: Request,
+    skin_id: str,
+    store: Database,
+    table: SigmaTable,
+    show: Shown = "d33",
+    sensor: str | None = None,
+    before: str | None = None,
+    by: By | None = None,
+    refused: RefusedForm | None = None,
+) -> Response:
+    """The page; `refused`: a form of it that was sent and cannot be used."""
     root, waiting = _completed(store, table, skin_id)
     with store.reading() as connection:
-        filters = campaigns.CampaignFilters(skin=root, state=None)
-        rows = campaigns.listed(connection, filters, number_of_cursor(before), _ON_A_PAGE + 1)
-        last = campaigns.latest(connection, root)
+        rows = campaigns.by_time(connection, root, number_of_cursor(before), _ON_A_PAGE + 1)
+        last = campaigns.describing(connection, root)
+        is_latest = last is None or campaigns.latest(connection, root) == last
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers)
+        about = skins.find(connection, root)
+        changed = changes.of_skin(connection, root)
+        used = annotations.in_use(connection, root)
         mark = skin_changes.mark(connection, root, table.sha256)
         together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
         may_be_together = diagnosed_together.count_usable(connection, root) > 1
@@ -100,9 +116,15 @@ def skin(
     made = page(
         request,
         "skin.html",
+        status=200 if refused is None else refused.status,
+        refused=refused,
+        about=about,
+        changes=changed,
+        may_be_discarded=about is not None and about.discarded_at is None and not used,
         skin_id=root,
         last=last,
         answer=answer,
+        is_latest=is_latest,
         described=None if last is None else last.about["skin"],
         rows=[
             (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))
@@ -145,31 +167,6 @@ def _latest(connection: Connection, root: str, kind: DiagnosisKind) -> Sequence[
     return diagnoses.listed(connection, diagnoses.DiagnosisFilters(skin=root, kind=kind), None, _MOST_TOGETHER)
 
 
-@router.post("/diagnosis", dependencies=[*WRITE, OWN_FORM])
-def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, store: Store, table: Table) -> Response:
-    """Puts one diagnosis of all campaigns in use into the queue; one that there is already is shown."""
-    row = store.write(diagnosis_usecase.ask_of_skin, skin_id, table, sender(request), AskForSkin())
-    runner.stir()
-    return see(f"/diagnoses/{row.id}")
-
-
-@router.post("/model/withdraw", dependencies=WRITE)
-def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store) -> Response:
-    """Has no model in force."""
-    with store.writing() as connection:
-        root = skins.require_root(connection, skin_id)
-        models.withdraw(connection, root, reason(sent), sender(request))
-    return see(f"/skins/{quote(root, safe='')}")
-
-
-@router.post("/join", dependencies=WRITE)
-def join(skin_id: SkinId, sent: Form, store: Store) -> Response:
-    """Count the other as this one from now on."""
-    asked = validated(Join, {"skin_id": sent.get("other", "").strip(), "reason": sent.get("reason", "")})
-    usecase.join(store, skin_id, asked.skin_id, asked.reason)
-    return see(f"/skins/{quote(skin_id, safe='')}")
-
-
 @router.get("/mark")
 def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
     """Another one whenever anything has changed that the page shows."""
@@ -179,10 +176,10 @@ def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
 
 @router.get("/map.csv")
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
-    """d33 of each sensor in the latest campaign, and its trend."""
+    """d33 of each sensor in the latest campaign with FRFs, and its trend."""
     root, _ = _completed(store, table, skin_id)
     history = usecase.history_by_model(store, table, root, by)
-    row = store.read(campaigns.latest, root)
+    row = store.read(campaigns.describing, root)
     rows = [] if row is None else map_rows(row, d33_cache.by_model(store, table, row, by), history)
     return csv_of_rows("map", _MAP_COLUMNS, rows)
 

@@ -2,6 +2,7 @@
 // Sliders: each moves its number by the same ratio a step, and the answer comes while they move.
 
 const form = document.getElementById("design");
+const outside = document.getElementById("outside");
 const refused = document.getElementById("refused");
 let asking = null;
 
@@ -9,7 +10,7 @@ function ratio(slider) {
   return Math.log(slider.dataset.high / slider.dataset.low);
 }
 function place(slider) {
-  const value = Number(form.elements[slider.dataset.for].value);
+  const value = Number(form.elements[slider.dataset.for].value.replace(",", "."));
   slider.value = String(Math.round((1000 * Math.log(value / slider.dataset.low)) / ratio(slider)));
 }
 
@@ -27,7 +28,12 @@ async function answer() {
   }
   refused.hidden = !design.error;
   refused.textContent = design.error ?? "";
+  // What was told before stands greyed beside an error: it is of other values.
+  for (const part of document.querySelectorAll(".results, figure.drawn")) part.classList.toggle("old", Boolean(design.error));
   if (design.error) return;
+  if (!document.querySelector("[data-result]")) return void location.assign(`/design?${query}`); // it opened with an error
+  outside.hidden = !design.outside;
+  outside.querySelector("span").textContent = design.outside ?? "";
   history.replaceState(null, "", `/design?${query}`);
   for (const [name, [text, exact, note]] of Object.entries(design.results)) {
     const entry = document.querySelector(`[data-result="${name}"]`);
@@ -40,8 +46,7 @@ async function answer() {
     const place = document.getElementById(`figure-${name}`);
     place.querySelector('script[type="application/json"]').textContent = figure;
     await redraw(place.querySelector(".plot"));
-    const numbers = place.querySelector(".tools a");
-    numbers.search = query;
+    for (const numbers of place.querySelectorAll(".tools a")) numbers.search = query;
   }
   document.querySelectorAll(".same code").forEach((code, index) => (code.textContent = design.same[index]));
 }

@@ -20,6 +20,7 @@ from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
+from underskin.recordings import curve_signs
 from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
@@ -37,7 +38,16 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         most = request.app.state.settings.max_body_bytes
         try:
             options = IngestOptions(
-                pending.skin, pending.corrects, reason, False, together, None, sender(request), most, pending.estimator
+                pending.skin,
+                pending.corrects,
+                reason,
+                False,
+                together,
+                None,
+                sender(request),
+                most,
+                pending.estimator,
+                turn_curves=pending.turned,
             )
             answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
@@ -111,3 +121,9 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
             )
         sentences += d33_cache.foreseen(table, one.campaign)
     return sentences
+
+
+def counts_pressing_negative(looked: InspectedFile) -> bool:
+    """Whether curves of a file do."""
+    held = [one.campaign for one in map(checked, looked.campaigns) if one.campaign is not None]
+    return any(curve_signs.findings(campaign) for campaign in held)

@@ -5,7 +5,7 @@ from copy import deepcopy
 from typing import Any
 
 from service.ingest.reading import InspectedFile
-from service.pages.shared.forms import UNLIKELY, worded
+from service.pages.shared.forms import UNLIKELY, number_or_text, worded
 from service.pages.upload import spring_mapping
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
@@ -170,7 +170,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     sensors, strange = _sensors(form.get("sensors", ""))
     channels, twice = _channels(form, base.get("channels", {}))
     document: dict[str, Any] = {"schema": SCHEMA, **deepcopy(dict(base)), "kind": kind}
-    document["skin"] = _replaced(base.get("skin", {}), {name: _number(form.get(name, "")) for name, *_ in SKIN})
+    document["skin"] = _replaced(base.get("skin", {}), {name: number_or_text(form.get(name, "")) for name, *_ in SKIN})
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
     values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
     document["recording"] = _replaced(base.get("recording", {}), values)
@@ -202,16 +202,7 @@ def _said(form: Mapping[str, str], name: str) -> Any:
     if form.get(f"{name}-from"):
         return {"property": form[f"{name}-from"]}
     text = form.get(name, "").strip()
-    return (text or None) if name in _TEXTS else _number(text)
-
-
-def _number(text: str) -> Any:
-    """A number, with a decimal point or comma; what is none is left to the checks, which name it."""
-    text = text.strip()
-    try:
-        return float(text.replace(",", ".")) if text else None
-    except ValueError:
-        return text
+    return (text or None) if name in _TEXTS else number_or_text(text)
 
 
 def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
@@ -230,7 +221,7 @@ def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInpu
             sensors.append({"id": text})
         else:
             name, x, y = parts
-            sensors.append({"id": name.strip(), "x_mm": _number(x), "y_mm": _number(y)})
+            sensors.append({"id": name.strip(), "x_mm": number_or_text(x), "y_mm": number_or_text(y)})
     return sensors or None, strange
 
 
@@ -262,7 +253,7 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
         "unit": true_unit if true_unit and (wrong or not label or "unit" in base) else None,
         "labelled": label if wrong else None,
         "sign": {"1": 1, "-1": -1}.get(form.get(f"sign-{number}", "")),
-        "sensitivity": _number(form.get(f"sensitivity-{number}", "")),
+        "sensitivity": number_or_text(form.get(f"sensitivity-{number}", "")),
         "sensitivity_unit": form.get(f"sensitivity_unit-{number}", "").strip() or None,
         "stiffness_n_per_mm": stiffness,
     }

@@ -22,10 +22,18 @@ from service.pages.upload import exported_skin, similar_errors, spring_mapping
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import figures, lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of, worth_knowing
+from service.pages.upload.keep import (
+    CORRECTS,
+    SKIN_FIELD,
+    counts_pressing_negative,
+    field_errors,
+    keep_good,
+    rig_in_use,
+    skin_of,
+    worth_knowing,
+)
 from service.pages.upload.mapping import mapped_file
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
-from service.problems import Refusal
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin import InvalidInput
@@ -58,10 +66,18 @@ def form(
     corrects: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
     """Asks for files; `corrects`: the campaign whose place they take."""
+    return _form(request, store, skin, corrects)
+
+
+def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
     return page(
         request,
         "upload.html",
+        waiting=pending_uploads.waiting(session.cookie_in(dict(request.scope["headers"]))),
+        status=200 if error is None else 422,
+        error=error,
         skin=skin,
         corrects=corrects,
         known=known,
@@ -82,7 +98,9 @@ async def send(request: Request, store: Store) -> Response:
         given = [one for one in sent if one.label and one.field != RIG]
         rig = next((one for one in sent if one.field == RIG and one.label), None)
         if not given:
-            raise Refusal(422, "No file came. Choose one, or drop it on the page.", title="No file")
+            error = "No file came. Choose one, or drop it on the page."
+            filled = fields.get(SKIN_FIELD, ""), fields.get(CORRECTS, "")
+            return await run_in_threadpool(_form, request, store, *filled, error)
         corrects = fields.get(CORRECTS) or None
         said = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, said) if said else None
@@ -173,6 +191,15 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     return see(f"/upload/{pending.id}")
 
 
+@router.post("/{upload_id}/signs", dependencies=WRITE)
+async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
+    """Reads the files again, curves that count pressing negative turned, or as they came."""
+    pending.turned = sent.get("turned") == "yes"
+    async with READING_SLOTS:
+        await run_in_threadpool(_look, request, pending)
+    return see(f"/upload/{pending.id}")
+
+
 @router.post("/{upload_id}/keep", dependencies=WRITE)
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
@@ -224,7 +251,8 @@ def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedF
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
     inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
-    return replace(inspected, campaigns=[one.with_estimator(pending.estimator) for one in inspected.campaigns])
+    campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
+    return replace(inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns)
 
 
 def _look(request: Request, pending: PendingUpload) -> None:
@@ -232,10 +260,12 @@ def _look(request: Request, pending: PendingUpload) -> None:
     summaries: list[FileSummary] = []
     drawn: list[Drawn] = []
     recordings = 0
+    pending.negative = False
     for number, upload in enumerate(pending.files):
         inspected = _looked(request, pending, number)
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
+        pending.negative |= counts_pressing_negative(inspected)
         known = worth_knowing(request, inspected, pending.skin, pending.corrects)
         summary = seen(upload, inspected, known)
         mapped = mapped_file(inspected, summary, pending.rig)
@@ -247,8 +277,8 @@ def _look(request: Request, pending: PendingUpload) -> None:
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
-    """What the latest campaign of a skin says of it."""
-    row = None if skin is None else store.read(campaigns.latest, skin)
+    """What the campaigns of a skin say of it."""
+    row = None if skin is None else store.read(campaigns.describing, skin)
     return {} if row is None else dict(row.about["skin"])
 
 

@@ -1,7 +1,7 @@
 """Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
 
-They lie in the server's folder of uploads, which is removed with the server. Together they take at most the room of one
-upload; the oldest are removed first.
+They lie in the server's folder of uploads, which is removed with the server. A session has a few at a time, and all
+together take at most the room of one upload; the oldest are removed first.
 """
 
 import hashlib
@@ -24,6 +24,7 @@ from underskin.recordings.rig_description import RigDescription
 
 LASTS_S = 3600.0
 _MOST_KEPT = 50
+_MOST_OF_SESSION = 5
 _MOST_DRAWN = 6  # files whose figures are kept
 
 
@@ -50,6 +51,8 @@ class PendingUpload:
     corrects: str | None = None  # the campaign whose place it takes
     reason: str = ""  # why it does
     skin_summary: SkinSummary | None = None  # where it is an exported skin
+    negative: bool = False  # whether curves of it count pressing negative
+    turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -70,7 +73,7 @@ class PendingUploads:
         self._held: dict[str, PendingUpload] = {}
 
     def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
-        """Take over the files of an upload; what the session had here before goes."""
+        """Take over the files of an upload; of a session that has too many the oldest goes."""
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
@@ -78,7 +81,7 @@ class PendingUploads:
         size = sum(one.path.stat().st_size for one in files)
         added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
         with self._lock:
-            for old in [held for held in self._held.values() if held.session == added.session]:
+            for old in self._of_session(added.session)[_MOST_OF_SESSION - 1 :]:
                 self._remove(old)
             self._sweep(size)
             self._held[name] = added
@@ -91,11 +94,17 @@ class PendingUploads:
             upload = self._held.get(name)
             if upload is None or upload.session != _digest(cookie):
                 raise Missing(
-                    "This upload is not here any more: an upload that is not kept goes after an hour, when you send "
-                    "another one, or when the server is restarted. Nothing of it was kept; send it again."
+                    "This upload is not here any more: an upload that is not kept goes after an hour, when room is "
+                    "needed for others, or when the server is restarted. Nothing of it was kept; send it again."
                 )
             upload.used = time.monotonic()
             return upload
+
+    def waiting(self, cookie: str) -> list[PendingUpload]:
+        """The session's own that were neither kept nor discarded, the one used last first."""
+        with self._lock:
+            self._sweep(0)
+            return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
 
     def empty(self, pending: PendingUpload) -> None:
         """Remove the files; the page that says where they went stays for a while."""
@@ -106,6 +115,10 @@ class PendingUploads:
         """Remove it whole."""
         with self._lock:
             self._remove(pending)
+
+    def _of_session(self, session: str) -> list[PendingUpload]:
+        own = [held for held in self._held.values() if held.session == session]
+        return sorted(own, key=lambda held: held.used, reverse=True)
 
     def _sweep(self, coming: int) -> None:
         """Remove what is too old, and the oldest until there is room."""

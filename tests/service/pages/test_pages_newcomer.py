@@ -39,7 +39,7 @@ def test_from_the_start_to_a_history_by_the_adopted_model(visitor: Visit, server
     page.get_by_label("sensor radius").fill("1.5")
     page.get_by_label("Layout").fill("s1, 0, 0\ns2; 8; 0")
     page.get_by_label("dynamic force", exact=False).first.fill("0.05")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_text("12 recordings understood").wait_for()
     visitor.drawn(2)  # and its FRFs
     visitor.require_accessible()

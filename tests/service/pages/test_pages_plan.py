@@ -1,6 +1,9 @@
 """What to measure next within the reader's own rig, on the pages."""
 
+import csv
+import io
 import re
+from typing import Any
 
 import httpx
 import pytest
@@ -27,7 +30,34 @@ def diagnosis_id(server: Server) -> str:
     return found
 
 
-def test_the_next_experiment_is_planned_within_the_reader_s_rig(visitor: Visit, diagnosis_id: str) -> None:
+def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dict[str, Any]]) -> None:
+    """As CSV and as rig descriptions; a file of the first one, read by its description, ticks its row off."""
+    plan = visitor.page.get_by_role("region", name="The plan")
+    query = visitor.page.url.partition("?")[2]
+    place = visitor.page.url.partition("?")[0]
+    table = list(csv.DictReader(io.StringIO(visitor.page.request.get(f"{place}/recordings.csv?{query}").text())))
+    assert [float(row["preload_n"]) for row in table] == [entry["preload_n"] for entry in planned]
+    assert {row["arrived"] for row in table} == {"0"}
+    with visitor.page.expect_download() as saving:
+        plan.get_by_role("link", name="YAML of recording 1").click()
+    rig = saving.value.path().read_bytes()
+    lines = "frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n\n10,7,0\n20,7,0\n40,7.1,0\n"
+    for number in range(planned[0]["repeats"]):
+        files = {
+            "file": (f"planned-{number}.csv", lines.replace("7.1", f"7.{number + 1}").encode()),
+            "rig": ("rig.yaml", rig),
+        }
+        server.http.post("/v1/campaigns?skin=narrow", files=files).raise_for_status()
+    visitor.page.reload()
+    row = plan.get_by_role("region", name="Recordings to make").locator("tbody tr").first
+    assert f"✓ {planned[0]['repeats']} of {planned[0]['repeats']}" in row.inner_text()
+    assert "1 of" in plan.locator("[role=status]").inner_text()
+    visitor.require_accessible()
+
+
+def test_the_next_experiment_is_planned_within_the_reader_s_rig(
+    visitor: Visit, server: Server, diagnosis_id: str
+) -> None:
     expected = diagnose(campaign(NARROW, table()), table(), limits=LIMITS).next_experiment
     page = visitor.page
     visitor.go(f"/diagnoses/{diagnosis_id}")
@@ -45,7 +75,13 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(visitor: Visit, 
     plan.wait_for(timeout=240_000)  # without reloading by hand
     assert readable(expected["statement"]) in plan.inner_text()
     assert plan.locator("tbody tr").count() == len(expected["recordings"])
+    assert "None of them has arrived yet." in plan.inner_text()
     visitor.require_accessible()
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    visitor.require_accessible()
+    page.set_viewport_size({"width": 1280, "height": 844})
+    _ticked_off_as_they_arrive(visitor, server, expected["recordings"])
     page.get_by_text("The same by request").click()
     command = page.get_by_label("Shell").inner_text()
     assert "--preload-n 0.3 2.5 --indenter-radius-mm 4.0 --indenter-radius-mm 8.0 --recordings 5" in command

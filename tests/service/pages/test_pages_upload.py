@@ -39,7 +39,7 @@ def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(vis
     page.get_by_text("What the channels are").click()
     assert page.get_by_label("Sign of Amplifier").input_value() == "-1"
     page.get_by_label("Sensitivity of Amplifier", exact=True).fill("5")  # as if the range had been another
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_text("1 recording understood").wait_for()
     shown = page.get_by_role("row", name="press").last.inner_text()
     assert float(shown.split()[-1]) == pytest.approx(2 * GAIN, rel=0.02)
@@ -62,24 +62,24 @@ def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG)
     page.get_by_text("What the channels are").click()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     alert = page.get_by_role("alert")
     assert "channels.charge_pc.sensitivity" in alert.inner_text()
     visitor.require_accessible()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/N")
     page.get_by_label("sphere radius R [mm]", exact=True).fill("5")
     page.get_by_label("Layout").fill("s01 0")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     assert "name, x [mm], y [mm]" in alert.inner_text()
     assert page.get_by_label("sphere radius R [mm]", exact=True).input_value() == "5"  # what was typed is still there
     assert page.get_by_label("Layout").input_value() == "s01 0"
     page.get_by_label("Layout").fill("s01 0 0")
     page.get_by_label("sphere radius R [mm]", exact=True).fill("")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_role("heading", name="It cannot be read so").wait_for()
     assert "Amplifier" in page.get_by_role("row", name="file").inner_text()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/pC")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     assert "fill it in below" in page.get_by_role("row", name="sphere radius R [mm]").inner_text()
 
 

@@ -84,7 +84,7 @@ def test_two_channels_for_one_field_are_pointed_out_and_refused(visitor: Visit) 
     look_at(visitor, [file("two forces.csv", TWO_FORCES)])
     assert "Force right [N] may be force as well as Force left [N]" in page.get_by_role("main").inner_text()
     page.get_by_label("What Force right [N] is").select_option("force_n")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     alert = page.get_by_role("alert").inner_text()
     assert "Force right" in alert
     assert "Force left [N] is force already: set one of the two to “not used”" in alert
@@ -97,7 +97,7 @@ def test_two_channels_for_one_field_are_pointed_out_and_refused(visitor: Visit) 
     page.locator("#indenter_radius_mm").fill("4")
     page.locator("#preload_n").fill("1")
     page.locator("#dynamic_force_n").fill("0.2")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_text("1 recording understood").wait_for()
     page.get_by_text("What the channels are").click()
     assert page.get_by_label("What Force left [N] is").input_value() == ""
@@ -131,7 +131,7 @@ def test_every_frf_of_a_universal_file_becomes_a_recording(visitor: Visit) -> No
     page.locator("#indenter_radius_mm").fill("4")
     page.locator("#preload_n").fill("1")
     page.locator("#dynamic_force_n").fill("0.2")
-    page.get_by_role("button", name="Read it so").click()
+    page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_text("3 recordings understood").wait_for()
     assert "holds 3 FRFs, each a part of its own: s1, s2, s3" in page.get_by_role("main").inner_text()
     levels = [page.get_by_role("row", name=f"array s{number}").locator("td").last.inner_text() for number in (1, 2, 3)]

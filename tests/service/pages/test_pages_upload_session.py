@@ -114,8 +114,11 @@ def test_the_shelf_holds_no_more_than_one_upload_may(tmp_path: Path) -> None:
     with pytest.raises(Missing):
         pending_uploads.find("two", second.id)  # looked at longest ago
     assert pending_uploads.find("one", first.id) is first
-    again = pending_uploads.put("one", [upload(arriving, 100)])  # a session has one
+    again = pending_uploads.put("one", [upload(arriving, 100)])  # beside the session's first
+    assert sum(path.stat().st_size for path in shelf_folder.rglob("*") if path.is_file()) == 900
+    assert pending_uploads.waiting("one") == [again, first]
+    assert pending_uploads.waiting("three") == [third]
+    more = [pending_uploads.put("one", [upload(arriving, 1)]) for _ in range(4)]  # a session has five at most
     with pytest.raises(Missing):
         pending_uploads.find("one", first.id)
-    assert sum(path.stat().st_size for path in shelf_folder.rglob("*") if path.is_file()) == 500
-    assert [pending_uploads.find("one", again.id), pending_uploads.find("three", third.id)] == [again, third]
+    assert pending_uploads.waiting("one") == [*reversed(more), again]

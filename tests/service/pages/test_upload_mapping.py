@@ -108,7 +108,7 @@ def test_what_is_missing_is_said_in_the_form_s_words() -> None:
         checked("thickness_mm", 2500.0)
     unlikely = error.value.allowed
     told = what_to_do({"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
-    assert "(or tick “Take unlikely magnitudes as they are”)" in told
+    assert "(or tick “These values are right, unusual as they are”)" in told
     assert "units_checked" not in told
     assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
 

@@ -45,7 +45,7 @@ def test_a_history_shows_nothing_of_an_earlier_revision(store: Database) -> None
         assert [point.sensor for point in inversions.history(connection, "palm", TABLE)] == ["s0"]
         assert inversions.history(connection, "palm", "1" * 64) == []
     with store.writing() as connection:
-        campaigns.exclude(connection, row.id, "s0-1N", "cable loose")
+        campaigns.exclude(connection, row.id, "s0-1N", "cable loose", None)
         assert inversions.history(connection, "palm", TABLE) == []
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.blocks import block
 from tests.support.store_server import Place, Server, campaign, running
 
 
@@ -189,3 +190,15 @@ def test_changes_need_a_key_of_scope_write(place: Place) -> None:
             assert answer.status_code != 403, path
         sent_by = server.http.get("/v1/campaigns").json()["campaigns"][0]["received_from"]
         assert sent_by == "write"
+
+
+def test_the_page_describes_the_skin_by_its_latest_campaign_with_frfs(server: Server) -> None:
+    for name, day in (("later", "2024-09-02"), ("earlier", "2024-05-02")):
+        document = campaign(name, thickness_mm=3.0 if name == "later" else 2.5)
+        for recording in document["recordings"]:
+            recording["recorded_at"] = f"{day}T09:00:00Z"
+        server.http.post("/v1/campaigns?skin=palm", json=document).raise_for_status()
+    server.http.post("/v1/campaigns?skin=palm", json=block("block", recorded_at="2024-11-02T09:00:00Z"))
+    page = server.http.get("/skins/palm", headers={"Accept": "text/html"}).text
+    assert page.index(">block</a>") < page.index(">later</a>", page.index(">block</a>")) < page.index(">earlier</a>")
+    assert '>3</span>&nbsp;<span class="unit">mm</span>' in page

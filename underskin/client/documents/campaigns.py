@@ -78,6 +78,9 @@ class RecordingEntry(Document):
     exclude_reason: str | None
     """Why it was excluded."""
 
+    excluded_from: str | None
+    """Name of the API key that excluded it."""
+
     scalars: Mapping[str, Any]
     """Its fields that are single values, as in campaign/1."""
 
@@ -162,6 +165,9 @@ class CampaignDetail(Document):
     withdraw_reason: str | None
     """Why."""
 
+    withdrawn_from: str | None
+    """Name of the API key that withdrew it."""
+
     skin: Skin
     """The skin as the campaign declares it."""
 
@@ -223,6 +229,9 @@ class CampaignEntry(Document):
 
     withdraw_reason: str | None
     """Why."""
+
+    withdrawn_from: str | None
+    """Name of the API key that withdrew it."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -42,8 +42,8 @@ def _statement(plan: NextRecordings) -> str:
     count = f"{len(plan.recordings)} recordings, first" if len(plan.recordings) > 1 else "One recording"
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
     return (
-        f"{count} with the {first.indenter_radius_mm:g} mm sphere at {first.preload_n:g} N, should tell which of "
-        f"{_rivals(plan)} it is, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
+        f"{count} with the {first.indenter_radius_mm:g} mm sphere at {first.preload_n:g} N, should tell whether "
+        f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
 
 
@@ -58,7 +58,7 @@ def _block(plan: NextRecordings) -> str:
 
 
 def _why_none(plan: NextRecordings) -> str:
-    statement = f"No recordings within these limits are likely to tell {_rivals(plan)} apart."
+    statement = f"No recordings within these limits are likely to tell whether it is {_rivals(plan)}."
     if plan.differ_on:
         words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
         statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
@@ -66,4 +66,6 @@ def _why_none(plan: NextRecordings) -> str:
 
 
 def _rivals(plan: NextRecordings) -> str:
-    return listed([in_words(names) for names in plan.rivals])
+    """Each explanation in words, "with" between the mechanisms of one, so that "or" parts explanations alone."""
+    *others, last = [" with ".join(in_words([name]) for name in names) for names in plan.rivals]
+    return f"{', '.join(others)} or {last}" if others else last

@@ -1,0 +1,109 @@
+"""What is asked for and changed on the page of a skin: diagnosed together, its model withdrawn, another one joined, its
+title, remark and tags; put away; and such a change taken back.
+"""
+
+from collections.abc import Callable
+from urllib.parse import quote
+
+from fastapi import APIRouter, Request, Response
+from sqlalchemy import Connection
+
+from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, sender
+from service.pages.shared.forms import OWN_FORM, Form, annotated, attempted, reason, see
+from service.pages.skin.page import shown
+from service.problems import parsed
+from service.schemas.diagnoses import AskForSkin
+from service.schemas.skins import Join
+from service.store import Database, annotations, models, skins
+from service.usecases import diagnoses as diagnosis_usecase
+from service.usecases import skins as usecase
+from service.usecases.campaigns import take_back
+from underskin.recordings import validation
+from underskin.surrogate.sigma_table import SigmaTable
+
+router = APIRouter(prefix="/skins/{skin_id}", dependencies=WRITE)
+
+
+@router.post("/diagnosis", dependencies=[OWN_FORM])
+def diagnose_together(request: Request, skin_id: SkinId, runner: RunnerInUse, store: Store, table: Table) -> Response:
+    """Puts one diagnosis of all campaigns in use into the queue; one that there is already is shown."""
+    row = store.write(diagnosis_usecase.ask_of_skin, skin_id, table, sender(request), AskForSkin())
+    runner.stir()
+    return see(f"/diagnoses/{row.id}")
+
+
+@router.post("/model/withdraw")
+def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
+    """Has no model in force."""
+
+    def do() -> None:
+        _of_root(store, skin_id, models.withdraw, reason(sent), sender(request))
+
+    return _done(request, skin_id, store, table, "model", sent, do)
+
+
+@router.post("/join")
+def join(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
+    """Count the other as this one from now on."""
+
+    def do() -> None:
+        asked = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
+        usecase.join(store, skin_id, asked.skin_id, asked.reason, sender(request))
+
+    return _done(request, skin_id, store, table, "join", sent, do)
+
+
+@router.post("/annotate")
+def annotate(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
+    """Change title, remark and tags."""
+
+    def do() -> None:
+        title = sent.get("title", "").strip()
+        values = {"title": validation.name("title", title, False) if title else None, **annotated(sent)}
+        _of_root(store, skin_id, annotations.of_skin, values, sender(request))
+
+    return _done(request, skin_id, store, table, "annotate", sent, do)
+
+
+@router.post("/discard")
+def discard(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
+    """Put a skin that holds nothing in use into no list any more."""
+
+    def do() -> None:
+        _of_root(store, skin_id, annotations.discard, reason(sent), sender(request))
+
+    return _done(request, skin_id, store, table, "discard", sent, do)
+
+
+@router.post("/undo")
+def undo(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
+    """Take a change back, while nothing builds on it."""
+
+    def do() -> None:
+        take_back(store, table, sent.get("change", ""), sender(request))
+
+    return _done(request, skin_id, store, table, "undo", sent, do)
+
+
+def _of_root(store: Database, skin_id: str, change: Callable[..., object], *values: object) -> None:
+    """Change the skin that an id counts as."""
+
+    def write(connection: Connection) -> None:
+        change(connection, skins.require_root(connection, skin_id), *values)
+
+    store.write(write)
+
+
+def _done(
+    request: Request,
+    skin_id: str,
+    store: Database,
+    table: SigmaTable,
+    form: str,
+    sent: dict[str, str],
+    do: Callable[[], None],
+) -> Response:
+    refused = attempted(form, sent, do)
+    if refused is not None:
+        return shown(request, skin_id, store, table, refused=refused)
+    return see(f"/skins/{quote(skin_id, safe='')}")

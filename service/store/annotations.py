@@ -1,0 +1,64 @@
+"""What a lab writes to a skin or a campaign afterwards: its name, a remark, tags. And skins that hold nothing in use,
+put away: they are in no list, and everything of them can still be read.
+"""
+
+from collections.abc import Mapping
+
+from sqlalchemy import Connection, func, select, update
+
+from service.store import campaigns as kept_campaigns
+from service.store import changes, skins
+from service.store.errors import Conflict, Missing
+from service.store.tables import campaigns
+from service.store.tables import skins as skin_rows
+from service.store.times import now
+
+OF_CAMPAIGN = ("name", "remark", "tags")
+OF_SKIN = ("title", "remark", "tags")
+
+
+def of_campaign(
+    connection: Connection, campaign_id: str, values: Mapping[str, str | None], made_from: str | None
+) -> None:
+    """Change some of `OF_CAMPAIGN`; nothing is recorded where nothing differs. Raises Missing."""
+    row = kept_campaigns.find(connection, campaign_id, lock=True)
+    after = {name: value for name, value in values.items() if getattr(row, name) != value}
+    if after:
+        before = {name: getattr(row, name) for name in after}
+        connection.execute(update(campaigns).where(campaigns.c.id == campaign_id).values(**after))
+        changes.record(
+            connection, "annotate", row.skin_id, made_from, campaign_id=campaign_id, before=before, after=after
+        )
+
+
+def of_skin(connection: Connection, root: str, values: Mapping[str, str | None], made_from: str | None) -> None:
+    """Change some of `OF_SKIN`; nothing is recorded where nothing differs. Raises Missing."""
+    row = skins.lock(connection, [root]).get(root)
+    if row is None:
+        raise Missing(f"There is no skin {root!r}.")
+    after = {name: value for name, value in values.items() if getattr(row, name) != value}
+    if after:
+        before = {name: getattr(row, name) for name in after}
+        connection.execute(update(skin_rows).where(skin_rows.c.id == root).values(**after))
+        changes.record(connection, "annotate", root, made_from, before=before, after=after)
+
+
+def discard(connection: Connection, root: str, reason: str, made_from: str | None) -> None:
+    """Put a skin away; raises Conflict where a campaign of it is in use, or it was put away already."""
+    row = skins.lock(connection, [root])[root]
+    if row.discarded_at is not None:
+        raise Conflict(f"Skin {root!r} was discarded already.")
+    used = in_use(connection, root)
+    if used:
+        raise Conflict(f"Skin {root!r} has {used} campaigns in use: withdraw them first.")
+    after = {"discarded_at": now()}
+    connection.execute(update(skin_rows).where(skin_rows.c.id == root).values(**after))
+    before = {"discarded_at": None}
+    changes.record(connection, "discard", root, made_from, reason=reason, before=before, after=after)
+
+
+def in_use(connection: Connection, root: str) -> int:
+    """How many campaigns of a skin figures use."""
+    query = select(func.count()).select_from(campaigns)
+    query = query.where(campaigns.c.skin_id.in_(skins.members(root)), kept_campaigns.CURRENT)
+    return int(connection.execute(query).scalar_one())

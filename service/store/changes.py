@@ -1,0 +1,58 @@
+"""What was changed of skins and campaigns since they were kept: who, when, why, and what was there before.
+
+Rows are added and never altered; what takes a change back is a change of its own, which names it.
+"""
+
+import secrets
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from sqlalchemy import Connection, insert, select
+
+from service.store.tables import AnyRow, changes, skins
+from service.store.times import now
+
+Action = Literal["annotate", "withdraw", "exclude", "join", "discard", "undo"]
+
+
+def record(
+    connection: Connection,
+    action: Action,
+    skin_id: str,
+    made_from: str | None,
+    *,
+    campaign_id: str | None = None,
+    recording: str | None = None,
+    reason: str | None = None,
+    before: Mapping[str, Any] | None = None,
+    after: Mapping[str, Any] | None = None,
+    undoes: str | None = None,
+) -> None:
+    """Keep one change of a skin, or of a campaign of it; `made_from`: name of the API key."""
+    row = {
+        "id": f"ch-{secrets.token_hex(8)}",
+        "action": action,
+        "skin_id": skin_id,
+        "campaign_id": campaign_id,
+        "recording": recording,
+        "at": now(),
+        "made_from": made_from,
+        "reason": reason,
+        "before": dict(before or {}),
+        "after": dict(after or {}),
+        "undoes": undoes,
+    }
+    connection.execute(insert(changes), row)
+
+
+def of_campaign(connection: Connection, campaign_id: str) -> Sequence[AnyRow]:
+    """Those of a campaign and its recordings, the latest first."""
+    query = select(changes).where(changes.c.campaign_id == campaign_id)
+    return connection.execute(query.order_by(changes.c.number.desc())).all()
+
+
+def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
+    """Those of a skin itself and of those joined to it, not of its campaigns, the latest first."""
+    own = select(skins.c.id).where(skins.c.root_id == root)
+    query = select(changes).where(changes.c.skin_id.in_(own), changes.c.campaign_id.is_(None))
+    return connection.execute(query.order_by(changes.c.number.desc())).all()

@@ -1,0 +1,121 @@
+"""Changes taken back, for as long as nothing builds on them: no diagnosis was asked for and no model adopted since, of
+the campaign or of its skin, and no later change of the same stands in between.
+"""
+
+from collections.abc import Sequence
+
+from sqlalchemy import Connection, select, update
+
+from service.store import changes as kept
+from service.store import skins
+from service.store.diagnosed_together import has_one_of
+from service.store.errors import Conflict, Missing
+from service.store.skin_changes import numbers_of
+from service.store.tables import AnyRow, campaigns, changes, diagnoses, models, recordings
+from service.store.tables import skins as skin_rows
+
+_FIGURES = ("withdraw", "exclude", "join")  # what changes figures
+
+
+def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:
+    """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
+    change = connection.execute(select(changes).where(changes.c.id == change_id)).first()
+    if change is None:
+        raise Missing(f"There is no change {change_id!r}.")
+    skins.lock(connection, [change.skin_id])
+    why_not = standing(connection, change)
+    if why_not is not None:
+        raise Conflict(f"This cannot be undone: {why_not}.")
+    _TAKE_BACK[change.action](connection, change)
+    kept.record(
+        connection,
+        "undo",
+        change.skin_id,
+        made_from,
+        campaign_id=change.campaign_id,
+        recording=change.recording,
+        undoes=change.id,
+    )
+    return change
+
+
+def standing(connection: Connection, change: AnyRow) -> str | None:
+    """Why a change stands: it was undone already, or something builds on it; None where it can be undone."""
+    if change.action == "undo":
+        return "it took another change back"
+    later = _later(connection, change)
+    if any(other.undoes == change.id for other in later):
+        return "it was undone already"
+    undone = {other.undoes for other in later}
+    if any(other.id not in undone and _stacks(change, other) for other in later):
+        return "a later change builds on it"
+    return _built_since(connection, change) if change.action in _FIGURES else None
+
+
+def _later(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
+    query = select(changes).where(changes.c.skin_id == change.skin_id, changes.c.number > change.number)
+    return connection.execute(query).all()
+
+
+def _stacks(change: AnyRow, other: AnyRow) -> bool:
+    """Whether a later change rests on the earlier one."""
+    if other.action == "undo" or other.campaign_id != change.campaign_id:
+        return False
+    return (change.action in _FIGURES) == (other.action in _FIGURES)
+
+
+def _built_since(connection: Connection, change: AnyRow) -> str | None:
+    root = skins.require_root(connection, change.skin_id)
+    numbers = numbers_of(root)
+    of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
+    if change.campaign_id is not None:
+        own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id)
+        of_skin = diagnoses.c.campaign.in_(own) | has_one_of(numbers)
+    asked = select(diagnoses.c.id).where(of_skin, diagnoses.c.asked_at > change.at).limit(1)
+    if connection.execute(asked).first() is not None:
+        return "it was diagnosed since"
+    adopted = select(models.c.id).where(models.c.skin_id.in_(skins.members(root)), models.c.adopted_at > change.at)
+    if connection.execute(adopted.limit(1)).first() is not None:
+        return "a model was adopted since"
+    return None
+
+
+def _use_again(connection: Connection, change: AnyRow) -> None:
+    values = {"withdrawn_at": None, "withdrawn_from": None, "withdraw_reason": None}
+    _campaign(connection, change, **values, revision=campaigns.c.revision + 1)
+
+
+def _include(connection: Connection, change: AnyRow) -> None:
+    own = select(campaigns.c.number).where(campaigns.c.id == change.campaign_id).scalar_subquery()
+    this = (recordings.c.campaign == own) & (recordings.c.id == change.recording)
+    values = {"excluded_at": None, "excluded_from": None, "exclude_reason": None}
+    connection.execute(update(recordings).where(this).values(**values))
+    _campaign(connection, change, excluded=campaigns.c.excluded - 1, revision=campaigns.c.revision + 1)
+
+
+def _part(connection: Connection, change: AnyRow) -> None:
+    """Let the skin that was joined, and those that counted as it, count for themselves again."""
+    other, members = change.before["skin_id"], change.before["members"]
+    connection.execute(update(skin_rows).where(skin_rows.c.id.in_(members)).values(root_id=other))
+    alone = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
+    connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**alone))
+
+
+def _as_before(connection: Connection, change: AnyRow) -> None:
+    if change.campaign_id is not None:
+        _campaign(connection, change, **change.before)
+    else:
+        connection.execute(update(skin_rows).where(skin_rows.c.id == change.skin_id).values(**change.before))
+
+
+def _campaign(connection: Connection, change: AnyRow, **values: object) -> None:
+    connection.execute(update(campaigns).where(campaigns.c.id == change.campaign_id).values(**values))
+
+
+_TAKE_BACK = {
+    "withdraw": _use_again,
+    "exclude": _include,
+    "join": _part,
+    "annotate": _as_before,
+    "discard": _as_before,
+}

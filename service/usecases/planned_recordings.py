@@ -1,0 +1,65 @@
+"""The recordings of a plan: which of them have arrived, and each one's rig description (`rig/1`)."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import orjson
+from sqlalchemy import Connection, select
+
+from service.store import AnyRow, skins
+from service.store.campaigns import CURRENT
+from service.store.tables import campaigns, recordings
+from underskin.recordings.rig_description import SCHEMA
+
+# Relative difference up to which a condition is the planned one.
+_ALIKE = {"indenter_radius_mm": 0.01, "preload_n": 0.05, "dynamic_force_n": 0.1, "dwell_s": 0.1}
+_NEAR_MM = 0.1
+_OF_ONE = ("position_mm", "dwell_s")  # conditions that no other recording hands on
+_COLUMNS = ("frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n")
+_OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius_mm", "sensors")
+
+
+def arrived(connection: Connection, diagnosis: AnyRow, planned: Sequence[Mapping[str, Any]]) -> list[int]:
+    """How many of each planned recording came for the skin since it was diagnosed, `repeats` at most; each recording in
+    use counts once."""
+    root = skins.require_root(connection, diagnosis.skin_id)
+    query = select(recordings.c.scalars).join(campaigns, campaigns.c.number == recordings.c.campaign)
+    query = query.where(campaigns.c.skin_id.in_(skins.members(root)), CURRENT, recordings.c.excluded_at.is_(None))
+    query = query.where(campaigns.c.received_at > diagnosis.asked_at, recordings.c.kind == "frf")
+    counts = [0] * len(planned)
+    for (recorded,) in connection.execute(query.order_by(campaigns.c.number, recordings.c.position)):
+        for place, entry in enumerate(planned):
+            if counts[place] < entry["repeats"] and _is_planned(recorded, entry):
+                counts[place] += 1
+                break
+    return counts
+
+
+def _is_planned(recorded: Mapping[str, Any], planned: Mapping[str, Any]) -> bool:
+    if recorded["sensor"] != planned["sensor"]:
+        return False
+    for name, tolerance in _ALIKE.items():
+        if name in planned and not np.isclose(recorded.get(name, np.nan), planned[name], rtol=tolerance, atol=0):
+            return False
+    if not planned.get("position_mm") or not recorded.get("position_mm"):
+        return True
+    return bool(np.hypot(*np.subtract(recorded["position_mm"], planned["position_mm"])) <= _NEAR_MM)
+
+
+def rig_description(connection: Connection, row: AnyRow, planned: Mapping[str, Any]) -> dict[str, Any]:
+    """How a file of one planned recording is read: the channels as the skin's own rig description has them, or else by
+    the names of the fields. `row`: the campaign that was diagnosed."""
+    kept = skins.rig_of(connection, row.skin_id)
+    own: dict[str, Any] = {} if kept is None else orjson.loads(kept)
+    described = {name: row.about["skin"][name] for name in _OF_SKIN if row.about["skin"].get(name) is not None}
+    conditions = {name: value for name, value in planned.items() if name != "repeats" and value not in (None, [])}
+    common = {name: value for name, value in own.get("recording", {}).items() if name not in _OF_ONE}
+    return {
+        "schema": SCHEMA,
+        "kind": "frf",
+        **{name: value for name, value in own.items() if name != "name"},
+        "skin": {**own.get("skin", {}), **described},
+        "recording": {**common, **conditions},
+        "channels": own.get("channels") or {name: {"channel": name} for name in _COLUMNS},
+    }

@@ -1,0 +1,67 @@
+"""Which campaign of a skin is the latest, and which one describes it, on every page alike."""
+
+from typing import Any
+
+import pytest
+
+from tests.service.pages.conftest import Visit
+from tests.support.blocks import block
+from tests.support.store_server import Server, campaign
+
+SKIN = "aged"
+
+
+def recorded(document: dict[str, Any], day: str) -> dict[str, Any]:
+    for recording in document["recordings"]:
+        recording["recorded_at"] = f"{day}T09:00:00Z"
+    return document
+
+
+@pytest.fixture(scope="module")
+def aged(idle: Server) -> Server:
+    """A skin whose campaigns arrived in another order than they were recorded, the last one of a block alone."""
+    for document in (
+        recorded(campaign("in September", sensors=4, thickness_mm=3.0), "2024-09-02"),
+        recorded(campaign("in May", sensors=2), "2024-05-02"),
+        block("the block", recorded_at="2024-11-02T09:00:00Z"),
+    ):
+        idle.http.post(f"/v1/campaigns?skin={SKIN}", json=document).raise_for_status()
+    return idle
+
+
+@pytest.mark.usefixtures("aged")
+def test_campaigns_are_in_the_order_of_recording(reader: Visit) -> None:
+    reader.go(f"/skins/{SKIN}")
+    names = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+    assert names == ["the block", "in September", "in May"]
+    reader.go("/")
+    assert "the block" in reader.page.get_by_role("row", name=SKIN).inner_text()
+
+
+@pytest.mark.usefixtures("aged")
+def test_a_block_leaves_the_skin_its_geometry_and_its_map(reader: Visit) -> None:
+    reader.go(f"/skins/{SKIN}")
+    reader.drawn(2)
+    facts = reader.page.locator(".facts").inner_text()
+    assert "3\xa0mm" in facts
+    assert "16\xa0MPa" in facts
+    assert facts.split("sensors")[1].split()[0] == "4"
+    assert "in September" in reader.page.locator("#figure-map figcaption").inner_text()
+    reader.require_accessible()
+    reader.page.get_by_role("link", name="Loads").last.click()
+    assert reader.page.get_by_label("thickness h").input_value() == "3"
+    reader.drawn(1)
+    assert reader.page.get_by_role("alert").count() == 0
+
+
+def test_older_campaigns_are_on_the_pages_behind(idle: Server, reader: Visit) -> None:
+    for number in range(52):
+        month, day = 1 + number // 28, 1 + number % 28
+        document = recorded(campaign(f"n{number:02d}", sensors=1, lines=3), f"2023-{month:02d}-{day:02d}")
+        idle.http.post("/v1/campaigns?skin=many", json=document).raise_for_status()
+    reader.go("/skins/many")
+    seen = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+    reader.page.get_by_role("link", name="Earlier campaigns").click()
+    reader.page.wait_for_url("**before=*")
+    seen += reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+    assert seen == [f"n{number:02d}" for number in reversed(range(52))]

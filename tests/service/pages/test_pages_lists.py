@@ -1,0 +1,92 @@
+"""Tables: sorted and filtered by keyboard, all recordings page by page, numbers as workbooks, in a dark scheme too."""
+
+import csv
+import io
+from collections.abc import Iterator
+
+import pytest
+from openpyxl import load_workbook
+from playwright.sync_api import Browser
+
+from service.pages.shared.workbooks import workbook
+from tests.service.pages.conftest import Visit, visit
+from tests.support.store_server import Server, campaign
+
+SENSORS = 40
+
+
+@pytest.fixture(scope="module")
+def place(idle: Server) -> str:
+    """The page of a campaign of 80 recordings."""
+    document = campaign("many", sensors=SENSORS, lines=4)
+    return f"/campaigns/{idle.http.post('/v1/campaigns?skin=many', json=document).raise_for_status().json()['id']}"
+
+
+@pytest.fixture
+def dark(browser: Browser, idle: Server) -> Iterator[Visit]:
+    for seen in visit(browser, idle):
+        seen.page.emulate_media(color_scheme="dark")
+        yield seen
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_a_table_is_sorted_and_filtered_with_the_keyboard(reader: Visit, place: str, width: int) -> None:
+    page = reader.page
+    page.set_viewport_size({"width": width, "height": 844})
+    reader.go(place)
+    table = page.get_by_role("region", name="d33 of each sensor")
+    heading = table.get_by_role("button", name="d33 [pC/N]")
+    heading.focus()
+    page.keyboard.press("Enter")
+    values = [float(text) for text in table.locator("tbody td:nth-child(2)").all_inner_texts()]
+    assert values == sorted(values)
+    assert len(values) == SENSORS
+    page.keyboard.press("Enter")
+    assert [float(text) for text in table.locator("tbody td:nth-child(2)").all_inner_texts()] == values[::-1]
+    assert table.locator("[aria-sort=descending]").count() == 1
+    page.locator(".filter", has=page.get_by_label("Filter")).first.get_by_label("Filter").fill("s39")
+    assert table.locator("tbody tr:visible").count() == 1
+    assert page.locator(".filter [role=status]").first.inner_text() == f"1 of {SENSORS}"
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    reader.require_accessible()
+
+
+def test_all_recordings_are_listed_page_by_page(reader: Visit, place: str) -> None:
+    page = reader.page
+    reader.go(place)
+    page.get_by_text(f"Recordings: {2 * SENSORS}").click()
+    listed = page.get_by_role("region", name="Recordings").locator("tbody th")
+    seen = listed.all_inner_texts()
+    assert len(seen) == 60
+    page.get_by_role("link", name="61 to 80").click()
+    page.wait_for_url("**first=60*")
+    seen += listed.all_inner_texts()
+    assert sorted(seen) == sorted(f"s{sensor}-{preload}N" for sensor in range(SENSORS) for preload in (1, 2))
+    reader.require_accessible()
+
+
+def test_a_workbook_holds_what_the_csv_does(reader: Visit, place: str) -> None:
+    reader.go(place)
+    table = list(csv.reader(io.StringIO(reader.page.request.get(f"{reader.address}{place}/d33.csv").text())))
+    with reader.page.expect_download() as saving:
+        reader.page.locator("#figure-response").get_by_role("link", name="XLSX").click()
+    rows = list(load_workbook(io.BytesIO(saving.value.path().read_bytes())).active.iter_rows(values_only=True))
+    assert list(rows[0]) == table[0]
+    assert len(rows) == len(table)
+    assert [row[-1] for row in rows[1:]] == pytest.approx([float(row[-1]) for row in table[1:]])
+    assert isinstance(rows[1][0], str)
+
+
+def test_no_text_of_a_workbook_is_a_formula() -> None:
+    made = workbook("name,value\r\n'=1+1,2.5\r\n@x,NaN\r\n")
+    sheet = load_workbook(io.BytesIO(made)).active
+    assert [(cell.value, cell.data_type) for cell in sheet["A"]] == [("name", "s"), ("=1+1", "s"), ("@x", "s")]
+    assert [cell.value for cell in sheet["B"]] == ["value", 2.5, None]
+
+
+def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:
+    for path in ("/", "/skins/many", place, "/upload", "/design", "/loads?thickness_mm=x", "/d33", "/fleets"):
+        dark.go(path)
+        ground = dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
+        assert ground == "rgb(20, 25, 31)", path
+        dark.require_accessible()

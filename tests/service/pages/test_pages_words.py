@@ -1,0 +1,51 @@
+"""What pages say of numbers: one value, one interval, digits that agree, in words for who is no statistician."""
+
+import re
+
+import pytest
+
+from service.pages.shared.formats import end_of, interval
+from tests.service.pages.conftest import Visit
+from tests.support.store_server import Server, campaign
+
+
+@pytest.mark.parametrize(
+    ("numbers", "shown"),
+    [
+        ((13.2468, 13.1119, 13.3912), "13.25 (95 %: 13.11 to 13.39)"),
+        ((1234.6, 1030.2, 1439.0), "1235 (95 %: 1030 to 1439)"),
+        ((-0.00123, -0.0019, -0.0004), "−0.00123 (95 %: −0.00190 to −0.00040)"),
+        ((7.0, 7.0, 7.0), "7.000 (95 %: 7.000 to 7.000)"),
+    ],
+)
+def test_digits_of_a_value_and_its_interval_agree(numbers: tuple[float, float, float], shown: str) -> None:
+    assert re.sub("<[^>]*>", "", interval(*numbers)) == shown
+    places = {len(part.partition(".")[2]) for part in re.findall(r"[\d.]+", shown.replace("95 %", ""))}
+    ends = [re.sub("<[^>]*>", "", end_of(one, *numbers[1:])) for one in numbers]
+    assert {len(end.partition(".")[2]) for end in ends} == places
+    assert len(places) == 1
+
+
+def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: Server, reader: Visit) -> None:
+    page = reader.page
+    sent = idle.http.post("/v1/campaigns?skin=words", json=campaign("alike", sensors=6, lines=60)).raise_for_status()
+    place = f"/campaigns/{sent.json()['id']}"
+    answer = idle.http.get(f"/v1{place}/d33").json()
+    reader.go(place)
+    text = page.get_by_role("main").inner_text().replace("\xa0", " ")
+    spread = answer["sensor_spread_percent"]
+    assert ("differ by less than can be measured" in text) == (spread["low"] < 0.05 * spread["high"])
+    value, low, high = map(float, re.search(r"([\d.]+) pC/N \(95 %: ([\d.]+) to ([\d.]+)\)", text).groups())  # type: ignore[union-attr]
+    array = answer["array"]
+    for shown, exact in ((value, "d33_pc_per_n"), (low, "d33_low_pc_per_n"), (high, "d33_high_pc_per_n")):
+        assert shown == pytest.approx(array[exact], abs=(high - low) / 20)
+    assert "where the response is flat" in text
+    page.get_by_text("Why this band").click()
+    assert page.get_by_text("no resonance in any recording").is_visible()
+    reader.require_accessible()
+
+
+def test_a_load_that_looks_wrong_is_named_by_its_line(reader: Visit) -> None:
+    reader.go("/loads?loads=10+8+4+1%0A14+16+10+60")
+    assert "Check load in line 2:" in reader.page.locator(".note[role=status]").first.inner_text()
+    reader.require_accessible()

@@ -1,0 +1,54 @@
+"""Curves whose force or displacement is counted negative as they are pressed: found, and turned where asked.
+
+Compression and depth are positive here. A curve is pressed up to its largest excursion of force: the sign of that
+excursion tells how the force is counted, and the displacement there, beside that at the start, how the travel is.
+A sphere that is only ever pulled has no such recording; a block may be pulled, with both negative.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, Recording
+
+_FORCE, _TRAVEL = "force_n", "displacement_mm"
+
+
+def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
+    """Those of `force_n` and `displacement_mm` that fall while the curve is pressed."""
+    force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
+    if len(force) != len(travel) or not len(force):
+        return ()
+    top = int(np.argmax(np.abs(force - force[0])))
+    return tuple(name for name, column in ((_FORCE, force), (_TRAVEL, travel)) if column[top] < column[0])
+
+
+def findings(campaign: Campaign) -> list[Finding]:
+    """One for the first curve of each way of counting, with how many more there are."""
+    by_fields: dict[tuple[str, ...], list[str]] = {}
+    for recording in _curves(campaign).values():
+        by_fields.setdefault(counted_negative(recording), []).append(recording.id)
+    return [
+        Finding(Reason.CURVE_COUNTED_NEGATIVE, ids[0], fields[0], {"fields": list(fields), "more": len(ids) - 1})
+        for fields, ids in by_fields.items()
+        if fields
+    ]
+
+
+def turned(campaign: Campaign) -> tuple[Campaign, int]:
+    """The campaign with what its curves count negative turned, and how many curves that changed."""
+    changed = 0
+    recordings: list[Recording] = []
+    for recording in campaign.recordings:
+        fields = () if isinstance(recording, FrfRecording) else counted_negative(recording)
+        changed += bool(fields)
+        columns = {name: -np.asarray(getattr(recording, name)) for name in fields}
+        recordings.append(replace(recording, **columns) if columns else recording)  # type: ignore[arg-type]
+    return replace(campaign, recordings=tuple(recordings)), changed
+
+
+def _curves(campaign: Campaign) -> Mapping[str, CurveRecording]:
+    return {one.id: one for one in campaign.recordings if not isinstance(one, FrfRecording)}
