@@ -153,14 +153,10 @@ def before_and_after(
         horizontal_spacing=0.12,
     )
     _, name = _part(diagnosis, before.measured)
-    ends = [
-        end
-        for points in (before, after)
-        for column in (points.predicted, points.measured)
-        for end in (_part(diagnosis, column)[0].min(), _part(diagnosis, column)[0].max())
-    ]
-    room = _EDGE * (max(ends) - min(ends))
-    whole = [float(min(ends) - room), float(max(ends) + room)]
+    both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
+    shown_part = _part(diagnosis, both)[0]
+    room = _EDGE * float(np.ptp(shown_part))
+    whole = [float(shown_part.min()) - room, float(shown_part.max()) + room]
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(
         ((before, _ORANGE, "square-open"), (after, _BLUE, "circle")), start=1
