@@ -56,11 +56,11 @@ class ConnectionLimits:
         """Whether so many bytes of a body are too few for the time after which a connection is idle."""
         return received < _LEAST_BODY_BYTES
 
-    def make_room(self, connections: Iterable[Connection]) -> bool:
+    def make_room(self, connections: Iterable[Connection], *, urgently: bool) -> bool:
         """Close the connection that has kept the server waiting for the longest, if any, and say so: one without a
-        request before one whose body is under way."""
+        request before one whose body has stopped, `urgently` for however short a time."""
         waiting = [(one, wait) for one in connections if (wait := one.waits_for_client_s()) is not None]
-        idle = [(one, wait) for one, wait in waiting if wait > _BODY_WAIT_S or not one.sends_body()]
+        idle = [(one, wait) for one, wait in waiting if urgently or wait > _BODY_WAIT_S or not one.sends_body()]
         if not idle:
             return False
         longest, _ = max(idle, key=lambda entry: (not entry[0].sends_body(), entry[1]))

@@ -102,9 +102,11 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             return
         said = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
         self.limits.reached("connections", said)
-        if len(others) >= most + SPARE:
+        full = len(others) >= most + SPARE
+        made = self.limits.make_room(others, urgently=full)
+        if full and not made:
             self.transport.abort()
-        elif not self.limits.make_room(others):
+        elif full or not made:
             self.app = _overloaded(self.app)
 
     def _look_at_all(self) -> None:
