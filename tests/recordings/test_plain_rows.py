@@ -41,6 +41,7 @@ def at_once(lines: Sequence[str], style: RowStyle) -> dict[int, list[float]]:
 
 @given(LINES, st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", "."), (" ", "."), (" ", ",")]))
 @example(['"1","2"', '1,"2', '"1",2,"x,y"', "1,2,,,"], (",", "."))
+@example(["1, ", " ,2", "1,"], (",", "."))
 @example(["  1   2 ", "1 2 x", "1"], (" ", "."))
 def test_numbers_are_those_of_single_lines(lines: list[str], marks: tuple[str, str]) -> None:
     style = RowStyle(*marks, (0, 1), 3)

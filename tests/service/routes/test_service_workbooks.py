@@ -62,12 +62,13 @@ def test_of_several_sheets_one_must_be_named(http: httpx.Client) -> None:
 
 
 def test_what_is_wrong_in_a_cell_is_said_as_of_csv(http: httpx.Client) -> None:
-    for rows in ([POINTS[0], POINTS[1], ["much", 0.6]], [["a_over_h", "b_over_h"], [0.3, 1.5]]):
+    wrong: list[list[list[Any]]] = [[*POINTS[:2], ["much", 0.6]], [["a_over_h", "b_over_h"], [0.3, 1.5]]]
+    for rows in wrong:
         of_csv = send(http, "/v1/sigma", as_csv(rows), "text/csv")
         of_sheet = send(http, "/v1/sigma", workbook({"Only": rows}), XLSX)
         assert of_csv.status_code == of_sheet.status_code == 422
         assert of_sheet.json()["errors"] == of_csv.json()["errors"]
-    twice = [["a_over_h", "a_over_h"], [0.3, 1.0]]
+    twice: list[list[Any]] = [["a_over_h", "a_over_h"], [0.3, 1.0]]
     of_csv = send(http, "/v1/sigma", as_csv(twice), "text/csv")
     of_sheet = send(http, "/v1/sigma", workbook({"Only": twice}), XLSX)
     assert of_csv.status_code == of_sheet.status_code == 400

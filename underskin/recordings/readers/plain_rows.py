@@ -85,6 +85,8 @@ def _refused(cells: CellBytes, style: RowStyle) -> Mask:
     """The lines with nothing in any cell, or with none or a byte of no number in a column of numbers."""
     filled = cells.lengths > 1
     wrong = _in_columns(cells, style.columns) & cells.having(~_OF_NUMBERS[style.decimal][cells.data])
+    digits = cells.having((cells.data > ord('"')) & (cells.data != ord("-")))  # np.fromstring reads a blank as -1
+    wrong |= _in_columns(cells, style.columns) & filled & ~digits
     if not style.is_template:
         wrong |= _in_columns(cells, style.columns) & ~filled
     return np.asarray(wrong.any(axis=1) | ~filled.any(axis=1))
