@@ -37,7 +37,9 @@ def drawn_map(
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     values, uncertainties = columns_of(rows, value, uncertainty)
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)
-    about = f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {_RESTS[by]}. "
+    about = (
+        f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {_RESTS[by]}. "
+    )
     about += f"{told_apart(values, uncertainties, quantity)} {CLICK}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 

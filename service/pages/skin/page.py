@@ -17,6 +17,7 @@ from service.pages.shared.verdicts import adopted_versions, answer_by_it, change
 from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_rows
 from service.schemas.campaign_d33 import D33Value
 from service.schemas.diagnoses import DiagnosisKind
+from service.schemas.skins import History
 from service.store import (
     AnyRow,
     Database,

@@ -252,7 +252,9 @@ def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedF
         raise Missing("There is no such file in this upload.")
     inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
     campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
-    return replace(inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns)
+    return replace(
+        inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns
+    )
 
 
 def _look(request: Request, pending: PendingUpload) -> None:
