@@ -27,13 +27,15 @@ class Quantity:
 
     `against`: `others` greys what does not differ from the others beyond chance, and the colours reach at least as far
     as chance does; `zero` the same from 0, with 0 in the middle of the colours; `nothing` colours from 0 upwards, or
-    between `ends`, which several maps may have in common.
+    between `ends`, which several maps may have in common. `differing`: which sensors differ, where a test of its own
+    has told, as that of a trend does.
     """
 
     name: str
     unit: str
     against: Literal["others", "zero", "nothing"] = "others"
     ends: tuple[float, float] | None = None
+    differing: tuple[bool, ...] | None = None
 
 
 D33 = Quantity("d33", "pC/N")
@@ -132,6 +134,8 @@ def _names(quantity: Quantity) -> dict[str, str]:
 def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
     if quantity.against == "nothing":
         return np.isfinite(value)
+    if quantity.differing is not None:
+        return np.array(quantity.differing, dtype=bool)
     return (differ_from_others if quantity.against == "others" else differ_from_zero)(value, uncertainty)
 
 

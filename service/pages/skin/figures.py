@@ -33,7 +33,9 @@ def drawn_map(
     from underskin.figures.array_map import Quantity, array_map, told_apart
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
-    quantity = Quantity(name, unit, against)
+    # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
+    significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None
+    quantity = Quantity(name, unit, against, differing=significant)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     values, uncertainties = columns_of(rows, value, uncertainty)
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)
