@@ -11,6 +11,7 @@ from service.store import AnyRow, skins
 from service.store.campaigns import CURRENT
 from service.store.tables import campaigns, recordings
 from underskin.recordings.rig_description import SCHEMA
+from underskin.units import Floats
 
 # Relative difference up to which a condition is the planned one.
 _ALIKE = {"indenter_radius_mm": 0.01, "preload_n": 0.05, "dynamic_force_n": 0.1, "dwell_s": 0.1}
@@ -24,34 +25,50 @@ def arrived(connection: Connection, diagnosis: AnyRow, planned: Sequence[Mapping
     """How many of each planned recording came for the skin since it was diagnosed, `repeats` at most; each recording in
     use counts once."""
     root = skins.require_root(connection, diagnosis.skin_id)
-    query = select(recordings.c.scalars).join(campaigns, campaigns.c.number == recordings.c.campaign)
-    query = query.where(campaigns.c.skin_id.in_(skins.members(root)), CURRENT, recordings.c.excluded_at.is_(None))
-    query = query.where(campaigns.c.received_at > diagnosis.asked_at, recordings.c.kind == "frf")
+    since = campaigns.c.skin_id.in_(skins.members(root)) & CURRENT & (campaigns.c.received_at > diagnosis.asked_at)
+    diagnosed = select(campaigns.c.about).where(campaigns.c.id == diagnosis.campaign_id)
+    own = _places(connection.execute(diagnosed).scalar_one())
+    places = {row.number: _places(row.about) for row in connection.execute(select(campaigns).where(since))}
+    query = select(recordings.c.campaign, recordings.c.scalars).where(recordings.c.campaign.in_(places))
+    query = query.where(recordings.c.excluded_at.is_(None), recordings.c.kind == "frf")
     counts = [0] * len(planned)
-    for (recorded,) in connection.execute(query.order_by(campaigns.c.number, recordings.c.position)):
+    for number, recorded in connection.execute(query.order_by(recordings.c.campaign, recordings.c.position)):
+        off_centre_mm = _off_centre_mm(recorded, places[number])
         for place, entry in enumerate(planned):
-            if counts[place] < entry["repeats"] and _is_planned(recorded, entry):
+            near = np.hypot(*(off_centre_mm - _off_centre_mm(entry, own))) <= _NEAR_MM
+            if counts[place] < entry["repeats"] and near and _is_planned(recorded, entry):
                 counts[place] += 1
                 break
     return counts
 
 
+def _places(about: Mapping[str, Any]) -> dict[str, list[float]]:
+    """Where the sensors of a campaign lie, x and y [mm]."""
+    return {sensor["id"]: [sensor["x_mm"], sensor["y_mm"]] for sensor in about["skin"].get("sensors", [])}
+
+
+def _off_centre_mm(conditions: Mapping[str, Any], places: Mapping[str, list[float]]) -> Floats:
+    """From the sensor's place to the sphere's, x and y; 0 where none is given, which means the sensor's own."""
+    own = places[conditions["sensor"]]
+    return np.subtract(conditions.get("position_mm") or own, own)
+
+
 def _is_planned(recorded: Mapping[str, Any], planned: Mapping[str, Any]) -> bool:
-    if recorded["sensor"] != planned["sensor"]:
-        return False
-    for name, tolerance in _ALIKE.items():
-        if name in planned and not np.isclose(recorded.get(name, np.nan), planned[name], rtol=tolerance, atol=0):
-            return False
-    if not planned.get("position_mm") or not recorded.get("position_mm"):
-        return True
-    return bool(np.hypot(*np.subtract(recorded["position_mm"], planned["position_mm"])) <= _NEAR_MM)
+    """Of the right sensor, under the planned conditions."""
+    return recorded["sensor"] == planned["sensor"] and all(
+        np.isclose(recorded.get(name, np.nan), planned[name], rtol=tolerance, atol=0)
+        for name, tolerance in _ALIKE.items()
+        if name in planned
+    )
 
 
 def rig_description(connection: Connection, row: AnyRow, planned: Mapping[str, Any]) -> dict[str, Any]:
-    """How a file of one planned recording is read: the channels as the skin's own rig description has them, or else by
-    the names of the fields. `row`: the campaign that was diagnosed."""
+    """How a file of one planned recording is read: the channels as the skin's own rig description of FRFs has them, or
+    else by the names of the fields. `row`: the campaign that was diagnosed."""
     kept = skins.rig_of(connection, row.skin_id)
     own: dict[str, Any] = {} if kept is None else orjson.loads(kept)
+    if own.get("kind", "frf") != "frf":
+        own = {"skin": own.get("skin", {})}  # its channels and conditions are those of curves
     described = {name: row.about["skin"][name] for name in _OF_SKIN if row.about["skin"].get(name) is not None}
     conditions = {name: value for name, value in planned.items() if name != "repeats" and value not in (None, [])}
     common = {name: value for name, value in own.get("recording", {}).items() if name not in _OF_ONE}

@@ -7,7 +7,7 @@ import orjson
 import pytest
 import yaml
 
-from service.store import Database, campaigns, database, diagnoses
+from service.store import Database, campaigns, database, diagnoses, skins
 from service.usecases import planned_recordings
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Place, Server, running
@@ -61,6 +61,8 @@ def test_rows_are_ticked_off_as_their_recordings_arrive(lab: tuple[Server, Datab
     sent(server, near, 3)  # more than was planned
     far = {**rigs[1], "recording": {**rigs[1]["recording"], "position_mm": [8.0, 0.0]}}
     sent(server, far, 4)
+    del far["recording"]["position_mm"]  # on the sensor, which lies at 8 mm
+    sent(server, far, 6)
     assert arrived(store, diagnosis_id) == [2, 0]
     sent(server, rigs[1], 5)
     assert arrived(store, diagnosis_id) == [2, 1]
@@ -68,3 +70,20 @@ def test_rows_are_ticked_off_as_their_recordings_arrive(lab: tuple[Server, Datab
     assert arrived(store, diagnosis_id) == [2, 1]  # the third takes its place
     kept = orjson.loads(server.http.get(f"/v1/campaigns/{first}/document").content)
     assert kept["recordings"][0]["preload_n"] == 1.5
+
+
+def test_a_rig_of_curves_does_not_tell_how_frfs_are_read(lab: tuple[Server, Database, str, str]) -> None:
+    server, store, campaign_id, _ = lab
+    of_curves = {
+        "schema": "rig/1",
+        "kind": "indentation",
+        "recording": {"indenter_radius_mm": 2.0},
+        "channels": {name: {"channel": name} for name in ("displacement_mm", "force_n")},
+        "curves": {"baseline": "off"},
+    }
+    with store.writing() as connection:
+        row = campaigns.find(connection, campaign_id)
+        skins.keep_rig(connection, row.skin_id, orjson.dumps(of_curves).decode())
+        rig = planned_recordings.rig_description(connection, row, PLANNED[0])
+    assert rig["kind"] == "frf"
+    sent(server, rig, 7)
