@@ -155,6 +155,17 @@ def by_time(connection: Connection, root: str, before: int | None, limit: int) -
     return connection.execute(query.order_by(TIME.desc(), campaigns.c.number.desc()).limit(limit)).all()
 
 
+def current_by_time(
+    connection: Connection, skin_id: str | None, limit: int, *, oldest_first: bool = False
+) -> Sequence[AnyRow]:
+    """Rows of current campaigns, of one skin or of all, the one recorded last first, or else the oldest first."""
+    query = select(campaigns).where(CURRENT)
+    if skin_id is not None:
+        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id))))
+    by = (TIME, campaigns.c.number) if oldest_first else (TIME.desc(), campaigns.c.number.desc())
+    return connection.execute(query.order_by(*by).limit(limit)).all()
+
+
 def latest(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin's current campaign that was recorded last; None where none is current."""
     return _first_current(connection, skin_id)

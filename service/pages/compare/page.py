@@ -29,14 +29,15 @@ Chosen = Annotated[str, Query(max_length=200)]
 def compare(
     request: Request, store: Store, table: Table, first: Chosen = "", second: Chosen = "", skin: Chosen = ""
 ) -> Response:
-    """Of the campaigns `first` and `second`; where either is not named, the oldest and the latest listed of `skin`."""
+    """Of the campaigns `first` and `second`; where one is not named, that in use of `skin` that was recorded first or
+    last."""
     with store.reading() as connection:
-        filters = campaigns.CampaignFilters(skin=skin or None, state="current")
-        listed = campaigns.listed(connection, filters, None, _MOST_LISTED)
+        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED))
         if listed:
-            first, second = first or listed[-1].id, second or listed[0].id
+            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, oldest_first=True)
+            first, second = first or oldest.id, second or listed[0].id
         both = [campaigns.find(connection, one) for one in (first, second) if one]
-    listed = [*listed, *(row for row in both if row.id not in {one.id for one in listed})]
+    listed += [row for row in both if row.id not in {one.id for one in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]
     rows = _rows(answers)
     return page(
@@ -48,7 +49,7 @@ def compare(
         second=second,
         both=both,
         rows=rows,
-        figures=_figures(both, answers, rows),
+        figures=drawn_maps(both, answers, rows),
         same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
     )
 
@@ -81,16 +82,18 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return list(of_sensor.values())
 
 
-def _figures(
+def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
-    """The maps of both in the same colours, and that of the difference."""
+    """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
     from underskin.figures.array_map import Quantity, array_map, told_apart
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
     values = [row[f"{which}_pc_per_n"] for row in rows for which in ("first", "second")]
     known = [value for value in values if value is not None]
+    if not known:
+        return []
     ends = min(known), max(known)
     maps = []
     for name, row, answer in zip(("first", "second"), both, answers, strict=True):

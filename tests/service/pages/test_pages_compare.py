@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support.diagnosed import sent, table
@@ -70,3 +71,20 @@ def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle
 
 def test_nothing_to_compare_is_said(idle: Server) -> None:
     assert idle.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
+
+
+def test_first_is_the_one_recorded_first_however_late_it_arrives(idle: Server) -> None:
+    ids = {}
+    for year in (2020, 2017):
+        made = campaign(BEFORE, table())
+        entries = tuple(replace(entry, recorded_at=f"{year}-05-03T09:00:00Z") for entry in made.recordings)
+        ids[year] = sent(idle, to_dict(replace(made, name=str(year), recordings=entries)), "by-time")
+    text = idle.http.get("/compare?skin=by-time", headers=BROWSING).text
+    chosen = [option.split('"')[1] for option in text.split("<option ")[1:] if " selected>" in option[:80]]
+    assert chosen == [ids[2017], ids[2020]]
+
+
+def test_sensors_without_d33_leave_nothing_to_draw() -> None:
+    nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
+    rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
+    assert drawn_maps([], [{"sensors": [{"sensor": "s0", **nothing}]}] * 2, rows) == []
