@@ -44,8 +44,11 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
 
 
 def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) -> str | None:
-    """Why a change stands: it was undone already, or something builds on it; None where it can be undone. `of_same`: all
-    changes of the same campaign; of one of a skin itself, all of the skin that it counts as and of those joined to it."""
+    """Why a change stands: it was undone already, or something builds on it; None where it can be undone.
+
+    `of_same`: all changes of its campaign; of a change of a skin itself, those of the skin that it counts as and of all
+    joined to that.
+    """
     if change.action == "undo":
         return "it took another change back"
     later = [other for other in of_same if other.number > change.number]
@@ -74,13 +77,8 @@ def _stacks(change: AnyRow, other: AnyRow) -> bool:
 
 def _joined_still(connection: Connection, change: AnyRow) -> bool:
     """Whether the skin counts as itself, and the one that was joined to it as this skin."""
-    skin, other = (skins.find(connection, name) for name in (change.skin_id, change.before["skin_id"]))
-    return (
-        skin is not None
-        and other is not None
-        and skin.root_id == skin.id
-        and other.joined_to == other.root_id == skin.id
-    )
+    own, other = change.skin_id, skins.find(connection, change.before["skin_id"])
+    return skins.require_root(connection, own) == own and other is not None and other.joined_to == other.root_id == own
 
 
 def _built_since(connection: Connection, change: AnyRow) -> str | None:

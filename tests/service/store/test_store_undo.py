@@ -95,6 +95,7 @@ def test_neither_of_two_joined_skins_stays_put_away(store: Database, away: str) 
         store.write(skins.require, name)
     store.write(annotations.discard, away, "empty", None)
     join = joined(store, "palm", "hand")
+    assert listed(store) == {"palm"}
     store.write(keep, "hand")
     assert listed(store) == {"palm"}
     store.write(undo.undo, join, None)
