@@ -28,7 +28,6 @@ Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\
 NEWER = (  # columns that files of older versions lack
     "withdrawn_from", "excluded_from", "joined_from", "title", "remark", "tags", "discarded_at"
 )  # fmt: skip
-_CHANGED = {"name", "title", "remark", "tags", "discarded_at", "skin_id", "members"}  # of changes, before and after
 
 
 class ImportedRow(BaseModel):
@@ -110,6 +109,54 @@ class ChangeRow(ImportedRow):
     undoes: ChangeId | None
 
 
+class OfCampaign(ImportedRow):
+    """What an annotation of a campaign changes, before or after."""
+
+    name: Text = ""
+    remark: Remark | None = None
+    tags: Text | None = None
+
+
+class OfSkin(ImportedRow):
+    """The same of a skin."""
+
+    title: Text | None = None
+    remark: Remark | None = None
+    tags: Text | None = None
+
+
+class Listed(ImportedRow):
+    """A skin before it is put away."""
+
+    discarded_at: None
+
+
+class PutAway(ImportedRow):
+    """A skin afterwards."""
+
+    discarded_at: Time
+
+
+class Joining(ImportedRow):
+    """A skin before it is joined to another, with all that count as it."""
+
+    skin_id: str
+    members: list[str]
+
+
+class Nothing(ImportedRow):
+    """No values: the columns that the change sets are empty before."""
+
+
+_Values = dict[str, tuple[type[ImportedRow], type[ImportedRow]]]  # by action: before and after
+_OF_SKIN: _Values = {"annotate": (OfSkin, OfSkin), "discard": (Listed, PutAway), "join": (Joining, Nothing)}
+_OF_CAMPAIGN: _Values = {
+    "annotate": (OfCampaign, OfCampaign),
+    "withdraw": (Nothing, Nothing),
+    "exclude": (Nothing, Nothing),
+}
+
+
 @dataclass(frozen=True)
 class CheckedOverview:
     """Rows of the skins, their rigs and what was changed, ready to be kept."""
@@ -141,14 +188,13 @@ def overview(exported: Overview) -> CheckedOverview:
         except orjson.JSONDecodeError as error:
             raise unreadable("rigs", None, f"must be JSON: {error.msg}") from None
     changes = [ChangeRow.model_validate(row) for row in exported.changes]
+    undone = {change.undoes for change in changes}
     for change in changes:
         _require(change.skin_id in ids, "changes", change.skin_id, "must be of a skin in the file")
-        _require(
-            all(values.keys() <= _CHANGED for values in (change.before, change.after)),
-            "changes",
-            change.id,
-            "must be of what can be changed",
-        )
+        _require_of(change, exported.campaigns)
+        if change.action == "join" and change.id not in undone:
+            joined = {change.before["skin_id"], *change.before["members"]}
+            _require(joined <= ids, "changes", change.id, "must join skins in the file")
     return CheckedOverview(rows, rigs, changes)
 
 
@@ -177,6 +223,22 @@ def campaign(exported: ExportedCampaign, name: str, skins: Sequence[SkinRow]) ->
         "revision": 0,
     }
     return ImportedCampaign(row, parsed, exclusions)
+
+
+def _require_of(change: ChangeRow, campaigns: Sequence[str]) -> None:
+    """What can be changed of a skin or of one of the campaigns, with values as the service keeps them."""
+    own = change.campaign_id
+    _require(own is None or own in campaigns, "changes", own, "must be of a campaign in the file")
+    named = change.recording is not None
+    _require(change.action != "exclude" or named, "changes", change.id, "must name the recording")
+    values = (_OF_SKIN if own is None else _OF_CAMPAIGN) | {"undo": (Nothing, Nothing)}
+    _require(change.action in values, "changes", change.id, "must be of what can be changed")
+    before, after = values[change.action]
+    before.model_validate(change.before)
+    after.model_validate(change.after)
+    for held in (change.before, change.after):
+        if "name" in held:
+            validation.name("name", held["name"], False)
 
 
 def _require_joined(root: str, rows: Sequence[SkinRow]) -> None:

@@ -28,9 +28,16 @@ def require(connection: Connection, skin_id: str | None) -> str:
     skin_id = skin_id or f"skin-{secrets.token_hex(6)}"
     row = {"id": skin_id, "root_id": skin_id, "created_at": now()}
     connection.execute(upsert(connection, skins).on_conflict_do_nothing(), row)
-    root = require_root(connection, skin_id)
-    connection.execute(update(skins).where(skins.c.id == root).values(discarded_at=None))
+    bring_back(connection, require_root(connection, skin_id))
     return skin_id
+
+
+def bring_back(connection: Connection, root: str) -> None:
+    """Have a skin in lists again that was put away. Until the transaction ends nobody can put it away; others may keep
+    something of it."""
+    query = select(skins.c.discarded_at).where(skins.c.id == root).with_for_update(read=True, key_share=True)
+    if connection.execute(query).scalar() is not None:
+        connection.execute(update(skins).where(skins.c.id == root).values(discarded_at=None))
 
 
 def find(connection: Connection, skin_id: str) -> AnyRow | None:
@@ -93,7 +100,10 @@ def called(contains: str) -> ColumnElement[bool]:
 
 
 def join(connection: Connection, skin_id: str, other: str, reason: str, joined_from: str | None) -> None:
-    """Count `other`, and all joined to it, as `skin_id` from now on; both are their own roots."""
+    """Count `other`, and all joined to it, as `skin_id` from now on; both are their own roots, and neither stays put
+    away."""
+    for root in (skin_id, other):
+        bring_back(connection, root)
     counted = list(connection.execute(members(other)).scalars())
     before = {"skin_id": other, "members": counted}
     changes.record(connection, "join", skin_id, joined_from, reason=reason, before=before)

@@ -118,6 +118,7 @@ changes = Table(
     Column("after", JSON, nullable=False),
     Column("undoes", String),  # id of the change that it takes back
     Index("changes_of_skin", "skin_id", "number"),
+    Index("changes_of_campaign", "campaign_id", "number"),
 )
 
 # Derived from what a recording holds: identical ones have the same (underskin.recordings.repeats).

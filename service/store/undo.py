@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from sqlalchemy import Connection, select, update
 
+from service.store import campaigns as kept_campaigns
 from service.store import changes as kept
 from service.store import skins
 from service.store.diagnosed_together import has_one_of
@@ -22,8 +23,11 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
     change = connection.execute(select(changes).where(changes.c.id == change_id)).first()
     if change is None:
         raise Missing(f"There is no change {change_id!r}.")
-    skins.lock(connection, [change.skin_id])
-    why_not = standing(connection, change)
+    if change.campaign_id is not None:  # before the skin, as all that change a campaign
+        kept_campaigns.find(connection, change.campaign_id, lock=True)
+    members = skins.members(skins.require_root(connection, change.skin_id))
+    skins.lock(connection, connection.execute(members).scalars().all())
+    why_not = standing(connection, change, _of_same(connection, change))
     if why_not is not None:
         raise Conflict(f"This cannot be undone: {why_not}.")
     _TAKE_BACK[change.action](connection, change)
@@ -39,29 +43,42 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
     return change
 
 
-def standing(connection: Connection, change: AnyRow) -> str | None:
-    """Why a change stands: it was undone already, or something builds on it; None where it can be undone."""
+def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) -> str | None:
+    """Why a change stands: it was undone already, or something builds on it; None where it can be undone.
+
+    `of_same`: all changes of its campaign; of a change of a skin itself, those of the skin that it counts as and of all
+    joined to that.
+    """
     if change.action == "undo":
         return "it took another change back"
-    later = _later(connection, change)
-    if any(other.undoes == change.id for other in later):
-        return "it was undone already"
+    later = [other for other in of_same if other.number > change.number]
     undone = {other.undoes for other in later}
+    if change.id in undone:
+        return "it was undone already"
     if any(other.id not in undone and _stacks(change, other) for other in later):
         return "a later change builds on it"
+    if change.action == "join" and not _joined_still(connection, change):
+        return "the skins were joined otherwise since"
     return _built_since(connection, change) if change.action in _FIGURES else None
 
 
-def _later(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
-    query = select(changes).where(changes.c.skin_id == change.skin_id, changes.c.number > change.number)
-    return connection.execute(query).all()
+def _of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
+    if change.campaign_id is not None:
+        return kept.of_campaign(connection, change.campaign_id)
+    return kept.of_skin(connection, skins.require_root(connection, change.skin_id))
 
 
 def _stacks(change: AnyRow, other: AnyRow) -> bool:
-    """Whether a later change rests on the earlier one."""
-    if other.action == "undo" or other.campaign_id != change.campaign_id:
+    """Whether a later change of the same rests on the earlier one."""
+    if other.action == "undo" or (change.action in _FIGURES) != (other.action in _FIGURES):
         return False
-    return (change.action in _FIGURES) == (other.action in _FIGURES)
+    return change.action in _FIGURES or other.skin_id == change.skin_id
+
+
+def _joined_still(connection: Connection, change: AnyRow) -> bool:
+    """Whether the skin counts as itself, and the one that was joined to it as this skin."""
+    own, other = change.skin_id, skins.find(connection, change.before["skin_id"])
+    return skins.require_root(connection, own) == own and other is not None and other.joined_to == other.root_id == own
 
 
 def _built_since(connection: Connection, change: AnyRow) -> str | None:
@@ -83,6 +100,7 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 def _use_again(connection: Connection, change: AnyRow) -> None:
     values = {"withdrawn_at": None, "withdrawn_from": None, "withdraw_reason": None}
     _campaign(connection, change, **values, revision=campaigns.c.revision + 1)
+    skins.bring_back(connection, skins.require_root(connection, change.skin_id))
 
 
 def _include(connection: Connection, change: AnyRow) -> None:
@@ -96,7 +114,8 @@ def _include(connection: Connection, change: AnyRow) -> None:
 def _part(connection: Connection, change: AnyRow) -> None:
     """Let the skin that was joined, and those that counted as it, count for themselves again."""
     other, members = change.before["skin_id"], change.before["members"]
-    connection.execute(update(skin_rows).where(skin_rows.c.id.in_(members)).values(root_id=other))
+    counted = skin_rows.c.id.in_(members) & (skin_rows.c.root_id == change.skin_id)
+    connection.execute(update(skin_rows).where(counted).values(root_id=other))
     alone = {"joined_to": None, "joined_at": None, "joined_from": None, "join_reason": None}
     connection.execute(update(skin_rows).where(skin_rows.c.id == other).values(**alone))
 

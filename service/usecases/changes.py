@@ -45,7 +45,7 @@ def _shown(connection: Connection, rows: Sequence[AnyRow]) -> list[ShownChange]:
             row.made_from,
             row.reason,
             row.id in undone,
-            undo.standing(connection, row) is None,
+            undo.standing(connection, row, rows) is None,
         )
         for row in rows[:_MOST]
     ]

@@ -71,18 +71,29 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
     return [drawn("curves", figure, about, numbers)]
 
 
-def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
+class CsvAnswer(Response):
+    """Columns as a CSV file to be saved; the columns themselves too, as numbers and texts are one in its text."""
+
+    def __init__(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+        super().__init__(csv_text(columns), headers=_saved(f"{name}.csv"), media_type="text/csv; charset=utf-8")
+        self.name, self.columns = name, columns
+
+
+def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> CsvAnswer:
     """Columns as a CSV file to be saved."""
-    return attachment(f"{name}.csv", csv_text(columns), "text/csv; charset=utf-8")
+    return CsvAnswer(name, columns)
 
 
 def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
     """A file to be saved."""
-    about = {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff", **headers}
-    return Response(content, headers=about, media_type=media_type)
+    return Response(content, headers=_saved(file) | headers, media_type=media_type)
 
 
-def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:
+def _saved(file: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff"}
+
+
+def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:
     """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
     return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
 

@@ -1,14 +1,16 @@
 """The numbers of pages as workbooks (XLSX), beside every CSV: the same table, its numbers as numbers."""
 
-import csv
 import functools
 import io
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from fastapi import APIRouter, Response
 from fastapi.routing import APIRoute
 
+from service.pages.shared.figures import CsvAnswer, attachment
 from service.problems import Refusal
 
 CSV, XLSX = ".csv", ".xlsx"
@@ -29,19 +31,18 @@ def _as_workbook(endpoint: Callable[..., Response]) -> Callable[..., Response]:
     @functools.wraps(endpoint)
     def answer(*arguments: Any, **values: Any) -> Response:
         table = endpoint(*arguments, **values)
-        file = table.headers["Content-Disposition"].replace(f'{CSV}"', f'{XLSX}"')
-        headers = {"Content-Disposition": file, "X-Content-Type-Options": "nosniff"}
-        return Response(workbook(bytes(table.body).decode()), headers=headers, media_type=_TYPE)
+        assert isinstance(table, CsvAnswer)
+        return attachment(f"{table.name}{XLSX}", workbook(table.columns), _TYPE)
 
     return answer
 
 
-def workbook(table: str) -> bytes:
-    """A CSV text as a workbook of one sheet; raises Refusal where a sheet has too few rows for it."""
+def workbook(columns: Mapping[str, Sequence[Any]]) -> bytes:
+    """Columns as a workbook of one sheet; raises Refusal where a sheet has too few rows for it."""
     from openpyxl import Workbook
     from openpyxl.cell import WriteOnlyCell
 
-    rows = list(csv.reader(io.StringIO(table)))
+    rows = [tuple(columns), *zip(*columns.values(), strict=True)]
     if len(rows) > _MOST_ROWS:
         raise Refusal(413, f"A sheet of a workbook holds {_MOST_ROWS} rows, and these are {len(rows)}: take the CSV.")
     book = Workbook(write_only=True)
@@ -57,11 +58,8 @@ def workbook(table: str) -> bytes:
     return file.getvalue()
 
 
-def _value(cell: str) -> float | str | None:
-    """A cell of the CSV: a number, nothing, or a text without the mark that keeps spreadsheets from computing it."""
-    if cell in ("", "NaN"):
-        return None
-    try:
-        return float(cell)
-    except ValueError:
-        return cell[1:] if cell.startswith("'") else cell
+def _value(value: Any) -> float | str | None:
+    """A cell: a finite number, nothing, or a text, also one that reads like a number."""
+    if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
+        return float(value) if math.isfinite(value) else None
+    return None if value is None or value == "" else str(value)

@@ -4,6 +4,7 @@ import csv
 import io
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from openpyxl import load_workbook
 from playwright.sync_api import Browser
@@ -78,10 +79,21 @@ def test_a_workbook_holds_what_the_csv_does(reader: Visit, place: str) -> None:
 
 
 def test_no_text_of_a_workbook_is_a_formula() -> None:
-    made = workbook("name,value\r\n'=1+1,2.5\r\n@x,NaN\r\n")
+    made = workbook({"name": ["=1+1", "@x"], "value": [2.5, None]})
     sheet = load_workbook(io.BytesIO(made)).active
     assert [(cell.value, cell.data_type) for cell in sheet["A"]] == [("name", "s"), ("=1+1", "s"), ("@x", "s")]
     assert [cell.value for cell in sheet["B"]] == ["value", 2.5, None]
+
+
+def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
+    names = ["01", "1", "1_0", "1e3", "inf", "nan", "NaN", "'quoted"]
+    made = workbook(
+        {"sensor": names, "value": list(np.arange(8.0)), "preload_n": [1, float("nan"), *[np.float32(2)] * 6]}
+    )
+    header, *rows = load_workbook(io.BytesIO(made)).active.iter_rows(values_only=True)
+    assert header == ("sensor", "value", "preload_n")
+    assert [row[0] for row in rows] == names
+    assert [row[1:] for row in rows] == [(0, 1), (1, None), *((number, 2) for number in range(2, 8))]
 
 
 def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:

@@ -140,6 +140,19 @@ def _edited(place: str, **values: Any) -> Callable[[h5py.File], None]:
     return spoil
 
 
+def _changed(**values: Any) -> Callable[[h5py.File], None]:
+    """Puts one change in place of those of the file."""
+    row = {"id": "ch-0123456789abcdef", "skin_id": "palm", "at": "2017-05-03T09:00:00.000000Z", "undoes": None}
+    row |= dict.fromkeys(("campaign_id", "recording", "made_from", "reason")) | {"before": {}, "after": {}} | values
+
+    def spoil(file: h5py.File) -> None:
+        own = {**row, "campaign_id": row["campaign_id"] and row["campaign_id"].format(last=list(file["campaigns"])[-1])}
+        del file["changes"]
+        file["changes"] = np.frombuffer(orjson.dumps([own]), np.uint8)
+
+    return spoil
+
+
 def _rename_skin(file: h5py.File) -> None:
     file.attrs["skin"] = "nowhere"
 
@@ -179,6 +192,13 @@ SPOILT = {
     "exclusion": _edited("campaigns/{last}/recordings", excluded_at="yesterday"),
     "dots": _rename_all,
     "another root": _edited("skins", root_id="finger"),
+    "campaign to another skin": _changed(action="annotate", campaign_id="{last}", before={"skin_id": "finger"}),
+    "campaign without a name": _changed(action="annotate", campaign_id="{last}", before={"name": " "}),
+    "campaign of another skin": _changed(action="annotate", campaign_id="c-0123456789abcdef", before={"name": "x"}),
+    "withdrawal of a skin": _changed(action="withdraw"),
+    "join of nothing": _changed(action="join"),
+    "join of another skin": _changed(action="join", before={"skin_id": "finger", "members": ["finger"]}),
+    "put away before": _changed(action="discard", before={"discarded_at": "2017-05-03T09:00:00.000000Z"}),
     "joined to itself": _edited("skins", joined_to="palm", joined_at="2017-05-03T09:00:00.000000Z", join_reason="?"),
 }
 

@@ -39,3 +39,4 @@ def upgrade() -> None:
         sa.Column("undoes", sa.String()),
     )
     op.create_index("changes_of_skin", "changes", ["skin_id", "number"])
+    op.create_index("changes_of_campaign", "changes", ["campaign_id", "number"])

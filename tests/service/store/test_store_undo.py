@@ -1,0 +1,156 @@
+"""Changes taken back below others, of skins put away, and beside other writers."""
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import Connection, event, select
+
+from service.store import Conflict, Database, annotations, campaigns, changes, open_store, skins, undo
+from service.store.tables import changes as change_rows
+from service.usecases import changes as shown_changes
+from tests.support import postgres
+from tests.support.store_server import Place, campaign
+from underskin.recordings.campaign import parse
+
+
+@pytest.fixture
+def store(place: Place) -> Iterator[Database]:
+    opened = open_store(place.database_url, place.folder)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def on_postgresql(cluster: postgres.Cluster, tmp_path: Path) -> Iterator[Database]:
+    opened = open_store(cluster.new_database(), tmp_path)
+    yield opened
+    opened.close()
+
+
+def keep(connection: Connection, skin: str) -> str:
+    arrival = campaigns.NewCampaign(parse(campaign(f"of {skin}", sensors=1)), skin)
+    return campaigns.add(connection, arrival)[0]
+
+
+def last(store: Database) -> str:
+    """The id of the latest change."""
+    query = select(change_rows.c.id).order_by(change_rows.c.number.desc()).limit(1)
+    return str(store.read(lambda connection: connection.execute(query).scalar_one()))
+
+
+def joined(store: Database, skin: str, other: str) -> str:
+    store.write(skins.join, skin, other, "one skin", None)
+    return last(store)
+
+
+def roots(store: Database, names: str) -> dict[str, str]:
+    return {name: store.read(skins.require_root, name) for name in names}
+
+
+def listed(store: Database) -> set[str]:
+    return {row.id for row in store.read(skins.listed, None, None, 9)}
+
+
+def test_a_join_below_another_is_undone_only_after_that(store: Database) -> None:
+    for name in "abcd":
+        store.write(skins.require, name)
+    lower, upper = joined(store, "a", "b"), joined(store, "c", "a")
+    with pytest.raises(Conflict, match="a later change builds on it"):
+        store.write(undo.undo, lower, None)
+    store.write(undo.undo, upper, None)
+    store.write(undo.undo, lower, None)
+    assert roots(store, "abc") == {name: name for name in "abc"}
+    joined(store, "d", "b")
+    with pytest.raises(Conflict, match="it was undone already"):
+        store.write(undo.undo, lower, None)
+    assert roots(store, "abcd") == {"a": "a", "b": "d", "c": "c", "d": "d"}
+
+
+def test_a_join_that_is_no_longer_so_cannot_be_undone(store: Database) -> None:
+    for name in "abc":
+        store.write(skins.require, name)
+    joined(store, "c", "b")
+    foreign = {"skin_id": "b", "members": ["b"]}  # as another store may have kept it
+    store.write(changes.record, "join", "a", None, before=foreign)
+    with pytest.raises(Conflict, match="joined otherwise"):
+        store.write(undo.undo, last(store), None)
+    assert roots(store, "abc") == {"a": "a", "b": "c", "c": "c"}
+
+
+def test_a_skin_put_away_comes_back_with_campaigns_in_use(store: Database) -> None:
+    campaign_id = store.write(keep, "palm")
+    store.write(campaigns.withdraw, campaign_id, "wrong sphere", None)
+    withdrawal = last(store)
+    store.write(annotations.discard, "palm", "empty", None)
+    assert listed(store) == set()
+    store.write(undo.undo, withdrawal, None)
+    assert listed(store) == {"palm"}
+
+
+@pytest.mark.parametrize("away", ["palm", "hand"])
+def test_neither_of_two_joined_skins_stays_put_away(store: Database, away: str) -> None:
+    for name in ("palm", "hand"):
+        store.write(skins.require, name)
+    store.write(annotations.discard, away, "empty", None)
+    join = joined(store, "palm", "hand")
+    assert listed(store) == {"palm"}
+    store.write(keep, "hand")
+    assert listed(store) == {"palm"}
+    store.write(undo.undo, join, None)
+    assert listed(store) == {"palm", "hand"}
+
+
+def test_a_page_asks_no_more_of_the_store_for_many_changes(store: Database) -> None:
+    campaign_id = store.write(keep, "palm")
+
+    def statements() -> int:
+        told: list[str] = []
+        listener: Callable[..., None] = lambda *given: told.append(given[2])  # noqa: E731
+        event.listen(store.engine, "before_cursor_execute", listener)
+        store.read(shown_changes.of_campaign, campaign_id)
+        event.remove(store.engine, "before_cursor_execute", listener)
+        return len(told)
+
+    store.write(annotations.of_campaign, campaign_id, {"remark": "0"}, None)
+    few = statements()
+    for number in range(1, 15):
+        store.write(annotations.of_campaign, campaign_id, {"remark": str(number)}, None)
+    assert statements() == few
+
+
+def test_arrivals_of_one_skin_do_not_wait_for_each_other(on_postgresql: Database) -> None:
+    on_postgresql.write(skins.require, "palm")
+    with on_postgresql.writing() as connection:
+        keep(connection, "palm")
+        other = threading.Thread(target=on_postgresql.write, args=(keep, "palm"))
+        other.start()
+        other.join(10)
+        assert not other.is_alive()
+
+
+def test_an_arrival_brings_back_a_skin_that_is_being_put_away(on_postgresql: Database) -> None:
+    on_postgresql.write(skins.require, "palm")
+    other = threading.Thread(target=on_postgresql.write, args=(keep, "palm"))
+    with on_postgresql.writing() as connection:
+        annotations.discard(connection, "palm", "empty", None)
+        other.start()
+        other.join(1)
+        assert other.is_alive()
+    other.join()
+    assert listed(on_postgresql) == {"palm"}
+
+
+def test_an_undo_and_a_change_of_one_campaign_wait_for_each_other(on_postgresql: Database) -> None:
+    campaign_id = on_postgresql.write(keep, "palm")
+    on_postgresql.write(annotations.of_campaign, campaign_id, {"remark": "wet"}, None)
+    other = threading.Thread(target=on_postgresql.write, args=(undo.undo, last(on_postgresql), None))
+    with on_postgresql.writing() as connection:
+        campaigns.find(connection, campaign_id, lock=True)
+        other.start()
+        other.join(1)  # time to take its locks
+        assert other.is_alive()
+        campaigns.withdraw(connection, campaign_id, "wrong sphere", None)
+    other.join()
+    assert on_postgresql.read(campaigns.find, campaign_id).remark is None
