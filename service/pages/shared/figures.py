@@ -71,18 +71,30 @@ def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", num
     return [drawn("curves", figure, about, numbers)]
 
 
-def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> Response:
+class CsvFile(Response):
+    """A CSV file to be saved, with the columns it was made of."""
+
+    def __init__(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
+        """Of columns of equal length; `name`: of the file, without its extension."""
+        super().__init__(csv_text(columns), headers=_to_save(f"{name}.csv"), media_type="text/csv; charset=utf-8")
+        self.name, self.columns = name, columns
+
+
+def csv_answer(name: str, columns: Mapping[str, Sequence[Any]]) -> CsvFile:
     """Columns as a CSV file to be saved."""
-    return attachment(f"{name}.csv", csv_text(columns), "text/csv; charset=utf-8")
+    return CsvFile(name, columns)
 
 
 def attachment(file: str, content: str | bytes, media_type: str, **headers: str) -> Response:
     """A file to be saved."""
-    about = {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff", **headers}
-    return Response(content, headers=about, media_type=media_type)
+    return Response(content, headers={**_to_save(file), **headers}, media_type=media_type)
 
 
-def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Response:
+def _to_save(file: str) -> dict[str, str]:
+    return {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff"}
+
+
+def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvFile:
     """Rows as a CSV file of these columns; a cell is NaN where a row lacks it."""
     return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
 

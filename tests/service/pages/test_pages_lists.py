@@ -2,13 +2,16 @@
 
 import csv
 import io
+import math
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 from openpyxl import load_workbook
 from playwright.sync_api import Browser
 
 from service.pages.shared.workbooks import workbook
+from service.problems import Refusal
 from tests.service.pages.conftest import Visit, visit
 from tests.support.store_server import Server, campaign
 
@@ -78,10 +81,24 @@ def test_a_workbook_holds_what_the_csv_does(reader: Visit, place: str) -> None:
 
 
 def test_no_text_of_a_workbook_is_a_formula() -> None:
-    made = workbook("name,value\r\n'=1+1,2.5\r\n@x,NaN\r\n")
-    sheet = load_workbook(io.BytesIO(made)).active
+    sheet = load_workbook(io.BytesIO(workbook({"name": ["=1+1", "@x"], "value": [2.5, None]}))).active
     assert [(cell.value, cell.data_type) for cell in sheet["A"]] == [("name", "s"), ("=1+1", "s"), ("@x", "s")]
     assert [cell.value for cell in sheet["B"]] == ["value", 2.5, None]
+
+
+def test_texts_of_a_workbook_that_look_like_numbers_stay_as_they_are() -> None:
+    texts = ["01", "1", "1_0", "1e3", "inf", "nan", "'s"]
+    numbers = [1.5, math.nan, 0.0, np.float64(-2), math.inf, 1e300, None]
+    sheet = load_workbook(io.BytesIO(workbook({"sensor": texts, "recordings": range(7), "value": numbers}))).active
+    assert [cell.value for cell in sheet["A"][1:]] == texts
+    assert [cell.value for cell in sheet["B"][1:]] == list(range(7))
+    assert [cell.value for cell in sheet["C"][1:]] == [1.5, None, 0, -2, "inf", 1e300, None]
+
+
+def test_a_long_table_is_no_workbook() -> None:
+    with pytest.raises(Refusal, match="take the CSV") as refused:
+        workbook({"time_s": range(125_000), "force_n": range(125_000), "sensor": ["s0"] * 125_000})
+    assert refused.value.status == 413
 
 
 def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:
