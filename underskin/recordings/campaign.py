@@ -200,9 +200,9 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
         document = field.mapping("recording", entry)
     except InvalidInput as refusal:
         return None, [refusal]
-    kind = document.get("kind") or "frf"
-    if not isinstance(kind, str) or kind not in KINDS:
-        return None, [errors.not_one_of("kind", shown(kind), KINDS)]
+    kind = shown(document.get("kind")) or "frf"
+    if kind not in KINDS:
+        return None, [errors.not_one_of("kind", kind, KINDS)]
     values, refused = field.check_fields(KINDS[kind], document, units_checked=units_checked)
     known = {error.field for error in refused}
     together = [*_unmet_needs(kind, document, values, skin), *_unequal_lengths(values)]

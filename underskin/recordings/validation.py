@@ -61,8 +61,9 @@ def of_schema(noun: str, value: Any, schema: str, known: Collection[str]) -> Map
     document = mapping(noun, value)
     if unknown := _unknown_fields(document, known, f"unknown field of a {noun}"):
         raise unknown[0]
-    if document.get("schema") != schema:
-        raise errors.not_one_of("schema", shown(document.get("schema")), (schema,))
+    given = shown(document.get("schema"))
+    if given != schema:
+        raise errors.not_one_of("schema", given, (schema,))
     return document
 
 

@@ -17,8 +17,9 @@ from underskin.units import Floats
 
 _BOM = b"\xef\xbb\xbf"
 _PIECE = 1 << 16  # characters of a list that are objects at once
-# A string, which may hold anything; a list of numbers alone; or a quotation mark that begins no string.
-_PARTS = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"|\[([-+0-9.eE,\s]{64,}+)\]|"', re.DOTALL)
+# A string, which may hold anything; a list of numbers alone, not in place of a key; or a quotation mark that begins no
+# string.
+_PARTS = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+"|\[([-+0-9.eE,\s]{64,}+)\](?!\s*+:)|"', re.DOTALL)
 _NO_MEMORY = "Not enough memory"  # how orjson says it
 _DEEPEST = 200  # lists and objects in each other, which is what can be answered
 
