@@ -41,7 +41,7 @@ def adhesive(start_mm: float, end_mm: float, force: int, travel: int) -> Indenta
     last = int(np.searchsorted(loads, 0.01))
     way_in = np.linspace(1e-3 * start_mm, depths[last], 80)
     way_out = np.linspace(depths[last], 1e-3 * end_mm, 80)
-    load_in = np.where(way_in < 0, 0.0, np.interp(way_in, depths, loads))  # it snaps in where it touches
+    load_in = np.where(way_in <= 0, 0.0, np.interp(way_in, depths, loads))  # it snaps in where it touches
     load_out = np.interp(way_out, depths, loads, left=0.0)
     assert load_out.max() == pytest.approx(0.01, rel=0.02)
     assert load_out.min() < -0.015
