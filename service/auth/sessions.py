@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from datetime import UTC, datetime
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -31,6 +32,7 @@ class Sessions:
         """Nothing is looked at yet."""
         self._store = store
         self._ended: frozenset[str] = frozenset()
+        self._adding = threading.Lock()
         self._failure = LastingFailure(logger)
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="sessions", daemon=True)
@@ -55,11 +57,11 @@ class Sessions:
     def end(self, session_id: str, key: Key) -> None:
         """End a session of a key, at once on this server; raises Missing, and as Database.writing."""
         self._store.write(sessions.end, session_id, key.sha256)
-        self._ended |= {session_id}
+        self._add({session_id})
 
     def log_out(self, cookie: str, key: Key) -> None:
         """End the session of a cookie on this server whatever happens to the store; the log says what did."""
-        self._ended |= {session.id_of(cookie)}
+        self._add({session.id_of(cookie)})
         try:
             self._store.write(sessions.end, session.id_of(cookie), key.sha256)
         except Missing:
@@ -69,7 +71,7 @@ class Sessions:
 
     def look(self) -> None:
         """Bring what was ended up to date."""
-        self._ended |= self._store.read(sessions.ended)
+        self._add(self._store.read(sessions.ended))
 
     def start(self) -> None:
         """Look from now on."""
@@ -80,6 +82,11 @@ class Sessions:
         self._ending.set()
         if self._thread.ident is not None:
             self._thread.join(_JOIN_S)
+
+    def _add(self, ended: AbstractSet[str]) -> None:
+        """One at a time, lest what another thread adds meanwhile is lost."""
+        with self._adding:
+            self._ended |= ended
 
     def _watch(self) -> None:
         while not self._ending.wait(_LOOK_S):

@@ -9,7 +9,7 @@ import pytest
 from tests.support.blocks import block
 from underskin import InvalidInput
 from underskin.recordings import curve_signs, elastomer, plausibility
-from underskin.recordings.campaign import Campaign, IndentationRecording, from_dict
+from underskin.recordings.campaign import Campaign, IndentationRecording, from_dict, samples_of
 
 SIGNS = list(product((1, -1), (1, -1)))
 NAMES = ("force_n", "displacement_mm")
@@ -30,6 +30,43 @@ def pressed_sphere(force: int, travel: int) -> Campaign:
         id="sphere", sensor=None, indenter_radius_mm=4.0, displacement_mm=travel * depth_mm, force_n=force * load_n
     )
     return replace(pressed_block(1, 1), recordings=(sphere,))
+
+
+def adhesive(start_mm: float, end_mm: float, force: int, travel: int) -> IndentationRecording:
+    """A sphere of 4 mm after JKR, E' = 0.2 MPa, pressed with 10 mN; it comes off at about −20 mN."""
+    radius, modulus, adhesion = 4e-3, 2e5, 1.0
+    radii = np.linspace((np.pi * adhesion * radius**2 / (8 * modulus)) ** (1 / 3), 1.2e-3, 4000)
+    depths = radii**2 / radius - np.sqrt(2 * np.pi * adhesion * radii / modulus)
+    loads = 4 / 3 * modulus * radii**3 / radius - np.sqrt(8 * np.pi * adhesion * modulus * radii**3)
+    last = int(np.searchsorted(loads, 0.01))
+    way_in = np.linspace(1e-3 * start_mm, depths[last], 80)
+    way_out = np.linspace(depths[last], 1e-3 * end_mm, 80)
+    load_in = np.where(way_in <= 0, 0.0, np.interp(way_in, depths, loads))  # it snaps in where it touches
+    load_out = np.interp(way_out, depths, loads, left=0.0)
+    assert load_out.max() == pytest.approx(0.01, rel=0.02)
+    assert load_out.min() < -0.015
+    depth_mm = 1e3 * np.concatenate([way_in, way_out])
+    load_n = np.concatenate([load_in, load_out])
+    return IndentationRecording(
+        id="adhesive", sensor=None, indenter_radius_mm=4.0, displacement_mm=travel * depth_mm, force_n=force * load_n
+    )
+
+
+@pytest.mark.parametrize(("force", "travel"), SIGNS)
+@pytest.mark.parametrize(("start_mm", "end_mm"), [(-0.05, -0.05), (0.0, 0.0), (0.0, -0.6), (-0.05, -0.6)])
+def test_what_pulls_a_sphere_on_its_way_out_tells_no_sign(
+    start_mm: float, end_mm: float, force: int, travel: int
+) -> None:
+    expected = tuple(name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0)
+    assert curve_signs.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
+
+
+def test_a_sphere_that_is_still_pulled_where_it_is_deepest_is_not_turned() -> None:
+    curve = adhesive(-0.05, -0.6, 1, 1)
+    rows = np.flatnonzero((np.arange(160) < 80) & (curve.displacement_mm < 0.06))
+    pressed_lightly = samples_of(curve, rows)
+    assert pressed_lightly.force_n[-1] < 0
+    assert curve_signs.counted_negative(pressed_lightly) == ()
 
 
 @pytest.mark.parametrize(("force", "travel"), SIGNS)

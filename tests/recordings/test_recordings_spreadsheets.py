@@ -115,9 +115,22 @@ def test_a_table_of_frfs_without_its_skin_is_told_what_is_missing() -> None:
     assert "schema,campaign/1" not in refusal(block).reason
 
 
-@pytest.mark.parametrize("said", ["p-p", "peak-to-peak", "pp", "RMS"])
-def test_a_force_that_is_no_amplitude_is_not_taken_for_one(said: str) -> None:
-    reason = refusal(changed("dynamic_force_n", f"Dynamic force {said} [N]")).reason
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "Dynamic force p-p [N]",
+        "Dynamic force peak-to-peak [N]",
+        "Dynamic force pp [N]",
+        "Dynamic force RMS [N]",
+        "dynamic_force_pp [N]",
+        "dynamic_force_pp_n",
+        "dynamic_force_rms_n",
+        "force_rms [N]",
+        "peak_to_peak force [N]",
+    ],
+)
+def test_a_force_that_is_no_amplitude_is_not_taken_for_one(heading: str) -> None:
+    reason = refusal(changed("dynamic_force_n", heading)).reason
     assert "dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms" in reason
     assert "did you mean" not in reason
 

@@ -17,6 +17,13 @@ def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:
     assert defects("charge_pc", charge) == []
 
 
+@pytest.mark.parametrize("samples", [1, 2, 3])
+def test_a_few_samples_show_no_defect(samples: int) -> None:
+    signal = np.arange(float(samples))
+    assert defects("charge_pc", signal) == []
+    assert defects_of_pair(signal, signal) == []
+
+
 def test_broadband_leaves_damaged_blocks_out() -> None:
     force, charge = shaken(10)
     damaged = charge.copy()

@@ -1,8 +1,10 @@
 """Curves whose force or displacement is counted negative as they are pressed: found, and turned where asked.
 
-Compression and depth are positive here. A curve is pressed up to its largest excursion of force: the sign of that
-excursion tells how the force is counted, and the displacement there, beside that at the start, how the travel is.
-A sphere that is only ever pulled has no such recording; a block may be pulled, with both negative.
+Compression and depth are positive here. A block is pressed up to its largest excursion of force: the sign of that
+excursion tells how the force is counted, and the displacement there, beside that at the start, how the travel is. It
+may be pulled, with both negative. A sphere moves into the sample first: where it goes tells how the travel is counted,
+and the force where it is deepest how the force is. What it pulls on its way out, often more than it was pressed with,
+tells nothing.
 """
 
 from collections.abc import Mapping
@@ -12,9 +14,13 @@ import numpy as np
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, Recording
+from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, IndentationRecording, Recording
+from underskin.units import Floats
 
 _FORCE, _TRAVEL = "force_n", "displacement_mm"
+_MOVED = 0.05  # of the range of travel, from which on a sphere moves
+_DEEPEST = 0.99  # of the way in: before what is held there relaxes
+_LOWEST = 0.15  # of the range of force on the way in, above its least: a sphere that snapped in is pulled there as well
 
 
 def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
@@ -22,8 +28,21 @@ def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
     if len(force) != len(travel) or not len(force):
         return ()
+    if isinstance(recording, IndentationRecording):
+        return _of_sphere(force, travel)
     top = int(np.argmax(np.abs(force - force[0])))
     return tuple(name for name, column in ((_FORCE, force), (_TRAVEL, travel)) if column[top] < column[0])
+
+
+def _of_sphere(force: Floats, travel: Floats) -> tuple[str, ...]:
+    """The same of a sphere; its force only where it is near its least when deepest."""
+    moved = travel - travel[0]
+    is_negative = bool(moved[np.argmax(np.abs(moved) > _MOVED * np.ptp(moved))] < 0)
+    depth = -moved if is_negative else moved
+    top = int(np.argmax(depth >= _DEEPEST * depth.max()))
+    way_in = force[: top + 1]
+    falls = force[top] < force[0] and force[top] - way_in.min() < _LOWEST * np.ptp(way_in)
+    return (*([_FORCE] if falls else []), *([_TRAVEL] if is_negative else []))
 
 
 def findings(campaign: Campaign) -> list[Finding]:

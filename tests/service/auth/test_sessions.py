@@ -1,13 +1,19 @@
 """Sessions of browsers: listed for their key, ended one by one, on the page, by a logout and by the command line."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import httpx
 import pytest
 
-from service.auth.session import COOKIE
+from service.auth.keys import Key
+from service.auth.session import COOKIE, logged_in
+from service.auth.sessions import Sessions
+from service.store import open_store
+from service.store import sessions as noted
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Place, Server, running
 
@@ -127,3 +133,24 @@ def test_the_cookie_is_kept_nowhere(keyed: tuple[Server, dict[str, str]], log_in
     written = [path.read_bytes() for path in server.place.folder.parent.rglob("*") if path.is_file()]
     assert any(b"/login" in text for text in written)  # of the log
     assert not any(part.encode() in text for text in written for part in (cookie, cookie.split(".")[0]))
+
+
+def test_a_logout_during_a_look_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The store has no row of this session, so that this process alone knows that it was ended."""
+    key = Key("mara", "write", "2026-01-01T00:00:00Z", 64 * "a")
+    sessions, cookie = Sessions(open_store("", tmp_path)), logged_in(key)
+    looking, logged_out = threading.Event(), threading.Event()
+
+    def slowly(_: object) -> frozenset[str]:
+        looking.set()
+        assert logged_out.wait(10)
+        return frozenset({"another"})
+
+    monkeypatch.setattr(noted, "ended", slowly)
+    look = threading.Thread(target=sessions.look)
+    look.start()
+    assert looking.wait(10)
+    sessions.log_out(cookie, key)
+    logged_out.set()
+    look.join(10)
+    assert sessions.has_ended(cookie)

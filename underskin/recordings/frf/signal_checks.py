@@ -83,8 +83,11 @@ def _kurtosis(signal: Floats) -> float:
 def defects(channel: str, signal: Floats) -> list[Defect]:
     """Every defect of a signal, in order of its kind.
 
-    Dropped samples are seen as a held value, or as a jump where the signal is sampled finely enough to be smooth.
+    Dropped samples are seen as a held value, or as a jump where the signal is sampled finely enough to be smooth. Fewer
+    than three samples show none.
     """
+    if len(signal) < 3:
+        return []
     clipped = _overload(signal)
     held = _held(signal) & ~clipped
     jump = _jumps(signal) & ~clipped & ~held

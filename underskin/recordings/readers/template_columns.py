@@ -31,7 +31,7 @@ _NEEDED = {
     "frequency_hz": "frequency",
     MAGNITUDE: "frf_magnitude",
 }
-_NO_AMPLITUDE = re.compile(r"force.*\b(p-?p|pk-?pk|peak.to.peak|rms)\b")
+_NO_AMPLITUDE = re.compile(r"\b(p[- ]?p|pk[- ]?pk|peak.to.peak|rms)\b")
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,8 @@ def _without(place: int, heading: str, column: _Nameless, fields: Sequence[str],
             raise NoField(place, f"has no heading, but cells such as {column.example!r}")
         return []
     none = f"{heading!r} is no field, or its unit is not of the field"
-    if _NO_AMPLITUDE.search(heading.lower()):
+    words = heading.lower().replace("_", " ")
+    if "force" in words and _NO_AMPLITUDE.search(words):
         raise NoField(place, f"{none}; dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms")
     alike = get_close_matches(heading.strip().lower().replace(" ", "_"), fields, 1, _ALIKE)
     if alike:
