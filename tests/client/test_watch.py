@@ -107,7 +107,7 @@ def test_a_rig_description_is_used_and_one_that_makes_sense_of_a_file_has_it_sen
         at.end()
         at.start()
         at.wait_for("block.csv: campaign c-")
-        assert "E 16.04" in at.told
+        assert "E of block 16.04" in at.told
         at.end()
         rig.write_text(described + "# a remark\n")
         at.start()

@@ -25,7 +25,7 @@ def d33(server: Server, campaign_id: str, model: str) -> dict[str, Any]:
 
 
 def numbers(text: str) -> list[float]:
-    found = re.findall(r"[+−-]?\d+\.?\d*", text.replace("d33", ""))
+    found = re.findall(r"[+−-]?\d+\.?\d*", text.replace("d33", "").replace("95 %", ""))
     return [float(one.replace("−", "-")) for one in found]
 
 

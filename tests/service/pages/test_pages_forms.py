@@ -42,7 +42,7 @@ def test_every_form_reads_decimal_commas(reader: Visit, kept: str, width: int) -
         reader.require_accessible()
     reader.go(kept)
     page.get_by_text("Average over another band").click()
-    page.get_by_label("from").fill("5,5")
+    page.get_by_label("from", exact=True).fill("5,5")
     page.get_by_label("to", exact=True).fill("50")
     page.get_by_role("button", name="Average").click()
     page.get_by_text("Averaged over your own band, 5.5 to 50").wait_for()
@@ -57,7 +57,7 @@ def test_a_mistyped_number_stays_in_its_form(reader: Visit, kept: str) -> None:
         assert page.get_by_role("link", name="Skins").first.is_visible()
     reader.go(f"{kept}?band_low_hz=five&band_high_hz=50")
     assert alert(reader) == "from [Hz]: five – must be a number"
-    assert page.get_by_label("from").input_value() == "five"
+    assert page.get_by_label("from", exact=True).input_value() == "five"
     reader.require_accessible()
 
 

@@ -9,9 +9,10 @@ import pytest
 from sqlalchemy import insert, select, text, update
 
 from service.schemas.campaign_d33 import ANSWER_VERSION, D33
-from service.store import campaigns, database, migrate, open_store
+from service.store import campaigns, database, migrate, open_store, skins
 from service.store.codec import compressed, decompressed
 from service.store.tables import inversions, sensor_d33
+from service.store.times import now
 from service.usecases import d33_cache
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import load_table
@@ -83,15 +84,21 @@ def test_what_a_store_of_the_first_schema_kept_is_computed_anew(place: Place, mo
         migrate.migrate(store, place.folder)
     with store.writing() as connection, monkeypatch.context() as earlier:
         earlier.setattr(campaigns, "keep_digests", lambda *_: None)  # a table of a later schema
+        earlier.setattr(skins, "require", lambda *_: "palm")  # columns of a later schema
+        connection.execute(
+            text("INSERT INTO skins (id, root_id, created_at) VALUES ('palm', 'palm', :at)"), {"at": now()}
+        )
         campaign_id, _ = campaigns.add(connection, campaigns.NewCampaign(parse(campaign("one")), "palm"))
-        row = campaigns.find(connection, campaign_id)
+        number = connection.execute(text("SELECT number FROM campaigns")).scalar_one()
         old = "INSERT INTO inversions (campaign, revision, table_sha256, document) VALUES (:campaign, 0, :table, :old)"
-        kept = {"campaign": row.number, "table": table.sha256, "old": compressed({"d33": 99})}
+        kept = {"campaign": number, "table": table.sha256, "old": compressed({"d33": 99})}
         connection.execute(text(old), kept)
         point = {"sensor": "s0", "d33_pc_per_n": 99.0, "d33_uncertainty_pc_per_n": 1.0}
-        connection.execute(insert(sensor_d33), {"campaign": row.number, **point})
+        connection.execute(insert(sensor_d33), {"campaign": number, **point})
     store.close()
     store = open_store(place.database_url, place.folder)
+    with store.reading() as connection:
+        row = campaigns.find(connection, campaign_id)
     assert D33(**d33_cache.answer(store, table, row, None)).status == "ok"
     with store.reading() as connection:
         assert 99.0 not in connection.execute(select(sensor_d33.c.d33_pc_per_n)).scalars().all()
