@@ -7,12 +7,24 @@ from pathlib import Path
 import pytest
 from sqlalchemy import Connection, event, select
 
-from service.store import Conflict, Database, annotations, campaigns, changes, open_store, skins, undo
+from service.store import (
+    Conflict,
+    Database,
+    annotations,
+    campaigns,
+    changes,
+    export,
+    import_checks,
+    open_store,
+    skins,
+    undo,
+)
 from service.store.tables import changes as change_rows
 from service.usecases import changes as shown_changes
 from tests.support import postgres
 from tests.support.store_server import Place, campaign
 from underskin.recordings.campaign import parse
+from underskin.recordings.skin_export import read_overview
 
 
 @pytest.fixture
@@ -87,6 +99,16 @@ def test_a_skin_put_away_comes_back_with_campaigns_in_use(store: Database) -> No
     assert listed(store) == set()
     store.write(undo.undo, withdrawal, None)
     assert listed(store) == {"palm"}
+
+
+def test_a_join_undone_since_is_exported_and_imported(store: Database, tmp_path: Path) -> None:
+    for name in "ab":
+        store.write(skins.require, name)
+    store.write(undo.undo, joined(store, "a", "b"), None)
+    store.read(export.export, "a", tmp_path / "a.h5")
+    with (tmp_path / "a.h5").open("rb") as stream:
+        checked = import_checks.overview(read_overview(stream, "a.h5"))
+    assert [change.action for change in checked.changes] == ["join", "undo"]
 
 
 @pytest.mark.parametrize("away", ["palm", "hand"])
