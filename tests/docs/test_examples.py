@@ -179,7 +179,7 @@ def test_labview_request_byte_for_byte(server_url: str) -> None:
 def test_labview_without_the_header_is_refused_as_the_page_says(server_url: str) -> None:
     answer = httpx.post(f"{server_url}/v1/frf", data={"preload_n": "1"})
     assert answer.status_code == 415
-    assert "application/json, text/csv or application/x-npz" in answer.json()["detail"]
+    assert "application/json, text/csv, application/x-npz or" in answer.json()["detail"]
 
 
 def read_answer(connection: socket.socket) -> tuple[str, str]:

@@ -17,8 +17,11 @@ from tests.support.server import running
 STORED = orjson.loads(FILE.read_bytes())
 CALCULATIONS = ("sigma_one", "sigma_columns", "frf_columns", "d33_columns", "stress", "design", "umbridge_gradient")
 # Without an example: arrays and files, and answers that are the document itself or never come.
-XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
-BINARY = ("application/x-npz", "application/x-hdf5", "application/octet-stream", XLSX)
+WORKBOOKS = (
+    "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",
+    "application/vnd.ms-excel.sheet.macroEnabled.12",
+)
+BINARY = ("application/x-npz", "application/x-hdf5", "application/octet-stream", *WORKBOOKS)
 NO_ANSWER = ("openapi", "umbridge_apply_hessian")
 
 
