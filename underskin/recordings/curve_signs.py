@@ -18,6 +18,7 @@ from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
 from underskin.units import Floats
 
 _FORCE, _TRAVEL = "force_n", "displacement_mm"
+_LEAST = 8  # samples: fewer tell nothing of how a curve goes
 _MOVED = 0.05  # of the range of travel, from which on a sphere moves
 _DEEPEST = 0.99  # of the way in: before what is held there relaxes
 _LOWEST = 0.15  # of the range of force on the way in, above its least: a sphere that snapped in is pulled there as well
@@ -26,7 +27,7 @@ _LOWEST = 0.15  # of the range of force on the way in, above its least: a sphere
 def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
     """Those of `force_n` and `displacement_mm` that fall while the curve is pressed."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
-    if len(force) != len(travel) or not len(force):
+    if len(force) != len(travel) or len(force) < _LEAST:
         return ()
     if isinstance(recording, IndentationRecording):
         return _of_sphere(force, travel)
