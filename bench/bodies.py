@@ -2,17 +2,16 @@
 
 import http.client
 import json
-import re
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 from bench import servers
 from bench.diagnosed import document
 from bench.figures import Figure
 from bench.servers import Server
+from tests.support.process_memory import memory_bytes
 
 _BYTES = 62_000_000
 _QUIET_S = 3.0
@@ -64,7 +63,7 @@ def measure() -> list[Figure]:
         figures.append(Figure("/health beside nothing, 99th percentile", 1e3 * _percentile(quiet.times_s), "ms"))
         for name, (path, make, status) in _BODIES.items():
             body = make()
-            before = _memory_bytes(server.process.pid)
+            before = memory_bytes(server.process.pid)
             with _beside(server) as beside:
                 _post(server, path, body, status)
             times = 1e3 * _percentile(beside.times_s)
@@ -102,7 +101,7 @@ def _beside(server: Server) -> Iterator[_Beside]:
 
     def look() -> None:
         while not seen.ended.wait(_EVERY_S):
-            seen.memory_bytes = max(seen.memory_bytes, _memory_bytes(server.process.pid))
+            seen.memory_bytes = max(seen.memory_bytes, memory_bytes(server.process.pid))
 
     threads = [threading.Thread(target=run) for run in (ask, look)]
     for thread in threads:
@@ -123,27 +122,6 @@ def _post(server: Server, path: str, body: bytes, status: int) -> None:
     connection.close()
     if answer.status != status:
         raise RuntimeError(f"{path} answered {answer.status}: {said[:500].decode()}")
-
-
-def _memory_bytes(pid: int) -> int:
-    """Of a process and all that it has started."""
-    process = Path(f"/proc/{pid}")
-    try:
-        found = re.search(r"VmRSS:\s+(\d+) kB", (process / "status").read_text())
-        children = [child for task in process.glob("task/*/children") for child in task.read_text().split()]
-    except OSError:  # it has ended
-        return 0
-    return (int(found[1]) * 1024 if found else 0) + sum(
-        _memory_bytes(int(child)) for child in children if _program(int(child)) != _program(pid)
-    )
-
-
-def _program(pid: int) -> bytes:
-    """The command line of a process; until it has become another program it has the memory of its parent."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
 
 
 def _percentile(times_s: list[float]) -> float:

@@ -64,6 +64,7 @@ class KeyRequirement:
             try:
                 self.look()
                 self._warn_of_missing_keys()
+                self._store.require_in_place()  # connections that are open read on where the file was moved
                 self._failure.is_over()
             except (SQLAlchemyError, StorageFull, StoreMoved, OSError) as error:
                 self._failure.log("whether keys are needed cannot be looked up", error)

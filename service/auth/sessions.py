@@ -92,6 +92,7 @@ class Sessions:
         while not self._ending.wait(_LOOK_S):
             try:
                 self.look()
+                self._store.require_in_place()  # connections that are open read on where the file was moved
                 self._failure.is_over()
             except _STORE_FAILED as error:
                 self._failure.log("which sessions were ended cannot be looked up", error)

@@ -13,6 +13,7 @@ import httpx
 import pytest
 
 from tests.service.requests import problem_of
+from tests.support.process_memory import memory_bytes
 from tests.support.server import Server, running
 from tests.support.store_server import campaign
 
@@ -44,27 +45,6 @@ def of_campaign(**fields: Any) -> bytes:
     count = LARGE // len(json.dumps(one))
     document["recordings"] = [{**one, "id": f"r{number}"} for number in range(count)]
     return json.dumps(document).encode()
-
-
-def memory_bytes(pid: int) -> int:
-    """Of a process and all that it has started."""
-    process = Path(f"/proc/{pid}")
-    try:
-        found = re.search(r"VmRSS:\s+(\d+) kB", (process / "status").read_text())
-        children = [child for task in process.glob("task/*/children") for child in task.read_text().split()]
-    except OSError:  # it has ended
-        return 0
-    return (int(found[1]) * 1024 if found else 0) + sum(
-        memory_bytes(int(child)) for child in children if _program(int(child)) != _program(pid)
-    )
-
-
-def _program(pid: int) -> bytes:
-    """The command line of a process; until it has become another program it has the memory of its parent."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except OSError:
-        return b""
 
 
 def processor_s(pid: int) -> float:
