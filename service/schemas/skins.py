@@ -37,6 +37,10 @@ class SkinDetail(BaseModel):
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
     joined: list[JoinedSkin] = Field(description="Skins that count as this one.")
+    differences: list[str] = Field(
+        description="What skins that count as one declare differently, in words; figures use each campaign's own.",
+        examples=[["youngs_modulus_mpa is 16 of palm-3 and 9 of palm-3b"]],
+    )
     rig: dict[str, Any] | None = Field(description="The rig description in use for its files (`rig/1`).")
 
 
@@ -114,6 +118,10 @@ class History(BaseModel):
 
     skin_id: str = Field(description="The skin; the one it was joined to, where it was.")
     joined: list[JoinedSkin] = Field(description="Skins that are counted in.")
+    differences: list[str] = Field(
+        description="What skins that count as one declare differently, in words; figures use each campaign's own.",
+        examples=[["youngs_modulus_mpa is 16 of palm-3 and 9 of palm-3b"]],
+    )
     sensors: list[SensorHistory] = Field(description="By id.")
     left_out_campaigns: list[LeftOutCampaign] = Field(
         description="Withdrawn, corrected, without d33, or only with recordings that count in another campaign."

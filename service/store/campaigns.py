@@ -168,14 +168,19 @@ def current_by_time(
 
 def latest(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin's current campaign that was recorded last; None where none is current."""
-    return _first_current(connection, skin_id)
+    return _first_current(connection, _counting_as(skin_id))
 
 
-def describing(connection: Connection, skin_id: str) -> AnyRow | None:
+def describing(connection: Connection, skin_id: str, *, alone: bool = False) -> AnyRow | None:
     """The row of a skin's current campaign that describes it: the latest with FRFs, which need geometry and sensors;
     else the latest with indentations, of which the thickness may be known; else the latest. None where none is
-    current."""
-    return _first_current(connection, skin_id, case((_has("frf"), 0), (_has("indentation"), 1), else_=2))
+    current. `alone`: of campaigns sent for this very id, none of those joined with it."""
+    of_skin = campaigns.c.skin_id == skin_id if alone else _counting_as(skin_id)
+    return _first_current(connection, of_skin, case((_has("frf"), 0), (_has("indentation"), 1), else_=2))
+
+
+def _counting_as(skin_id: str) -> ColumnElement[bool]:
+    return campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
 
 
 def _has(kind: str) -> ColumnElement[bool]:
@@ -183,8 +188,9 @@ def _has(kind: str) -> ColumnElement[bool]:
     return exists(select(recordings.c.kind).where(own).correlate(campaigns))
 
 
-def _first_current(connection: Connection, skin_id: str, *rank: ColumnElement[int]) -> AnyRow | None:
-    of_skin = campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id)))
+def _first_current(
+    connection: Connection, of_skin: ColumnElement[bool], *rank: ColumnElement[int]
+) -> AnyRow | None:
     query = select(campaigns).where(of_skin, CURRENT).order_by(*rank, TIME.desc(), campaigns.c.number.desc())
     return connection.execute(query.limit(1)).first()
 

@@ -20,6 +20,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 _YEAR_S = 365.25 * 86400
 _LEAST_SPAN_S = 86400.0
+_DECLARED = ("thickness_mm", "youngs_modulus_mpa", "poisson_ratio", "sensor_radius_mm")  # of a skin as a whole
 _SensorPoint = tuple[str, models.Point]
 
 
@@ -42,12 +43,26 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
     row = skins.find(connection, skins.require_root(connection, skin_id))
     assert row is not None
     rig = skins.rig_of(connection, row.id)
+    others = skins.joined_to(connection, row.id)
     return SkinDetail(
         id=row.id,
         created_at=row.created_at,
-        joined=[joined(other) for other in skins.joined_to(connection, row.id)],
+        joined=[joined(other) for other in others],
+        differences=differences(connection, [row.id, *(other.id for other in others)]),
         rig=None if rig is None else orjson.loads(rig),
     )
+
+
+def differences(connection: Connection, ids: Sequence[str]) -> list[str]:
+    """What the campaigns sent for several skins declare differently of them, in words."""
+    rows = {skin_id: campaigns.describing(connection, skin_id, alone=True) for skin_id in ids}
+    declared = {skin_id: row.about["skin"] for skin_id, row in rows.items() if row is not None}
+    told = []
+    for name in _DECLARED:
+        values = {skin_id: skin[name] for skin_id, skin in declared.items() if skin.get(name) is not None}
+        if len(set(values.values())) > 1:
+            told.append(f"{name} is " + " and ".join(f"{value:g} of {skin_id}" for skin_id, value in values.items()))
+    return told
 
 
 def history_by_model(
@@ -95,9 +110,11 @@ def _history(
     names = sorted(by_sensor)
     used = {point.campaign_id for points in by_sensor.values() for point in points}
     campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
+    others = skins.joined_to(connection, root)
     return models.History(
         skin_id=root,
-        joined=[joined(row) for row in skins.joined_to(connection, root)],
+        joined=[joined(row) for row in others],
+        differences=differences(connection, [root, *(other.id for other in others)]),
         sensors=[
             models.SensorHistory(sensor=name, points=by_sensor[name], trend=line, no_trend=_no_trend(by_sensor[name]))
             for name, line in zip(names, _trends([by_sensor[name] for name in names]), strict=True)

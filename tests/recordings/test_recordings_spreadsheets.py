@@ -221,6 +221,20 @@ def test_local_times_are_read_and_their_zone_told(written: str, time: str, monke
         read(text)
 
 
+@pytest.mark.parametrize("day", ["24.12.2025", "2025-12-24", "2025-12-24T00:00:00+01:00"])
+def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str) -> None:
+    def table(headings: str, cells: str) -> str:
+        return ABOVE + HEADINGS.replace("\n", headings + "\n") + ROWS.replace("-0.5\n", f"-0.5,{cells}\n", 1)
+
+    assert only(same_as_plain(table(",Date,Time", f"{day},09:30"))).recorded_at == "2025-12-24T09:30:00+00:00"
+    assert only(same_as_plain(table(",Uhrzeit,Datum", f"9:30:07,{day}"))).recorded_at == "2025-12-24T09:30:07+00:00"
+    if "T" not in day:
+        assert only(read(table(",Date", day))).recorded_at == "2025-12-24T00:00:00+00:00"
+    refused = refusal(table(",Date,Time", ",09:30"))
+    assert (refused.place, refused.reason) == ("line 10, column 9", "has a time of day, '09:30', and no Date")
+    assert "is no date and time" in refusal(table(",Date,Time", "31.2.2025,09:30")).reason
+
+
 @pytest.mark.parametrize(
     ("written", "reason"), [("03/02/2025 09:30", "can be two days"), ("31.2.2025 09:30", "is no date and time")]
 )

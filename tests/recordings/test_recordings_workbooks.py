@@ -92,6 +92,18 @@ def test_what_is_wrong_on_a_sheet_is_named_as_in_the_csv() -> None:
     assert (error.place, "did you mean preload_n?" in error.reason) == ("sheet 'May', line 9, column 4", True)
 
 
+def test_the_skin_on_one_sheet_and_the_table_on_the_next_are_one_campaign() -> None:
+    table = cells(HEADINGS + ROWS)
+    data = workbook({"Skin": cells(ABOVE), "Notes": [["warm day"]], "May": table})
+    reading = read_file(data, "palm.xlsx")
+    assert to_dict(reading.campaign) == to_dict(read(PLAIN).campaign)
+    assert reading.warnings == ["sheet 'Notes' is no campaign, and is left out"]
+    error = refusal(workbook({"Skin": cells(ABOVE), "May": [*table, ["r9", "s01", *["x"] * 9]]}))
+    assert error.place.startswith("sheet 'Skin' with sheet 'May' under it, line ")
+    error = refusal(workbook({"Skin": cells(ABOVE), "May": table, "June": table}))
+    assert "the table is missing" in error.reason
+
+
 def test_two_campaigns_in_a_workbook_are_named() -> None:
     error = refusal(workbook({"May": cells(PLAIN), "June": cells(PLAIN)}))
     assert error.reason == "holds a campaign on each of the sheets 'May', 'June': save each as a workbook"

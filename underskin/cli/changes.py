@@ -81,7 +81,8 @@ def join(
     with connect(url, key) as client:
         detail = client.skins.join(skin, other, reason)
     joined = " and ".join(entry["id"] for entry in detail["joined"])
-    _say(detail, f"skin {detail['id']} counts as one with {joined}", json)
+    differ = "".join(f"\nwarning: they differ: {difference}" for difference in detail["differences"])
+    _say(detail, f"skin {detail['id']} counts as one with {joined}{differ}", json)
 
 
 def adopt(

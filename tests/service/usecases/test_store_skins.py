@@ -56,6 +56,19 @@ def test_joined_skins_are_one_and_keep_their_names(server: Server) -> None:
     assert points(server, "c") == [a, b, c, d]
 
 
+def test_what_joined_skins_declare_differently_is_said(server: Server) -> None:
+    post(server, "a", "a")
+    document = campaign("b")
+    document["skin"] |= {"youngs_modulus_mpa": 9.0}
+    assert server.http.post("/v1/campaigns", json=document, params={"skin": "b"}).status_code == 201
+    assert server.http.get("/v1/skins/a").json()["differences"] == []
+    detail = server.http.post("/v1/skins/a/join", json={"skin_id": "b", "reason": "one skin"}).json()
+    declared = campaign("a")["skin"]["youngs_modulus_mpa"]
+    assert detail["differences"] == [f"youngs_modulus_mpa is {declared:g} of a and 9 of b"]
+    assert history(server, "b")["differences"] == detail["differences"]
+    assert detail["differences"][0] in server.http.get("/skins/a").text
+
+
 @pytest.mark.parametrize(("skin", "other", "status"), [("a", "a", 422), ("a", "none", 404), ("none", "a", 404)])
 def test_what_cannot_be_joined_is_refused(server: Server, skin: str, other: str, status: int) -> None:
     post(server, "a", "a")

@@ -142,6 +142,9 @@ class History(Document):
     joined: tuple[JoinedSkin, ...]
     """Skins that are counted in."""
 
+    differences: tuple[str, ...]
+    """What skins that count as one declare differently, in words; figures use each campaign's own."""
+
     sensors: tuple[SensorHistory, ...]
     """By id."""
 
@@ -167,6 +170,9 @@ class SkinDetail(Document):
 
     joined: tuple[JoinedSkin, ...]
     """Skins that count as this one."""
+
+    differences: tuple[str, ...]
+    """What skins that count as one declare differently, in words; figures use each campaign's own."""
 
     rig: Mapping[str, Any] | None
     """The rig description in use for its files (`rig/1`)."""

@@ -8,6 +8,7 @@ _WRITTEN = re.compile(
     r"(?:[ ,T]+(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}))?)?"
 )
 _MONTHS = 12
+_ISO_DATE = re.compile(r"(\d{4})-(\d{2})-(\d{2})")
 
 
 def iso_time(cell: str, zone: tzinfo) -> str:
@@ -30,3 +31,9 @@ def iso_time(cell: str, zone: tzinfo) -> str:
         return datetime.fromisoformat(time).replace(tzinfo=zone).isoformat()
     except ValueError as error:
         raise ValueError(f"is no date and time: {error}") from None
+
+
+def of_two_cells(day: str, clock: str) -> str:
+    """A date, also one that begins an ISO time, and a time of day in cells of their own, as `iso_time` reads them."""
+    iso = _ISO_DATE.match(day.strip())
+    return f"{'.'.join(reversed(iso.groups())) if iso else day.strip()} {clock.strip()}".strip()

@@ -28,7 +28,7 @@ from underskin.recordings.channels import Document
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers import template_columns, template_lines, text
 from underskin.recordings.readers.calendar_times import iso_time
-from underskin.recordings.readers.template_columns import NO_NAME, Column, NoField
+from underskin.recordings.readers.template_columns import CLOCK, DATE, NO_NAME, Column, NoField
 from underskin.recordings.readers.template_lines import TemplateLines
 from underskin.recordings.readers.template_recordings import POSITION, TemplateRecordings
 from underskin.recordings.readers.text_blocks import BlockText
@@ -38,7 +38,7 @@ from underskin.recordings.time_zone import time_zone
 from underskin.units import LAB, LabField
 
 _SENSOR = ("id", "x_mm", "y_mm")
-_TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id")
+_TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id", DATE, CLOCK)
 _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(POSITION)) - {"conditions"}
 _ID = "id"
@@ -50,6 +50,11 @@ _FLAGS = {"true": True, "false": False}
 def is_template(content: str) -> bool:
     """Whether a text begins as the template does."""
     return template_lines.separator_of(content) is not None
+
+
+def has_table(content: str) -> bool:
+    """Whether a line of a text whose cells are separated by tabs is the headings of the table."""
+    return any(_begins_table(line.split("\t")) for line in content.splitlines())
 
 
 def read(stream: BinaryIO, file: str) -> Document:

@@ -1,7 +1,7 @@
 """The columns of the CSV template: which field each heading means, and what is no field.
 
-Headings are read in capitals or not. `indenter_diameter_mm` is halved, a magnitude with a phase is a complex value. A
-column without a heading that only counts its rows, as spreadsheets write it, or is empty, and a column of words that
+Headings are read in capitals or not. `indenter_diameter_mm` is halved, a magnitude with a phase is a complex value, a
+date and a time of day are `recorded_at`. A column without a heading that only counts its rows, as spreadsheets write it, or is empty, and a column of words that
 names no field, are left out.
 """
 
@@ -18,6 +18,8 @@ from underskin.recordings.readers.unit_labels import in_brackets, lab_field, uni
 
 FURTHER = "conditions."  # what else the lab noted, a column each
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
+DATE, CLOCK = "date", "time of day"
+_DATED = {"date": DATE, "datum": DATE, "time": CLOCK, "uhrzeit": CLOCK}
 PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
 _PHASE_ALONE, _TURN = "frf_phase", 2 * math.pi
@@ -31,6 +33,7 @@ _NEEDED = {
     "frequency_hz": "frequency",
     MAGNITUDE: "frf_magnitude",
 }
+_Meaning = tuple[str, float] | None  # a field, and the factor to its unit
 _NO_AMPLITUDE = re.compile(r"\b(p[- ]?p|pk[- ]?pk|peak.to.peak|rms)\b")
 
 
@@ -94,6 +97,8 @@ def columns(
     found: dict[str, Column] = {}
     left_out: list[str] = []
     meanings = [field_of(heading, known) for heading in headings]
+    if not any(meant is not None and meant[0] == "recorded_at" for meant in meanings):
+        meanings = _dated(headings, meanings)
     present = {meant[0] for meant in meanings if meant is not None}
     others = {place: _Nameless() for place, meant in enumerate(meanings) if meant is None}
     for row in under(list(others)) if others else ():
@@ -115,7 +120,7 @@ def columns(
     return list(found.values()), left_out
 
 
-def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
+def field_of(heading: str, known: Collection[str]) -> _Meaning:
     """The field of a heading and the factor to its unit; None where it names none."""
     heading = heading.strip()
     if heading.lower().startswith(FURTHER):
@@ -133,6 +138,16 @@ def field_of(heading: str, known: Collection[str]) -> tuple[str, float] | None:
         if name == "frf_magnitude" and given is not None and given.dimension == "charge/force":
             return MAGNITUDE, given.to_si / 1e-12
     return lab_field(heading) or lab_field(lower)
+
+
+def _dated(headings: Sequence[str], meanings: Sequence[_Meaning]) -> list[_Meaning]:
+    """The meanings, those of a date and of the time of day beside it too; without a date, a time is none of the day."""
+    dated = [_DATED.get(heading.strip().lower()) for heading in headings]
+    if DATE not in dated:
+        return list(meanings)
+    return [
+        (of, 1.0) if meant is None and of is not None else meant for of, meant in zip(dated, meanings, strict=True)
+    ]
 
 
 def in_small_letters(name: str) -> str:

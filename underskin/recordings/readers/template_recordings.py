@@ -10,8 +10,9 @@ import numpy as np
 from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS
 from underskin.recordings.readers import template_columns
+from underskin.recordings.readers.calendar_times import of_two_cells
 from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
-from underskin.recordings.readers.template_columns import FURTHER, MAGNITUDE, PARTS, PHASE, Column
+from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, MAGNITUDE, PARTS, PHASE, Column
 from underskin.recordings.readers.template_lines import TemplateLines
 from underskin.units import Floats
 
@@ -51,8 +52,20 @@ class TemplateRecordings:
         self._current, self._continued = "", False  # the id, and whether rows without it have followed
 
     def documents(self) -> list[dict[str, Any]]:
-        """The recordings as in a campaign."""
+        """The recordings as in a campaign; raises FileError where a date and a time of day are no time."""
+        for recording, index in zip(self._recordings, self._begun.values(), strict=True):
+            self._date(recording.once, index)
         return [recording.document() for recording in self._recordings]
+
+    def _date(self, once: dict[str, Any], index: int) -> None:
+        """Put `recorded_at` in place of a date and a time of day, of a recording that begins in a row."""
+        day, clock = once.pop(DATE, None), once.pop(CLOCK, None)
+        column = next((one for one in self._columns if one.field == DATE), None)
+        if column is None or day is clock is None:
+            return
+        if day is None:
+            raise self._reader.error(index, f"has a time of day, {clock!r}, and no {column.heading}", column.place)
+        once["recorded_at"] = self._reader.value("recorded_at", of_two_cells(day, clock or ""), (index, column.place))
 
     def take(self, first: int, lines: Sequence[str]) -> None:
         """Take lines, of which the first is at an index; raises FileError."""

@@ -1,6 +1,6 @@
 """Workbooks (.xlsx, .xlsm): each sheet is read as the CSV that it would be saved as.
 
-One sheet may be the campaign of csv_template.py. Otherwise each sheet with a table of numbers is a block by the sheet's
+One sheet may be the campaign of csv_template.py, or what stands above its table, and another the table. Otherwise each sheet with a table of numbers is a block by the sheet's
 name, as csv_file.py reads it; others are left out, with a warning.
 """
 
@@ -26,7 +26,7 @@ def read(stream: BinaryIO, file: str) -> Contents | Document:
             file, "", f"holds a campaign on each of the sheets {_listed(campaigns)}: save each as a workbook"
         )
     if campaigns:
-        document = _campaign(campaigns[0], sheets.pop(campaigns[0]), file)
+        document = _campaign(*_with_table(campaigns[0], sheets), file)
         others = [f"sheet {name!r} is no campaign, and is left out" for name in sheets]
         return replace(document, warnings=(*document.warnings, *others, *book.notes))
     contents = _tables(sheets, file)
@@ -49,16 +49,30 @@ def _listed(names: list[str]) -> str:
     return ", ".join(map(repr, names))
 
 
-def _campaign(name: str, text: str, file: str) -> Document:
+def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
+    """Takes a campaign off the sheets, with the table on the next sheet where its own has none: where it stands, in
+    words, and its text."""
+    text = sheets.pop(name)
+    tables = [other for other, below in sheets.items() if csv_template.has_table(below.partition("\n")[0])]
+    if csv_template.has_table(text) or len(tables) != 1:
+        return f"sheet {name!r}", text
+    (table,) = tables
+    return f"sheet {name!r} with sheet {table!r} under it", f"{text}\n\n{sheets.pop(table)}"
+
+
+def _campaign(place: str, text: str, file: str) -> Document:
     try:
         return csv_template.read(BytesIO(text.encode()), file)
     except FileError as error:
-        raise _on_sheet(name, error) from None
+        raise _at(place, error) from None
 
 
 def _on_sheet(name: str, error: FileError) -> FileError:
-    place = ", ".join(part for part in (f"sheet {name!r}", error.place) if part)
-    return FileError(error.file, place, error.reason, code=error.code)
+    return _at(f"sheet {name!r}", error)
+
+
+def _at(place: str, error: FileError) -> FileError:
+    return FileError(error.file, ", ".join(filter(None, (place, error.place))), error.reason, code=error.code)
 
 
 def _tables(sheets: dict[str, str], file: str) -> Contents:
