@@ -188,9 +188,7 @@ def _has(kind: str) -> ColumnElement[bool]:
     return exists(select(recordings.c.kind).where(own).correlate(campaigns))
 
 
-def _first_current(
-    connection: Connection, of_skin: ColumnElement[bool], *rank: ColumnElement[int]
-) -> AnyRow | None:
+def _first_current(connection: Connection, of_skin: ColumnElement[bool], *rank: ColumnElement[int]) -> AnyRow | None:
     query = select(campaigns).where(of_skin, CURRENT).order_by(*rank, TIME.desc(), campaigns.c.number.desc())
     return connection.execute(query.limit(1)).first()
 

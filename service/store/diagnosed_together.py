@@ -58,12 +58,11 @@ def count_usable(connection: Connection, skin_id: str) -> int:
     return int(connection.execute(select(func.count()).select_from(campaigns).where(_usable(skin_id))).scalar_one())
 
 
-def count_with_frfs(connection: Connection, members: Sequence[Member]) -> int:
-    """How many of these campaigns have FRFs that are not excluded."""
-    has = (recordings.c.kind == "frf") & recordings.c.excluded_at.is_(None)
-    query = select(func.count(recordings.c.campaign.distinct())).where(has)
-    numbers = [one.number for one in members]
-    return int(connection.execute(query.where(recordings.c.campaign.in_(numbers))).scalar_one())
+def have_frfs(connection: Connection, members: Sequence[Member]) -> bool:
+    """Whether one of these campaigns has FRFs that are not excluded."""
+    of_these = recordings.c.campaign.in_([one.number for one in members])
+    frfs = select(recordings.c.kind).where(of_these, recordings.c.kind == "frf", recordings.c.excluded_at.is_(None))
+    return connection.execute(frfs.limit(1)).first() is not None
 
 
 def _usable(skin_id: str) -> ColumnElement[bool]:

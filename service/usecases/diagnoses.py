@@ -32,7 +32,7 @@ def ask_of_skin(
     """As `ask`, of the campaigns of a skin together.
 
     Raises Missing where there is no such skin, InvalidInput that names the campaign that is not its own, and Conflict
-    where one is not in use, or fewer than two are with FRFs.
+    where one is not in use, there are fewer than two, or none has FRFs.
     """
     root = skins.require_root(connection, skin_id)
     _require_known(asked.without)
@@ -42,11 +42,10 @@ def ask_of_skin(
     elif len(members) < _FEWEST:
         count = "no campaign" if not members else "one campaign"
         raise Conflict(f"Skin {root!r} has {count} in use with recordings; {_FEWEST} or more are diagnosed together.")
-    if (with_frfs := diagnosed_together.count_with_frfs(connection, members)) < _FEWEST:
+    if not diagnosed_together.have_frfs(connection, members):
         raise Conflict(
-            f"Of these campaigns of skin {root!r} {'none has' if with_frfs == 0 else 'one alone has'} FRFs in use, by "
-            f"which campaigns are compared; {_FEWEST} or more are diagnosed together. Curves and FRFs of one skin tell "
-            "more in one campaign: send their files together, as a correction of this one."
+            f"Of these campaigns of skin {root!r} none has FRFs in use, by which campaigns are compared: diagnose "
+            "curves each campaign by itself, or send their files together, as a correction of one."
         )
     name = root if asked.name is None else checked_name("name", asked.name, False)
     together = Together("skin", name, members, [root] if asked.campaigns is None else [])

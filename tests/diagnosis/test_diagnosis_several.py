@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from tests.support.kinds_campaigns import BLOCK, curves
 from tests.support.skins import HEAVY_TIP, document, made
 from underskin.cli.app import app
 from underskin.diagnosis.reporting.html_report import page
@@ -16,7 +17,7 @@ from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, changes
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
@@ -119,8 +120,8 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
     thick = replace(other, skin=replace(other.skin, thickness_mm=3.0))
     with pytest.raises(InvalidInput, match="as may has it"):
         diagnose_together([made("may"), thick], table, "two skins")
-    with pytest.raises(InvalidInput, match="two at least with recordings of kind frf"):
-        diagnose_together([made("may"), replace(other, recordings=())], table, "empty")
+    with pytest.raises(InvalidInput, match="two at least, one of them with recordings of kind frf"):
+        diagnose_together([of_block(9.0), replace(of_block(9.0), name="again")], table, "curves")
     again = replace(made("may"), name="renamed")
     with pytest.raises(InvalidInput, match=r"renamed: recordings\[0\].*a recording of may: it would count twice"):
         diagnose_together([made("may"), again], table, "copy")
@@ -154,20 +155,40 @@ def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:
     assert refused.exit_code != 0
 
 
-def test_curves_beside_one_campaign_of_frfs_are_told_how_to_become_one_campaign(tmp_path: Path) -> None:
-    """Campaigns are compared by FRFs: a block of the elastomer belongs into the campaign of the FRFs."""
-    frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"
-    frfs.write_text(json.dumps(document("may", "2017-05-03T09:00:00Z", seed=5)))
-    travel = np.linspace(0.0, 1.0, 20)  # mm
-    cylinder = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
-    cylinder |= {"displacement_mm": travel.tolist(), "force_n": (125.0 * travel).tolist()}
+def of_block(modulus: float, name: str = "block") -> Campaign:
+    """A campaign of nothing but a compressed block of the elastomer, which is declared to have 16 MPa."""
     skin = {"youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
-    block.write_text(json.dumps({"schema": "campaign/1", "name": "block", "skin": skin, "recordings": [cylinder]}))
-    asked = ["diagnose", str(frfs), str(block), "--together", "palm", "--output-dir", str(tmp_path / "out")]
-    done = CliRunner(env={"COLUMNS": "400"}).invoke(app, asked)
-    assert done.exit_code == 2
-    assert f"{block} has none" in done.stderr
-    assert "underskin import FILES --together NAME" in done.stderr
+    recordings = curves("compression", BLOCK, modulus)
+    return parse({"schema": "campaign/1", "name": name, "skin": skin, "recordings": recordings})
+
+
+def test_a_block_measured_apart_tells_the_modulus_of_both_dates(table: SigmaTable) -> None:
+    """E is 9 where 16 is declared: FRFs leave open whether it is the thickness; the block counts for both dates."""
+    dates = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
+    report = diagnose_together([*dates, of_block(9.0)], table, "all")
+    assert report["campaigns"] == ["may", "september", "block"]
+    assert scopes(report) == {"modulus_error": {"campaigns": ["may", "september"]}}
+    (factor,) = report["mechanisms"][0]["parameters"]
+    assert factor["low"] < 9 / 16 < factor["high"]
+    assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
+    assert report["contradictions"] == []
+    other = replace(of_block(9.0), skin=replace(of_block(9.0).skin, youngs_modulus_mpa=9.0))
+    with pytest.raises(InvalidInput, match=r"block: skin\.youngs_modulus_mpa"):
+        diagnose_together([*dates, other], table, "all")
+
+
+def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Path) -> None:
+    """As if all were in one file."""
+    frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"
+    frfs.write_text(json.dumps(document("may", modulus=9.0)))
+    block.write_text(json.dumps(to_dict(of_block(9.0))))
+    asked = ["diagnose", str(frfs), str(block), "--together", "palm", "--output-dir", str(tmp_path)]
+    done = CliRunner().invoke(app, asked)
+    assert done.exit_code == 0, done.output
+    report = json.loads((tmp_path / "palm.json").read_text())
+    assert (report["campaign"], report["campaigns"]) == ("palm", ["may", "block"])
+    assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["modulus_error"])
+    assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
 
 
 def sensors(name: str, d33: Floats, relative: float) -> SensorsOfCampaign:

@@ -103,7 +103,7 @@ def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
 def test_the_stated_uncertainty_is_the_scatter_of_repeats(estimator: Estimator) -> None:
-    """Of all lines below 300 Hz, 12 records with noise in both channels; the formula is of the first order in (1 − γ²)/n."""
+    """Of lines below 300 Hz, in 12 records with noise in both channels; by a formula of first order in (1 − γ²)/n."""
     found, stated = [], []
     for seed in range(930_001, 930_013):
         frf = broadband(*noisy(NOISE, NOISE, seed), RATE, block_samples=1000, estimator=estimator)

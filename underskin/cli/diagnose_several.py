@@ -45,9 +45,6 @@ def of_several(
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
         raise typer.BadParameter(allowed, param_hint="--together")
     console = Console(stderr=True)
-    if together is not None:
-        for file in _without_frfs(files, campaigns):
-            console.print(f"{file}: left out: it has no FRFs", markup=False, highlight=False, soft_wrap=True)
     with Progress(console=console) as progress:
         bar = progress.add_task("diagnosing", total=1.0)
 
@@ -91,26 +88,6 @@ def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Rea
         except UnderskinError as error:
             raise UnderskinError(f"{file}: {error}") from error
     return readings
-
-
-def _without_frfs(files: Sequence[Path], campaigns: Sequence["Campaign"]) -> list[Path]:
-    """The files of curves alone, which several campaigns are not compared by; BadParameter where others are too few."""
-    from underskin.recordings.campaign import FrfRecording
-
-    curves = [
-        file
-        for file, campaign in zip(files, campaigns, strict=True)
-        if not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)
-    ]
-    if curves and len(files) - len(curves) < 2:
-        said = ", ".join(map(str, curves))
-        allowed = (
-            f"compares campaigns by their FRFs, and {said} {'has' if len(curves) == 1 else 'have'} none. Curves tell "
-            "more in one campaign with the FRFs: send the files with `underskin import FILES --together NAME`, then "
-            "run `underskin diagnose --campaign ID`"
-        )
-        raise typer.BadParameter(allowed, param_hint="--together")
-    return curves
 
 
 def _refused(readings: Sequence["Reading"]) -> list[dict[str, str]]:

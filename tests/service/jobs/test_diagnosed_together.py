@@ -86,18 +86,18 @@ def test_one_of_several_that_needs_too_much_memory_fails(tmp_path: Path) -> None
         assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
 
 
-def test_a_block_beside_one_campaign_of_frfs_is_refused_at_once(server: Server) -> None:
-    """Campaigns are compared by FRFs; a block is told to belong into the campaign that has them."""
-    sent_to(server, "palm", 1)
+def test_blocks_alone_are_refused_at_once_and_beside_one_campaign_of_frfs_are_not(server: Server) -> None:
+    """Campaigns are compared by FRFs."""
     travel = [0.05 * step for step in range(20)]
     cylinder = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
     cylinder |= {"displacement_mm": travel, "force_n": [125.0 * one for one in travel]}
     skin = {"id": "palm", "youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
-    sent(server, {"schema": "campaign/1", "name": "block", "skin": skin, "recordings": [cylinder]}, "palm")
+    for name in ("block", "again"):
+        recordings = [{**cylinder, "sample_height_mm": 10.0 + len(name)}]
+        sent(server, {"schema": "campaign/1", "name": name, "skin": skin, "recordings": recordings}, "palm")
     detail = refused(server, "/v1/skins/palm/diagnosis", {}, 409)["detail"]
-    assert "one alone has FRFs in use" in detail
-    assert "send their files together" in detail
-    sent_to(server, "palm", 2)
+    assert "none has FRFs in use" in detail
+    sent_to(server, "palm", 1)
     assert server.http.post("/v1/skins/palm/diagnosis").status_code == 202
 
 

@@ -1,12 +1,14 @@
 """Campaigns of one skin diagnosed together: what acts in all of them, and what is there from a campaign on.
 
-Each is diagnosed as it would be alone, which gives its noise, its findings and the sets of mechanisms that it asks for;
-then one set a campaign is chosen for all together (course.py). What a sensor's d33 did between them is told with the
-mechanisms taken into account (sensors.py).
+Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs. Each of
+those is diagnosed as it would be alone, which gives its noise, its findings and the sets of mechanisms that it asks
+for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did between them is told with
+the mechanisms taken into account (sensors.py).
 """
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
 from typing import Any
 
 from underskin.diagnosis.inference.explanation import Explanation
@@ -18,7 +20,7 @@ from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, chang
 from underskin.diagnosis.several.together_report import together_report
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, FrfRecording, Recording
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -34,8 +36,8 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least with FRFs, others are left out; they are put in the order of their first recordings' times where
-        all have one.
+        Two at least, one of them with FRFs; those are put in the order of their first recordings' times where all have
+        one.
     table
         σ.
     name
@@ -53,12 +55,26 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns with FRFs, skins that are declared otherwise, or recordings that are in two campaigns.
+        Fewer than two campaigns, none with FRFs, skins that are declared otherwise, or recordings that are in two
+        campaigns.
     """
-    with_frf = [campaign for campaign in campaigns if any(isinstance(one, FrfRecording) for one in campaign.recordings)]
-    _check(with_frf)
-    refuse_copies(with_frf)
+    with_frf, of_curves = by_frfs(campaigns)
+    _check(with_frf, of_curves)
+    refuse_copies(campaigns)
     ordered = in_order(with_frf)
+    ordered[0] = with_curves(ordered[0], of_curves)
+    document = _report(ordered, table, name, without, progress)
+    return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
+
+
+def _report(
+    ordered: Sequence[Campaign],
+    table: SigmaTable,
+    name: str,
+    without: Collection[str],
+    progress: Callable[[float], None],
+) -> dict[str, Any]:
+    """Of campaigns with FRFs in their order; of one alone its own."""
     results = []
     for number, campaign in enumerate(ordered):
         results.append(diagnose(campaign, table, without=without))
@@ -68,8 +84,8 @@ def diagnose_together(
     reports = [reported(result) for result in results]
     usable = [number for number, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = next(entry.document for number, entry in enumerate(reports) if number not in usable)
-        return {**lacking, "campaign": name, "campaigns": [campaign.name for campaign in ordered]}
+        lacking = (own.document for number, own in enumerate(reports) if number not in usable)
+        return next(lacking, reports[0].document)
     dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
     return together_report(name, ordered, results, reports, usable, dated, alone, table)
 
@@ -108,35 +124,53 @@ def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
     return values(shared.parameters, shared.mean)
 
 
+def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaign]]:
+    """Those with FRFs, and those of curves alone."""
+    parts: tuple[list[Campaign], list[Campaign]] = ([], [])
+    for campaign in campaigns:
+        parts[not any(isinstance(one, FrfRecording) for one in campaign.recordings)].append(campaign)
+    return parts
+
+
+def with_curves(campaign: Campaign, of_curves: Sequence[Campaign]) -> Campaign:
+    """The campaign with the curves of others of its skin, each called by its own campaign's name."""
+    curves = [replace(entry, id=f"{other.name}: {entry.id}") for other in of_curves for entry in other.recordings]
+    return replace(campaign, recordings=(*campaign.recordings, *curves)) if curves else campaign
+
+
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:
     """Raise InvalidInput where a recording is in two campaigns, number for number: it would count twice."""
     owners: dict[bytes, str] = {}
     for campaign in campaigns:
         for place, recording in enumerate(campaign.recordings):
-            if not isinstance(recording, FrfRecording):
-                continue
             owner = owners.setdefault(_measured(recording), campaign.name)
             if owner != campaign.name:
                 allowed = f"must not hold the same numbers as a recording of {owner}: it would count twice"
-                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.sensor, allowed)
+                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.id, allowed)
 
 
-def _measured(recording: FrfRecording) -> bytes:
-    series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
-    return b"".join(b"-" if one is None else one.tobytes() for one in series)
+def _measured(recording: Recording) -> bytes:
+    if isinstance(recording, FrfRecording):
+        series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
+        return b"".join(b"-" if one is None else one.tobytes() for one in series)
+    return recording.displacement_mm.tobytes() + recording.force_n.tobytes()
 
 
-def _check(campaigns: Sequence[Campaign]) -> None:
-    if len(campaigns) < 2:
-        raise InvalidInput("campaigns", len(campaigns), "must be two at least with recordings of kind frf")
+def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
+    campaigns = [*with_frf, *of_curves]
+    if not with_frf or len(campaigns) < 2:
+        allowed = "must be two at least, one of them with recordings of kind frf"
+        raise InvalidInput("campaigns", len(campaigns), allowed)
     names = [campaign.name for campaign in campaigns]
     for campaign in campaigns:
         if names.count(campaign.name) > 1:
             raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")
     first = campaigns[0].skin
-    for campaign in campaigns[1:]:
+    for number, campaign in enumerate(campaigns):
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio"):
             here, there = getattr(first, field), getattr(campaign.skin, field)
+            if there is None and number >= len(with_frf):
+                continue  # which curves do not need
             if here != there and not (here and there and math.isclose(here, there, rel_tol=1e-9)):
                 allowed = f"must be {here:g}, as {campaigns[0].name} has it: they are to be of one skin"
                 raise InvalidInput(f"{campaign.name}: skin.{field}", there, allowed)

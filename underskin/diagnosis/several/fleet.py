@@ -1,8 +1,8 @@
 """Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
 
-Each skin speaks by its latest campaign that can be used. The set of mechanisms that all have in common is found over
-all skins (common_set.py), and what each says of its E, thickness and d33 (skin.py) is pooled (population.py), so that a
-skin of which little was recorded leans on its sisters.
+Each skin speaks by its latest campaign of FRFs that can be used, with the curves of its campaigns without FRFs. The set
+of mechanisms that all have in common is found over all skins (common_set.py), and what each says of its E, thickness
+and d33 (skin.py) is pooled (population.py), so that a skin of which little was recorded leans on its sisters.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -15,7 +15,7 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.diagnosis.several.bench import benches
-from underskin.diagnosis.several.campaigns import refuse_copies
+from underskin.diagnosis.several.campaigns import by_frfs, refuse_copies, with_curves
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.dates import Dated, date_of, in_order
@@ -24,7 +24,7 @@ from underskin.diagnosis.several.population import Make, Populations, Spread, po
 from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
 from underskin.diagnosis.several.strengths import of_strengths
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 _LEAST_SKINS = 3
@@ -51,10 +51,10 @@ def diagnose_fleet(
     results: dict[str, DiagnosisResult] = {}
     orders: dict[str, str] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
-        with_frf = [one for one in campaigns if any(isinstance(entry, FrfRecording) for entry in one.recordings)]
+        with_frf, of_curves = by_frfs(campaigns)
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
-        results[skin] = _latest(with_frf, table, without)
+        results[skin] = _latest([with_curves(one, of_curves) for one in with_frf], table, without)
         if len(with_frf) > 1:
             orders[skin] = Dated([one.name for one in with_frf], [date_of(one) for one in with_frf]).order_clause()
         progress((number + 1) / (len(skins) + 1))

@@ -92,6 +92,7 @@ def together_report(
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
         "not_identifiable": quoted.not_identifiable({last_name: last}),
         "findings": findings,
+        **_of_kinds(reports),
         "fit": None,
         "power": [],
         "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
@@ -101,6 +102,13 @@ def together_report(
             "each": [{key: own.document[key] for key in ("campaign", "verdict", "probability")} for own in reports],
         },
     }
+
+
+def _of_kinds(reports: Sequence[Reported]) -> dict[str, Any]:
+    """What recordings of each kind tell, and how they contradict each other, of the campaigns that have several."""
+    keys = ("by_kind", "contradictions")
+    told = [own.document for own in reports if "by_kind" in own.document]
+    return {key: [entry for document in told for entry in document[key]] for key in keys} if told else {}
 
 
 def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:

@@ -1,8 +1,8 @@
 """The columns of the CSV template: which field each heading means, and what is no field.
 
 Headings are read in capitals or not. `indenter_diameter_mm` is halved, a magnitude with a phase is a complex value, a
-date and a time of day are `recorded_at`. A column without a heading that only counts its rows, as spreadsheets write it, or is empty, and a column of words that
-names no field, are left out.
+date and a time of day are `recorded_at`. A column without a heading that only counts its rows, as spreadsheets write
+it, or is empty, and a column of words that names no field, are left out.
 """
 
 import cmath
@@ -145,9 +145,7 @@ def _dated(headings: Sequence[str], meanings: Sequence[_Meaning]) -> list[_Meani
     dated = [_DATED.get(heading.strip().lower()) for heading in headings]
     if DATE not in dated:
         return list(meanings)
-    return [
-        (of, 1.0) if meant is None and of is not None else meant for of, meant in zip(dated, meanings, strict=True)
-    ]
+    return [(of, 1.0) if meant is None and of is not None else meant for of, meant in zip(dated, meanings, strict=True)]
 
 
 def in_small_letters(name: str) -> str:

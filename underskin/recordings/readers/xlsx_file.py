@@ -1,7 +1,8 @@
 """Workbooks (.xlsx, .xlsm): each sheet is read as the CSV that it would be saved as.
 
-One sheet may be the campaign of csv_template.py, or what stands above its table, and another the table. Otherwise each sheet with a table of numbers is a block by the sheet's
-name, as csv_file.py reads it; others are left out, with a warning.
+One sheet may be the campaign of csv_template.py, or what stands above its table, and another the table. Otherwise each
+sheet with a table of numbers is a block by the sheet's name, as csv_file.py reads it; others are left out, with a
+warning.
 """
 
 from dataclasses import replace
