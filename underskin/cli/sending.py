@@ -80,7 +80,7 @@ def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:
         return f"no d33: {error}", []
     moduli = [
         f"E of {one['recording']} {significant(one['youngs_modulus_mpa'], 4)} "
-        f"± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa"
+        f"± {significant(one['youngs_modulus_uncertainty_mpa'], 2)} MPa by its noise alone"
         for one in answer["moduli"]
     ]
     array = answer["array"]
