@@ -73,7 +73,7 @@ class Modulus(BaseModel):
     kind: Literal["compression", "indentation"] = Field(description="Its kind.")
     youngs_modulus_mpa: float = Field(description="Young's modulus of the elastomer [MPa].")
     youngs_modulus_uncertainty_mpa: float = Field(
-        description="Its standard uncertainty [MPa] by noise and curvature alone, without friction, size and calibration."
+        description="Its standard uncertainty [MPa] by noise and curvature alone, not friction, size or calibration."
     )
     statement: str = Field(description="Where the curve is straight, or how well Hertz' law fits it.")
 

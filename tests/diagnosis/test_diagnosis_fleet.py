@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.kinds_campaigns import of_block
 from tests.support.skins import HEAVY_TIP, made
 from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.pipeline import diagnose
@@ -136,6 +137,18 @@ def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: Sigma
 
 
 @pytest.mark.slow
+def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(table: SigmaTable) -> None:
+    """E is 9 where 16 is declared, which FRFs of three skins do not tell."""
+    skins = {f"s{number}": [made(f"c{number}", seed=10 + number, modulus=9.0)] for number in range(3)}
+    skins["s0"].append(of_block(9.0))
+    report = diagnose_fleet(skins, table, "palms")
+    assert [entry["name"] for entry in report["mechanisms"]] == ["modulus_error"]
+    assert report["campaigns"] == ["c0", "block", "c1", "c2"]
+    moduli = population(report, "youngs_modulus")
+    assert moduli["mean"] == pytest.approx(9.0, rel=0.1)
+    assert all(skin["low"] < 9.0 < skin["high"] for skin in moduli["skins"])
+
+
 def test_which_campaign_counts_as_the_latest_is_told_where_one_has_no_date(table: SigmaTable) -> None:
     skins = sisters(3)
     undated = made("undated", seed=30)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tests.support.kinds_campaigns import BLOCK, curves
+from tests.support.kinds_campaigns import of_block
 from tests.support.skins import HEAVY_TIP, document, made
 from underskin.cli.app import app
 from underskin.diagnosis.reporting.html_report import page
@@ -17,7 +17,7 @@ from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, changes
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, to_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
@@ -153,13 +153,6 @@ def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:
     assert "agree within the noise" in (out / "both.html").read_text()
     refused = CliRunner().invoke(app, ["diagnose", *files, "--fleet", "f", "--output-dir", str(out)])
     assert refused.exit_code != 0
-
-
-def of_block(modulus: float, name: str = "block") -> Campaign:
-    """A campaign of nothing but a compressed block of the elastomer, which is declared to have 16 MPa."""
-    skin = {"youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
-    recordings = curves("compression", BLOCK, modulus)
-    return parse({"schema": "campaign/1", "name": name, "skin": skin, "recordings": recordings})
 
 
 def test_a_block_measured_apart_tells_the_modulus_of_both_dates(table: SigmaTable) -> None:

@@ -9,7 +9,7 @@ from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.recordings.campaign import parse
+from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14}
@@ -65,6 +65,13 @@ def curves(
     made = experiment({**described, "effects": effects or {}})
     recordings = campaign_of_curves(made, record_curves(made))["recordings"]
     return [{**entry, "id": f"{kind}-{number}"} for number, entry in enumerate(recordings)]
+
+
+def of_block(modulus: float, name: str = "block") -> Campaign:
+    """A campaign of nothing but a compressed block of the elastomer, which is declared to have 16 MPa."""
+    skin = {"youngs_modulus_mpa": 16.0, "poisson_ratio": 0.5}
+    recordings = curves("compression", BLOCK, modulus)
+    return parse({"schema": "campaign/1", "name": name, "skin": skin, "recordings": recordings})
 
 
 def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable) -> dict[str, Any]:
