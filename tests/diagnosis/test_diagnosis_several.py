@@ -105,6 +105,20 @@ def test_one_sensor_that_ages_is_no_physics_of_the_skin(table: SigmaTable) -> No
     assert values["may", "s03"]["low"] < 14.0 < values["may", "s03"]["high"]
 
 
+def test_two_sensors_that_have_each_others_d33_since_a_date_are_exchanged_and_none_aged(table: SigmaTable) -> None:
+    """Presses at the sensors' centres: places tell nothing, the levels alone do."""
+    before = with_gain(with_gain(made("may"), "s02", 1.3), "s05", 0.8)
+    after = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 1.3), "s02", 0.8)
+    report = diagnose_together([before, after], table, "both")
+    assert "ageing" not in scopes(report)
+    assert "sensors s02 and s05 look exchanged since 2017-09-12" in report["statement"]
+    (finding,) = [one for one in report["findings"] if "each have the d33" in one["statement"]]
+    assert finding["code"] == "sensors_exchanged"
+    apart = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 0.8), "s02", 0.8)
+    report = diagnose_together([before, apart], table, "both")
+    assert "exchanged" not in report["statement"]
+
+
 def test_where_nothing_changed_one_d33_serves(table: SigmaTable) -> None:
     report = diagnose_together([made("may"), made("september", SEPTEMBER, seed=8)], table, "both")
     assert (report["verdict"], report["mechanisms"]) == ("no_mismatch", [])

@@ -127,6 +127,7 @@ class Reason(StrEnum):
     ALL_CONJUGATED = "conjugated.campaign"
     RECORDINGS_CONJUGATED = "conjugated.recordings"
     LABELS_EXCHANGED = "sensors_exchanged.labels"
+    LEVELS_EXCHANGED = "sensors_exchanged.levels"
     CABLES_EXCHANGED = "sensors_exchanged.cables"
     LABELS_PERMUTED = "sensors_exchanged.permuted"
     LABELS_CONTRADICT_PLACES = "sensors_exchanged.contradict_places"

@@ -149,6 +149,8 @@ ENGLISH: Mapping[Reason, Words] = {
         f"the phase over frequency of {len(conjugated)} of {recordings} recordings is that of the others with its sign "
         f"turned: they look conjugated, and were conjugated back ({sentences.listed(conjugated, 'recordings')})"
     ),
+    Reason.LEVELS_EXCHANGED: "since {since} sensors {first!r} and {second!r} each have the d33 that the other one had "
+    "before: their labels or cables look exchanged, and each d33 since then belongs to the other sensor",
     Reason.LABELS_EXCHANGED: "sensors {first!r} and {second!r} answer where the other one was pressed: their labels, "
     "or their places, look exchanged; put right",
     Reason.CABLES_EXCHANGED: sensor_sentences.cables_exchanged,

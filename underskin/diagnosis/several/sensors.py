@@ -61,6 +61,7 @@ class Change:
     uncertainty: float  # of its logarithm
     probability: float
     causes: tuple[str, ...] = ()  # of a change of all: mechanisms that would make it
+    exchanged_with: str | None = None  # the sensor that has since then the d33 that this one had, and this one its
 
 
 Values = Mapping[str, Mapping[str, float]]  # of mechanisms' parameters
@@ -189,6 +190,9 @@ def per_sensor(each: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]
 
 def change_in_words(change: Change, dated: Dated) -> str:
     """A clause on d33 of one or of all sensors; of all, that a change of level tells nothing of its cause."""
+    if change.exchanged_with is not None:
+        both = f"sensors {change.sensor} and {change.exchanged_with}"
+        return f"{both} look exchanged since {dated.called(change.since)}: each has the d33 that the other had"
     whose = "of all sensors" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     way = "fell" if change.value < 0 else "rose"
     before, after = (dated.called(number) for number in (change.since - 1, change.since))

@@ -14,6 +14,8 @@ from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several import quoted
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
 from underskin.diagnosis.several.dates import Dated
+from underskin.diagnosis.several.exchanged import changed_once, with_exchanges
+from underskin.diagnosis.several.exchanged import findings as exchanges
 from underskin.diagnosis.several.level import AGEING, causes, unsure_of_changes
 from underskin.diagnosis.several.posteriors import Shared, combined, values
 from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
@@ -60,7 +62,7 @@ def together_report(
         change
         if change.sensor is not None
         else replace(change, causes=causes(candidates[change.since], leader.sets[change.since], change))
-        for change in changes(sensors, [alone[number] for number in usable], unsure)
+        for change in with_exchanges(changes(sensors, [alone[number] for number in usable], unsure), sensors)
     ]
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
@@ -71,6 +73,7 @@ def together_report(
         for campaign, own in zip(campaigns, reports, strict=True)
         for finding in own.document["findings"]
     ]
+    findings = [*(finding.in_report() for finding in exchanges(changed, dated)), *findings]
     return {
         "schema": SCHEMA,
         "campaign": name,
@@ -193,7 +196,7 @@ def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
     entries = []
     for change in changed:
         could = change.causes if change.sensor is None else (AGEING,) if change.value < 0 else ()
-        if not could:
+        if not could or change.exchanged_with is not None:
             continue
         half = SDS_OF_95 * change.uncertainty
         ends = {"value": 100 * change.value, "low": 100 * (change.value - half), "high": 100 * (change.value + half)}
@@ -259,9 +262,10 @@ def _statement(
 ) -> str:
     percent = in_percent(probability)
     names = dated.names
-    said = [change_in_words(change, dated) for change in changed[:_MOST_TOLD]]
-    if len(changed) > _MOST_TOLD:
-        said.append(f"d33 of each sensor has {len(changed) - _MOST_TOLD} further changes")
+    told = list(changed_once(changed))
+    said = [change_in_words(change, dated) for change in told[:_MOST_TOLD]]
+    if len(told) > _MOST_TOLD:
+        said.append(f"d33 of each sensor has {len(told) - _MOST_TOLD} further changes")
     parts = [
         _in_words(entry, names) for entry in mechanisms if entry["name"] in {n for own in leader.sets for n in own}
     ]
