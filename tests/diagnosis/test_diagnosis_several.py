@@ -111,7 +111,7 @@ def test_two_sensors_that_have_each_others_d33_since_a_date_are_exchanged_and_no
     after = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 1.3), "s02", 0.8)
     report = diagnose_together([before, after], table, "both")
     assert "ageing" not in scopes(report)
-    assert "sensors s02 and s05 look exchanged since 2017-09-12" in report["statement"]
+    assert "Sensors s02 and s05 look exchanged since 2017-09-12" in report["statement"]
     (finding,) = [one for one in report["findings"] if "each have the d33" in one["statement"]]
     assert finding["code"] == "sensors_exchanged"
     apart = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 0.8), "s02", 0.8)
