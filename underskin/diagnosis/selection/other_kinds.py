@@ -54,6 +54,10 @@ class Beside:
         """What curves of a kind say under a set of mechanisms."""
         return kind.told(names, self._of_both[kind.kind])
 
+    def told_alone(self, kind: OtherKind) -> OfCurves:
+        """What curves of a kind say under the set that they alone find the most probable."""
+        return self.told(kind, tuple(self._most_probable(kind)[0]))
+
     def asked_for(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
         """Sets by which recordings of both kinds may be explained: what the curves find the most probable and nothing,
         each by itself or with an error of the modulus, and with the sets that explain the other recordings `alone`."""
