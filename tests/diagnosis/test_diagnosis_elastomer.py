@@ -34,6 +34,27 @@ def test_relaxation_that_short_curves_tell_as_a_rate_alone_is_the_skins(table: S
     assert time["low"] < 60.0 < time["high"]
 
 
+@pytest.mark.parametrize(
+    ("fraction", "time_s", "dwells", "preloads", "hold"),
+    [(0.3, 20.0, [5.0, 8.0], [1, 2], 10.0), (0.22, 6.0, [30.0, 60.0], [0.5, 1, 2, 3, 5], 4.0)],
+)
+def test_relaxation_that_curves_tell_better_than_frfs_is_theirs(
+    fraction: float, time_s: float, dwells: list[float], preloads: list[float], hold: float, table: SigmaTable
+) -> None:
+    """A hold tells g and τ, correlated with each other; FRFs of few dwell times, with much scatter, tell neither."""
+    creep: Effects = {"contact_creep": {"fraction": fraction, "time_s": time_s}}
+    design = {**LINES["design"], "dwells_s": dwells, "preloads_n": preloads}
+    described = {**LINES, "design": design, "noise": {**LINES["noise"], "gain": 0.04}, "seed": 4, "effects": creep}
+    measured = campaign_of_lines(record_lines(experiment(described)))
+    held = {**SPHERE, "hold_s": hold, "repeats": 2}
+    document = report(measured, curves("indentation", held, effects=creep), table)
+    assert document["contradictions"] == []
+    assert (document["verdict"], named(document)) == ("explained", ["contact_creep"])
+    told, time = document["mechanisms"][0]["parameters"]
+    assert told["low"] < fraction < told["high"]
+    assert time["low"] < time_s < time["high"]
+
+
 def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wrongly(table: SigmaTable) -> None:
     """E of such curves holds although the declared thickness is 15 % too large."""
     both: Effects = {"layered_contact": {}, "thickness_error": {"factor": 0.87}}

@@ -122,6 +122,19 @@ def test_a_block_of_another_elastomer_contradicts(table: SigmaTable) -> None:
     assert modulus_of(document, "compression")["value"] == pytest.approx(48.0, rel=0.05)
 
 
+def test_kinds_that_contradict_each_tell_the_modulus_by_what_explains_them_alone(table: SigmaTable) -> None:
+    """Deep indentations of another skin: their E counts the base that they feel, which these FRFs do not show."""
+    exact = {"gain": 0.002, "line": 0.002, "coherence": True}
+    described = {**LINES, "noise": exact, "seed": 3, "design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}
+    measured = campaign_of_lines(record_lines(experiment(described)))
+    deep = {**SPHERE, "largest_displacement_mm": 0.8}
+    document = report(measured, curves("indentation", deep, 48.0, effects={"layered_contact": {}}), table)
+    assert len(document["contradictions"]) == 1
+    assert document["verdict"] == "no_mismatch"
+    told = modulus_of(document, "indentation")
+    assert told["low"] < 48.0 < told["high"]
+
+
 def test_indentations_and_a_block_are_one_data_set_too(table: SigmaTable) -> None:
     document = {"schema": "campaign/1", "name": "curves", "skin": {**lines()["skin"], "youngs_modulus_mpa": None}}
     both = [*curves("indentation", SPHERE, 9.0), *curves("compression", BLOCK, 9.0)]

@@ -16,13 +16,13 @@ _MODULUS_ERROR = "modulus_error"
 
 
 def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
-    """E by each kind alone, and from curves the parameters of their mechanisms under the leading set; empty where there
-    is one kind."""
+    """E by each kind alone, and from curves the parameters of their mechanisms under the leading set, or under what the
+    curves alone find where the kinds contradict each other; empty where there is one kind."""
     if joined.beside is None or joined.apart is None:
         return []
     told = []
     for kind in joined.beside.kinds:
-        known = joined.beside.told(kind, leading)
+        known = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
         explanation = known.best
         stated = [_of_elastomer(parameter(explanation, place_of(explanation, "youngs_modulus")), known)]
         for own in own_places(explanation.names, explanation.best.hypothesis.lines).values():
@@ -73,7 +73,7 @@ def moduli_clause(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
 
 def contradictions(joined: Joined) -> list[dict[str, Any]]:
     """That the kinds are not of one material, where this is more probable than that they are."""
-    if joined.beside is None or joined.contradictory <= 0.5:
+    if joined.beside is None or not joined.apart_is_likelier:
         return []
     kinds = [joined.problem.kind, *(kind.kind for kind in joined.beside.kinds)]
     named = " and ".join(_CALLED[kind] for kind in kinds)

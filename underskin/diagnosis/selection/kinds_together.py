@@ -43,6 +43,11 @@ class Joined:
     apart: Search | None = None
     contradictory: float = 0.0
 
+    @property
+    def apart_is_likelier(self) -> bool:
+        """Whether the kinds contradict each other, so that each is explained alone."""
+        return self.contradictory > 0.5
+
     def shows_on_curves(self, name: str, names: Sequence[str]) -> bool:
         """Whether a mechanism of a set shows on the recordings of another kind."""
         beside = self.search.beside
@@ -80,8 +85,9 @@ class Others:
         log_apart = _log_apart(apart, beside) + np.log(_APART)
         log_together = together.log_total + np.log1p(-_APART)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
-        if contradictory > 0.5:
-            return Joined(alone, apart, beside, apart, contradictory)
+        explained_alone = Joined(alone, apart, beside, apart, contradictory)
+        if explained_alone.apart_is_likelier:
+            return explained_alone
         return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
 
 

@@ -54,6 +54,10 @@ class Beside:
         """What curves of a kind say under a set of mechanisms."""
         return kind.told(names, self._of_both[kind.kind])
 
+    def told_alone(self, kind: OtherKind) -> OfCurves:
+        """What curves of a kind say under the set that they alone find the most probable."""
+        return self.told(kind, tuple(self._most_probable(kind)[0]))
+
     def asked_for(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
         """Sets by which recordings of both kinds may be explained: what the curves find the most probable and nothing,
         each by itself or with an error of the modulus, and with the sets that explain the other recordings `alone`."""
@@ -102,15 +106,16 @@ class Beside:
         matrix, offset, priors = _in_model(told, model, lines, self._begun(model.names, lines))
         return _likelihood(told, matrix, offset, priors)
 
-    def _begun(self, names: Sequence[str], lines: Lines) -> dict[Quantity, float]:
-        """Fit coordinates of mechanisms' parameters where the recordings alone have them: under this set, or else under
-        the best one that holds the mechanism."""
-        begun: dict[Quantity, float] = {}
+    def _begun(self, names: Sequence[str], lines: Lines) -> dict[Quantity, tuple[float, float]]:
+        """Fit coordinates of mechanisms' parameters, and their variances, where the recordings alone have them: under
+        this set, or else under the best one that holds the mechanism."""
+        begun: dict[Quantity, tuple[float, float]] = {}
         for entry in sorted(self._alone, key=lambda entry: frozenset(entry.names) != frozenset(names)):
+            variances = dict(zip(entry.best.hypothesis.mean_places, np.diag(entry.best.covariance), strict=True))
             for mechanism, places in own_places(entry.names, lines).items():
                 for place in range(places.start, places.stop):
                     key = (mechanism, entry.model.parameters[place].name)
-                    begun.setdefault(key, float(entry.point.fit[place]))
+                    begun.setdefault(key, (float(entry.point.fit[place]), float(variances.get(place, np.inf))))
         return begun
 
 
@@ -121,10 +126,11 @@ def _acts_on(name: str, lines: Lines) -> bool:
 
 
 def _in_model(
-    told: OfCurves, model: Model, lines: Lines, begun: Mapping[Quantity, float]
+    told: OfCurves, model: Model, lines: Lines, begun: Mapping[Quantity, tuple[float, float]]
 ) -> tuple[Floats, Floats, list[Moments]]:
     """The quantities as matrix · x + offset of the model's fit coordinates, and what is known of each without any
-    recording; a row of zeros where the model has no such quantity. `begun`: about where the fit will be."""
+    recording; a row of zeros where the model has no such quantity. `begun`: fit coordinates by the recordings alone,
+    and their variances."""
     quantities = told.quantities
     places = own_places(model.names, lines)
     names = [entry.name for entry in model.parameters]
@@ -149,23 +155,24 @@ def _in_model(
         found = [index for index in range(own.start, own.stop) if names[index] == key]
         if found:
             entry = model.parameters[found[0]]
-            matrix[row, found[0]], offset[row] = _tangent(told, row, entry, begun.get((mechanism, key), 0.0))
+            matrix[row, found[0]], offset[row] = _tangent(told, row, entry, begun.get((mechanism, key)))
             priors.append(_moments(entry, float(told.mean[row])))
         else:
             priors.append((0.0, 0.0, False, 0.0))
     return matrix, offset, priors
 
 
-def _tangent(told: OfCurves, row: int, entry: Parameter, begun: float) -> tuple[float, float]:
+def _tangent(told: OfCurves, row: int, entry: Parameter, begun: tuple[float, float] | None) -> tuple[float, float]:
     """Slope and offset of a quantity over its fit coordinate.
 
     A fraction that is known as a ratio to a time alone, as of curves that are short beside it, is known along a line
-    that is straight in its logarithm: m ln(x/m) + m in place of x, about `begun`.
+    that is straight in its logarithm: m ln(x/m) + m in place of x. Its tangent is about where the recordings alone have
+    it, if they tell it better than the curves do; else the fit will be about the curves' mean, where both are one.
     """
-    mean = float(told.mean[row])
-    if entry.scale == "log" or not told.is_ratio(row) or min(mean, begun) <= 0:
+    mean, (at, variance) = float(told.mean[row]), begun or (0.0, np.inf)
+    if entry.scale == "log" or not told.is_ratio(row) or min(mean, at) <= 0 or variance > told.covariance[row, row]:
         return 1.0, 0.0
-    return mean / begun, mean * float(np.log(begun / mean))
+    return mean / at, mean * float(np.log(at / mean))
 
 
 def _moments(entry: Parameter, mean: float) -> Moments:

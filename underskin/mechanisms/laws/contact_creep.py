@@ -43,21 +43,20 @@ class ContactCreep(Mechanism):
     name = "contact_creep"
     plain = """The skin slowly gives way under the preload, so the contact grows and the response changes with the time
     for which the preload has been held."""
-    law = """E(t) = E (1 − g (1 − e^(−t/τ))), with t the time held; a³ ∝ 1/E(t), L ∝ 1/E(t). Indentations: E(t) = E (1 −
-    g s (1 − e^(−t/τ₁)) − g (1 − s) (1 − e^(−t/τ₂))), with s the first share, ln τ = s ln τ₁ + (1 − s) ln τ₂ and
-    ln(τ₂/τ₁) the time spread."""
-    assumptions = """quasi-elastic: each instant as an elastic layer of modulus E(t), one Prony pair (two of
-    indentations), the declared E is the instantaneous one. (Exact creep under a constant force uses J(t), whose time is
-    τ/(1 − g): fitted to FRFs of a solid that creeps so, τ comes out 7 % too long at g 0.2, 15 % at 0.4, 24 % at 0.6.) A
-    held oscillation is felt through the contact radius alone, since transmission through a linear layer under force
-    control has no modulus in it, and a contact's stiffness against an oscillation much faster than τ is the
-    instantaneous modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic force,
-    e = E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large, ∫_{t1}^{t} e(t−s)
-    dδ(s) = 0 (Ting's theory, exact for one growing and one shrinking of the contact, with holds between). With adhesion
-    the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous modulus. Where the modulus
-    stiffens too, all of the force is multiplied by its ratio at the contact radius of the moment. A stage gives by the
-    relaxed force. A sphere that presses again after it was drawn back meets a surface that has not recovered: refused.
-    A cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
+    law = """E(t) = E (1 − g (1 − e^(−t/τ))). FRFs: the preload held for t creeps with that solid's compliance J(t) = (1
+    + g/(1 − g) (1 − e^(−(1 − g) t/τ)))/E; a³ ∝ J(t), L ∝ J(t). Indentations: E(t) = E (1 − g s (1 − e^(−t/τ₁)) − g (1 −
+    s) (1 − e^(−t/τ₂))), with s the first share, ln τ = s ln τ₁ + (1 − s) ln τ₂ and ln(τ₂/τ₁) the time spread."""
+    assumptions = """one Prony pair (two of indentations), the declared E is the instantaneous one. FRFs: an elastic
+    layer of modulus 1/J(t) at each instant, exact for a sphere on a half space whose force rises at once and then
+    stays. A held oscillation is felt through the contact radius alone, since transmission through a linear layer
+    under force control has no modulus in it, and a contact's stiffness against an oscillation much faster than τ is
+    the instantaneous modulus' at that radius. Curves: an indentation F(t) = ∫₀^{t1} e(t−s) du(s), with u the elastic
+    force, e = E(t)/E, and t1 = t while the contact grows; while it shrinks t1 is when it last was as large,
+    ∫_{t1}^{t} e(t−s) dδ(s) = 0 (Ting's theory, exact for one growing and one shrinking of the contact, with holds
+    between). With adhesion the edge lets go where it carries the stretch ℓ of JKR's contact at the instantaneous
+    modulus. Where the modulus stiffens too, all of the force is multiplied by its ratio at the contact radius of the
+    moment. A stage gives by the relaxed force. A sphere that presses again after it was drawn back meets a surface
+    that has not recovered: refused. A cylinder: F(t) = ∫₀^t e(t−s) du(s)."""
     source = """Lee & Radok, J. Appl. Mech. 27 (1960) 438; Ting, J. Appl. Mech. 33 (1966) 845; Greenwood & Johnson,
     Phil. Mag. A 43 (1981) 697 (the modulus that a moving edge sees)."""
     stage = Stage.MATERIAL
@@ -120,9 +119,11 @@ class ContactCreep(Mechanism):
         return "dwell_s is the same in all recordings" if len(set(dwell.values())) == 1 else None
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
-        """Relax the modulus."""
-        times = -contacts.dwell * (1.0 / values["relaxation_time"])
-        contacts.relaxed = 1.0 - values["relaxed_fraction"] * (1.0 - exp(times))
+        """Creep under the preload."""
+        fraction = values["relaxed_fraction"]
+        left = 1.0 - fraction
+        times = -contacts.dwell * left / values["relaxation_time"]
+        contacts.relaxed = 1.0 / (1.0 + fraction / left * (1.0 - exp(times)))
         contacts.modulus = contacts.modulus * contacts.relaxed
 
     def on_curve(self, curve: Curve, values: Values) -> None:
