@@ -18,7 +18,8 @@ from scipy.stats import qmc
 
 from underskin.diagnosis.screening.levels import BENDS, SCATTER, SCATTER_PRIOR, Levels
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.models.composed import Model, compose
+from underskin.mechanisms.models.composed import compose
+from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording
@@ -73,6 +74,7 @@ def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Level
             model = compose((name,), conditions, table, "frf")
         except Unsupported:
             continue
+        assert isinstance(model, FrfModel)
         if not any(parameter.moves_covariance for parameter in model.parameters):
             response = np.abs([value[levels.number] for value in model.values(_drawn(model, start))])
             change = np.log(np.maximum(response, _LEAST_RESPONSE * usual) / usual)
@@ -120,7 +122,7 @@ def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
     return Explained(evidence, coefficient)
 
 
-def _drawn(model: Model, start: Floats) -> Array:
+def _drawn(model: FrfModel, start: Floats) -> Array:
     """Points (points, parameters) from the priors of a mechanism's parameters, declared values as they are."""
     own = model.parameters[: len(model.parameters) - len(start)]
     if not own:
