@@ -57,10 +57,10 @@ def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Level
     base = compose((), conditions, table, "frf")
     start = np.array([parameter.start for parameter in base.parameters])
     prediction = base.predict(start)
-    usual = np.abs(prediction.value[levels.number])
+    value = prediction.value[levels.number]
     declared = np.stack(
         [
-            (slope / prediction.value)[levels.number].real * parameter.prior.sd
+            (slope[levels.number] / value).real * parameter.prior.sd
             for parameter, slope in zip(base.parameters, prediction.slopes, strict=True)
             if isinstance(parameter.prior, Normal)
         ],
@@ -76,8 +76,8 @@ def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Level
             continue
         assert isinstance(model, FrfModel)
         if not any(parameter.moves_covariance for parameter in model.parameters):
-            response = np.abs([value[levels.number] for value in model.values(_drawn(model, start))])
-            change = np.log(np.maximum(response, _LEAST_RESPONSE * usual) / usual)
+            relative = np.abs([changed[levels.number] / value for changed in model.values(_drawn(model, start))])
+            change = np.log(np.maximum(relative, _LEAST_RESPONSE))
             laws.append(change.T / len(change) ** 0.5)
     bends = [bend for bend in BENDS if bend > 0]
     return [
