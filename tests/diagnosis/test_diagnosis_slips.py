@@ -221,7 +221,7 @@ def test_a_warm_up_is_told_from_mechanisms_that_move_the_levels(table: SigmaTabl
         if len(made.recordings) < 12:
             continue
         assert Reason.WARM_UP not in named(inspect(made, table))
-        cold = changed(made, partial(_warming, 1 - 0.25 * np.exp(-recording_order(frf_recordings(made)) / 2)))
+        cold = changed(made, partial(_warming, 1 - 0.25 * np.exp(-recording_order(frf_recordings(made)) / 4)))
         seen += 1
         told += Reason.WARM_UP in named(inspect(cold, table))
     assert seen >= 8
