@@ -209,6 +209,32 @@ def test_a_warm_up_is_told_beside_steps_of_its_first_recordings(table: SigmaTabl
     assert told >= 0.85 * seen
 
 
+def test_a_warm_up_is_told_from_mechanisms_that_move_the_levels(table: SigmaTable) -> None:
+    """Of the rig's campaigns of 12 recordings and more that scatter by at most 3 % and hide a mechanism of contact."""
+    moving = {"contact_creep", "misalignment", "layered_contact", "amplitude_nonlinearity", "moving_contact_edge"}
+    told, seen = 0, 0
+    for number in range(70):
+        description = drawn(938002, number, "single")
+        if not moving & set(description["effects"]) or description["noise"]["gain"] > 0.03:
+            continue
+        made, _ = from_dict(recorded_campaign(record(description)))
+        if len(made.recordings) < 12:
+            continue
+        assert Reason.WARM_UP not in named(inspect(made, table))
+        cold = changed(made, partial(_warming, 1 - 0.25 * np.exp(-recording_order(frf_recordings(made)) / 4)))
+        seen += 1
+        told += Reason.WARM_UP in named(inspect(cold, table))
+    assert seen >= 8
+    assert told >= 0.9 * seen
+
+
+def test_a_warm_up_is_told_of_six_recordings(good: Campaign, table: SigmaTable) -> None:
+    six = replace(good, recordings=tuple(shuffled(good).recordings[:6]))
+    order = recording_order(frf_recordings(six))
+    assert named(inspect(six, table)) == []
+    assert named(inspect(changed(six, partial(_warming, 1 - 0.3 * np.exp(-order / 1.5))), table)) == [Reason.WARM_UP]
+
+
 def test_a_warm_up_is_told_of_ten_recordings_and_no_drift_of_a_few_percent(good: Campaign, table: SigmaTable) -> None:
     ten = replace(good, recordings=tuple(shuffled(good).recordings[:10]))
     order = recording_order(frf_recordings(ten))

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
 from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
+from underskin.diagnosis.screening.level_causes import causes_of
 from underskin.diagnosis.screening.levels import levels
 from underskin.diagnosis.screening.sensor_alone import Alone, at_the_others, standing_alone
 from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
@@ -47,7 +48,12 @@ def _plainest(
     own = levels(campaign, entries, table)
     if not _LEAST <= len(own.value) <= _MOST:
         return None
-    slips = (amplitude_step(own), warming(own), exchanged_cables(own), standing_alone(own))
+    slips = (
+        amplitude_step(own),
+        warming(own, causes_of(campaign, entries, own, table)),
+        exchanged_cables(own),
+        standing_alone(own),
+    )
     found = [one for one in slips if one is not None]
     best = max(found, key=lambda one: one.gain, default=None)
     if isinstance(best, Step):

@@ -28,10 +28,10 @@ from underskin.units import Floats, Indices, Mask
 
 _FLAT_HZ = 130.0  # the response is about flat below
 _LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
-_SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
-_SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
+SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
+SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 _SPREAD = (0.01, 0.06, 0.25)  # t
-_BENDS = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
+BENDS = (0.0, 0.1, 0.4, 1.0)  # of all smooth functions together; 0 where nothing moves the levels
 _PLACE_MM = (0.0, 0.1, 0.3)  # p
 _USUAL_SPREAD, _USUAL_PLACE_MM = 0.06, 0.1
 _OVERALL, _SMOOTH, _BEND = 3.0, 0.3, 0.15  # prior standard deviations of the other coefficients
@@ -55,14 +55,13 @@ class Levels:
 
         `further` (recordings, columns) is added to X, scaled by its prior; `sensor` stands for the recordings' sensors.
         """
-        spreads = _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
         added = 0.0 if further is None else further @ further.T
-        best, chosen, best_spread = -np.inf, np.eye(len(value)), spreads[0]
-        for spread, place, bend in product(spreads, self._places, _BENDS):
-            fixed = self._expected(spread, bend, sensor) + np.diag((self.slope * place) ** 2) + added
-            for scatter in _SCATTER:
+        best, chosen, best_spread = -np.inf, np.eye(len(value)), self.spreads[0]
+        for spread, place, bend in product(self.spreads, self.places, BENDS):
+            fixed = self.expected(spread, bend * self.smooth, sensor) + np.diag((self.slope * place) ** 2) + added
+            for scatter in SCATTER:
                 covariance = fixed + np.diag(np.full(len(value), scatter**2))
-                density = _log_density(value, covariance) + float(_SCATTER_PRIOR.log_density(log(scatter)))
+                density = _log_density(value, covariance) + float(SCATTER_PRIOR.log_density(log(scatter)))
                 if density > best:
                     best, chosen, best_spread = density, covariance, spread
         return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
@@ -70,15 +69,21 @@ class Levels:
     def precision(self, scatter: float, bend: float) -> Floats:
         """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
         noise = scatter**2 + (_USUAL_PLACE_MM * self.slope) ** 2
-        return np.asarray(np.linalg.inv(self._expected(_USUAL_SPREAD, bend) + np.diag(noise)))
+        return np.asarray(np.linalg.inv(self.expected(_USUAL_SPREAD, bend * self.smooth) + np.diag(noise)))
 
-    def _expected(self, spread: float, bend: float, sensor: Indices | None = None) -> Floats:
-        """X P Xᵀ."""
+    def expected(self, spread: float, columns: Floats, sensor: Indices | None = None) -> Floats:
+        """X P Xᵀ (recordings, recordings) at a sensors' spread t, of a gain, the sensors' and columns."""
         own = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
-        return np.asarray(_OVERALL**2 + bend**2 * self.smooth @ self.smooth.T + spread**2 * own @ own.T)
+        return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * own @ own.T)
 
     @property
-    def _places(self) -> tuple[float, ...]:
+    def spreads(self) -> tuple[float, ...]:
+        """The values of t that are tried."""
+        return _SPREAD if self.sensor.max() > 0 else _SPREAD[:1]
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """The values of p that are tried."""
         return _PLACE_MM if self.slope.max(initial=0.0) > 0.05 else _PLACE_MM[:1]
 
 

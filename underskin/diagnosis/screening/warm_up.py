@@ -1,8 +1,8 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
-A fall that load cycles could have caused is `ageing` and none of this, nor is what a smooth law along any axis explains
-as well, a first recording that is off alone, or a step after the first recordings, or of one sensor, that explains far
-more.
+It is judged beside all that may move the levels (`level_causes`). A fall that load cycles could have caused is `ageing`
+and none of this, nor is what a smooth law along any axis explains as well, a first recording that is off alone, or a
+step after the first recordings, or of one sensor, that explains far more.
 """
 
 from collections.abc import Sequence
@@ -11,14 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.diagnosis.screening.along_axes import smooth_along
-from underskin.diagnosis.screening.levels import LevelFit, Levels
+from underskin.diagnosis.screening.level_causes import Cause, explained
+from underskin.diagnosis.screening.levels import Levels
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 
-_LEAST = 8
+_LEAST = 6
 _TIMES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)  # τ, in recordings
 _LONGEST = 0.3  # of the recordings: τ at most
 _MOST_SHARE = 0.4  # of the recordings are left out at most
@@ -43,31 +44,30 @@ class WarmUp:
     gain: float
 
 
-def warming(levels: Levels) -> WarmUp | None:
-    """The drift within the first recordings, None where none is plain."""
+def warming(levels: Levels, causes: Sequence[Cause]) -> WarmUp | None:
+    """The drift within the first recordings, None where none is plain beside all that may move the levels."""
     times = [time for time in _TIMES if time <= _LONGEST * len(levels.value)]
     if len(levels.value) < _LEAST or not times:
         return None
-    nothing = levels.fit(levels.value)
-    base = nothing.evidence
-    fits = [levels.fit(levels.value, _AMPLITUDE * _drift(levels, time)[:, None]) for time in times]
-    best = int(np.argmax([fit.evidence for fit in fits]))
-    gain = fits[best].evidence - base
-    if gain < _GAIN:
-        return None
-    drift = _drift(levels, times[best])
-    amplitude, _ = _without(levels, drift).amplitude(levels.value, drift)
-    if abs(amplitude) < _LEAST_AMPLITUDE:
+    drifts = [np.zeros(len(levels.value)), *(_drift(levels, time) for time in times)]
+    found = explained(levels, causes, _AMPLITUDE * np.array(drifts)[:, :, None])
+    best = int(np.argmax(found.evidence[1:]))
+    evidence, amplitude = float(found.evidence[1 + best]), _AMPLITUDE * float(found.coefficient[1 + best, 0])
+    gain = evidence - float(found.evidence[0])
+    if gain < _GAIN or abs(amplitude) < _LEAST_AMPLITUDE:
         return None
     first, *steps = _steps(levels)
-    slower = [_drift(levels, times[-1] * longer)[:, None] for longer in _SLOWER]
+    slower = [_drift(levels, times[-1] * longer) for longer in _SLOWER]
     ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
-    columns = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
-    columns += [(one, _OVER_AGEING) for one in ageing]
-    columns += _sensor_step(levels, nothing)
-    needed = [levels.fit(levels.value, _AMPLITUDE * column).evidence + over for column, over in columns]
-    needed += [levels.fit(levels.value, smooth_along(axis)).evidence + _OVER_SMOOTH for axis in levels.axes]
-    return WarmUp(times[best], amplitude, gain) if base + gain > max(needed) else None
+    rivals = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
+    rivals += [(one, _OVER_AGEING) for one in ageing]
+    rivals += _sensor_step(levels)
+    columns, over = zip(*rivals, strict=True)
+    needed = explained(levels, causes, _AMPLITUDE * np.array(columns)[:, :, None]).evidence + over
+    if levels.axes:
+        along = np.array([smooth_along(axis) for axis in levels.axes])
+        needed = np.append(needed, explained(levels, causes, along).evidence + _OVER_SMOOTH)
+    return WarmUp(times[best], amplitude, gain) if evidence > needed.max() else None
 
 
 def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:
@@ -79,29 +79,23 @@ def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[
     return kept, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
 
 
-def _without(levels: Levels, drift: Floats) -> LevelFit:
-    """The fit of the levels without the drift at about its amplitude."""
-    amplitude, _ = levels.fit(levels.value, _AMPLITUDE * drift[:, None]).amplitude(levels.value, drift)
-    return levels.fit(levels.value - amplitude * drift)
-
-
 def _steps(levels: Levels) -> list[Floats]:
     """1 in the first recordings, as many as a warm-up may last."""
-    return [(levels.order < last).astype(float)[:, None] for last in range(1, _LONGEST_STEP + 1)]
+    return [(levels.order < last).astype(float) for last in range(1, _LONGEST_STEP + 1)]
 
 
-def _sensor_step(levels: Levels, nothing: LevelFit) -> list[tuple[Floats, float]]:
-    """1 in the later recordings of one of several sensors, from some on: of all these steps the best by C⁻¹ of
-    `nothing` moved, and by how much less ln evidence it is worth, since any of them might have been the best."""
+def _sensor_step(levels: Levels) -> list[tuple[Floats, float]]:
+    """1 in the later recordings of one of several sensors, from some on: of all these steps the best by C⁻¹
+    without one, and by how much less ln evidence it is worth, since any of them might have been the best."""
     if levels.sensor.max() == 0:
         return []
     onsets = np.unique(np.quantile(levels.order, _ONSETS_OF_STEP).round())
     late = levels.order >= onsets[:, None]
     steps = np.concatenate([late & (levels.sensor == sensor) for sensor in np.unique(levels.sensor)]).astype(float)
-    weight = nothing.precision @ steps.T
+    weight = levels.fit(levels.value).precision @ steps.T
     size = (steps.T * weight).sum(axis=0)
     gain = (levels.value @ weight) ** 2 / (size + _AMPLITUDE**-2) - np.log1p(_AMPLITUDE**2 * size)
-    return [(steps[int(np.argmax(gain))][:, None], -float(np.log(len(steps))))]
+    return [(steps[int(np.argmax(gain))], -float(np.log(len(steps))))]
 
 
 def _drift(levels: Levels, time: float) -> Floats:
@@ -109,6 +103,5 @@ def _drift(levels: Levels, time: float) -> Floats:
 
 
 def _ageing(cycles: Floats) -> list[Floats]:
-    return [np.exp(-cycles / (share * cycles.max()))[:, None] for share in _ONSETS] + [
-        np.log10(1 + cycles / (share * cycles.max()))[:, None] for share in _ONSETS
-    ]
+    onsets = [share * cycles.max() for share in _ONSETS]
+    return [*(np.exp(-cycles / onset) for onset in onsets), *(np.log10(1 + cycles / onset) for onset in onsets)]
