@@ -59,8 +59,7 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     )
     influence = _influence(table, request, radius / thickness)
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    pressures = _pressures(request, thickness)
-    loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
+    pressures, loads = _pressed(request, thickness)
     total = integration.array_stress(influence, thickness, sensors, loads)
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
@@ -78,6 +77,50 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
         reach_mm=float(to_lab("x_mm", influence.reach * thickness)),
         contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
         findings=findings(request),
+    )
+
+
+@dataclass(frozen=True)
+class BaseStress:
+    """The normal stress on the base under all loads, on a grid.
+
+    Attributes
+    ----------
+    x_mm, y_mm : ndarray, (columns,) and (rows,)
+        Places of the grid in the sensors' frame.
+    sigma_zz_mpa : ndarray, (rows, columns)
+        Tension positive; 0 where no load is within the table's range.
+    contact_radius_mm : ndarray, (contacts,)
+    """
+
+    x_mm: Floats
+    y_mm: Floats
+    sigma_zz_mpa: Floats
+    contact_radius_mm: Floats
+
+
+def base_stress(table: InfluenceTable, request: LoadCase, x_mm: Floats, y_mm: Floats) -> BaseStress:
+    """The normal stress at the points of a grid on the base, of the linear layer; as for point sensors there.
+
+    Parameters and errors as in `answer`; `x_mm` (columns,) and `y_mm` (rows,) are the places of the grid.
+    """
+    thickness = float(checked("thickness_mm", request.thickness_mm, units_checked=True))
+    pressures, loads = _pressed(request, thickness)
+    grid = to_si("x_mm", np.stack(np.meshgrid(x_mm, y_mm), axis=-1).reshape(-1, 2))
+    stress = integration.array_stress(_influence(table, request, 0.0), thickness, grid, loads).stress
+    return BaseStress(
+        x_mm=x_mm,
+        y_mm=y_mm,
+        sigma_zz_mpa=to_lab("sigma_zz_mpa", stress).reshape(y_mm.size, x_mm.size),
+        contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
+    )
+
+
+def _pressed(request: LoadCase, thickness: float) -> tuple[list[SpherePressure], Iterable[Load]]:
+    """The pressures of the contacts, none for a map, and all loads."""
+    pressures = _pressures(request, thickness)
+    return pressures, (
+        [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
     )
 
 
