@@ -83,7 +83,7 @@ def test_a_small_contact_near_the_surface_does_not_feel_the_base() -> None:
 def test_the_stress_is_in_equilibrium_and_compatible(poisson_ratio: float) -> None:
     """Without body forces σ_zz is biharmonic: ∇²∇²σ_zz = 0, with ∇² = ∂²/∂r² + (1/r) ∂/∂r + ∂²/∂z², on the axis."""
     step, middle = 0.04, 0.5
-    offsets = step * np.arange(-3, 4)
+    offsets = np.linspace(-3 * step, 3 * step, 7)
 
     def laplacian(values: Floats) -> Floats:
         """Of even functions of r on a grid (depths, radii) that starts on the axis."""
@@ -95,7 +95,7 @@ def test_the_stress_is_in_equilibrium_and_compatible(poisson_ratio: float) -> No
         second_z = (values[2:] - 2 * values[1:-1] + values[:-2]) / step**2
         return radial[1:-1] + second_z[:, :-1]
 
-    field = layer_stress(poisson_ratio, np.array([1.0]), step * np.arange(8), middle + offsets)[0]
+    field = layer_stress(poisson_ratio, np.array([1.0]), np.linspace(0.0, 7 * step, 8), middle + offsets)[0]
     once = laplacian(field)
     assert abs(laplacian(once)[1, 0]) < 0.02 * np.abs(once).max() / step**2
     assert np.abs(once).max() > 0.1  # not harmonic, so that the test can fail

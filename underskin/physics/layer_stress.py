@@ -46,7 +46,8 @@ def layer_stress(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> F
     """
     k, weight = _nodes(float(a.max() + r.max()))
     free = (1 + np.outer(depth, k)) * np.exp(-np.outer(depth, k))
-    reflected = (depth_transmission(poisson_ratio, k, depth) - free) * (weight * k / 3)
+    added = np.where(depth[:, None] > 0, depth_transmission(poisson_ratio, k, depth) - free, 0.0)
+    reflected = added * (weight * k / 3)
     pressed = hertz_transform(np.outer(a, k))[:, None, :] * reflected
     return half_space_stress(a, r, depth) + pressed @ j0(np.outer(k, r))
 

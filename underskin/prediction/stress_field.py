@@ -98,7 +98,7 @@ def stress_field(
         preload=preload,
         r=h * over_h,
         depth=h * depth,
-        sigma_zz=-scale[:, None, None] * stress,
+        sigma_zz=0.0 - scale[:, None, None] * stress,  # no stress is 0, not −0
         section_error=error,
         limits=tuple(limits or [None] * preload.size),
     )
