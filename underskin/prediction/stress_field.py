@@ -41,6 +41,8 @@ class StressField:
         One row a force; for ν ≠ 0.5 σ is that of the linear layer, without an error.
     preload : ndarray, (forces,)
         F [N].
+    indenter_radius : float
+        R [m].
     r : ndarray, (radii,)
         Distance from the contact's axis [m], the same for all forces.
     depth : ndarray, (depths,)
@@ -55,6 +57,7 @@ class StressField:
 
     contact: Transmission
     preload: Floats
+    indenter_radius: float
     r: Floats
     depth: Floats
     sigma_zz: Floats
@@ -96,6 +99,7 @@ def stress_field(
     return StressField(
         contact=contact,
         preload=preload,
+        indenter_radius=float(indenter.radius),
         r=h * over_h,
         depth=h * depth,
         sigma_zz=0.0 - scale[:, None, None] * stress,  # no stress is 0, not −0
