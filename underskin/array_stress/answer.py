@@ -59,7 +59,8 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     )
     influence = _influence(table, request, radius / thickness)
     sensors = to_si("x_mm", [[sensor.x_mm, sensor.y_mm] for sensor in request.sensors])
-    pressures, loads = _pressed(request, thickness)
+    pressures = _pressures(request, thickness)
+    loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
     total = integration.array_stress(influence, thickness, sensors, loads)
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
@@ -100,27 +101,25 @@ class BaseStress:
 
 
 def base_stress(table: InfluenceTable, request: LoadCase, x_mm: Floats, y_mm: Floats) -> BaseStress:
-    """The normal stress at the points of a grid on the base, of the linear layer; as for point sensors there.
+    """The normal stress on the base under contacts, at the points of a grid: the linear layer's, as for point sensors.
 
     Parameters and errors as in `answer`; `x_mm` (columns,) and `y_mm` (rows,) are the places of the grid.
     """
     thickness = float(checked("thickness_mm", request.thickness_mm, units_checked=True))
-    pressures, loads = _pressed(request, thickness)
-    grid = to_si("x_mm", np.stack(np.meshgrid(x_mm, y_mm), axis=-1).reshape(-1, 2))
-    stress = integration.array_stress(_influence(table, request, 0.0), thickness, grid, loads).stress
+    influence = _influence(table, request, 0.0)
+    pressures = _pressures(request, thickness)
+    _contacts_load(request, pressures, thickness)  # raises where contacts overlap or lie beside the skin
+    x, y = np.meshgrid(to_si("x_mm", x_mm), to_si("x_mm", y_mm))
+    stress = np.zeros(x.shape)
+    for contact, pressure in zip(request.contacts, pressures, strict=True):
+        away = x - to_si("x_mm", contact.x_mm), y - to_si("x_mm", contact.y_mm)
+        forces = (*contact.tangential_force_n, contact.normal_force_n)
+        stress += integration.stress_around(influence, thickness, pressure, forces, away)
     return BaseStress(
         x_mm=x_mm,
         y_mm=y_mm,
-        sigma_zz_mpa=to_lab("sigma_zz_mpa", stress).reshape(y_mm.size, x_mm.size),
+        sigma_zz_mpa=to_lab("sigma_zz_mpa", stress),
         contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
-    )
-
-
-def _pressed(request: LoadCase, thickness: float) -> tuple[list[SpherePressure], Iterable[Load]]:
-    """The pressures of the contacts, none for a map, and all loads."""
-    pressures = _pressures(request, thickness)
-    return pressures, (
-        [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
     )
 
 
