@@ -20,6 +20,7 @@ from service.schemas.campaign_document import campaign_schemas
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, CampaignResult
 from service.schemas.design import DesignAnswer
 from service.schemas.diagnoses import Asked, Diagnosis, DiagnosisEntry, ModelEntry, ModelVersion
+from service.schemas.field import FieldAnswer
 from service.schemas.mechanisms import MechanismEntry
 from service.schemas.skins import History, SkinDetail, SkinEntry
 from underskin.client.documents.document import Document
@@ -29,7 +30,7 @@ _REF = "#/components/schemas/{model}"
 _PACKAGE = "underskin.client.documents"
 _ANSWERS: tuple[type[BaseModel], ...] = (
     *(CampaignResult, CampaignEntry, CampaignDetail, D33, SkinEntry, SkinDetail, History, Imported),
-    *(Asked, DiagnosisEntry, Diagnosis, ModelEntry, ModelVersion, MechanismEntry, DesignAnswer),
+    *(Asked, DiagnosisEntry, Diagnosis, ModelEntry, ModelVersion, MechanismEntry, DesignAnswer, FieldAnswer),
 )
 # Of each module of classes: what its answers are about. Its models are those of the module of this name in the service.
 _MODULES = {
@@ -43,6 +44,7 @@ _MODULES = {
     "report_several": "What a report says of several kinds of recordings, campaigns or skins.",
     "mechanisms": "The catalogue of mechanisms.",
     "design": "A skin before it is built.",
+    "field": "The stress in the layer under a sphere.",
 }
 _PLAIN = {"string": "str", "number": "float", "integer": "int", "boolean": "bool", "null": "None"}
 

@@ -24,6 +24,7 @@ from rig.description import parse as experiment
 from rig.recorded import campaign as campaign_of
 from rig.recorded import record_lines
 from service.routes import campaigns, design, mechanisms, pressed_skin, sigma, stress
+from service.routes import field as stress_field
 
 FILE = Path(__file__).parents[1] / "service" / "routes" / "examples.json"
 _ID = re.compile(r"\b([cdm])-[0-9a-f]{16}\b")
@@ -102,6 +103,7 @@ def _calculations(walked: Walk) -> None:
     walked.columns("frf_columns", "/v1/frf", pressed_skin.FRF_EXAMPLE)
     walked.columns("d33_columns", "/v1/d33", pressed_skin.D33_EXAMPLE)
     walked.columns("stress", "/v1/stress", stress.EXAMPLE)
+    walked.ask("field", "GET", "/v1/field", params=stress_field.EXAMPLE)
     walked.ask("design", "POST", "/v1/design", design.EXAMPLE)
     walked.ask("tables", "GET", "/v1/tables")
     walked.ask("health", "GET", "/health")

@@ -24,6 +24,7 @@ from service.routes import (
     design,
     diagnoses,
     exports,
+    field,
     health,
     mechanisms,
     metrics,
@@ -97,7 +98,20 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
-    for noun in (sigma, pressed_skin, stress, design, tables, campaigns, diagnoses, exports, skins, models, mechanisms):
+    for noun in (
+        sigma,
+        pressed_skin,
+        stress,
+        field,
+        design,
+        tables,
+        campaigns,
+        diagnoses,
+        exports,
+        skins,
+        models,
+        mechanisms,
+    ):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)

@@ -68,6 +68,9 @@ LAB: dict[str, LabField] = {
         LabField("charge_error_pc", "pC", 1e-12),
         LabField("normal_force_n", "N", 1.0, (1e-3, 1e3)),
         LabField("pressure_mpa", "MPa", 1e6, (1e-5, 100.0)),
+        LabField("sigma_zz_mpa", "MPa", 1e6, signed=True),
+        LabField("r_mm", "mm", 1e-3),
+        LabField("depth_mm", "mm", 1e-3),
     )
 }
 

@@ -15,6 +15,7 @@ from underskin.client.documents.campaigns import CampaignDetail, CampaignResult
 from underskin.client.documents.design import DesignAnswer
 from underskin.client.documents.diagnoses import Diagnosis, DiagnosisEntry, ModelEntry
 from underskin.client.documents.document import Document
+from underskin.client.documents.field import FieldAnswer
 from underskin.client.documents.mechanisms import MechanismEntry
 from underskin.client.documents.skins import History, SkinDetail
 
@@ -30,6 +31,7 @@ ANSWERS: dict[str, type[Document]] = {
     "skin_model": ModelEntry,
     "keep_mechanism": MechanismEntry,
     "design": DesignAnswer,
+    "field": FieldAnswer,
 }
 
 

@@ -81,6 +81,48 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     )
 
 
+@dataclass(frozen=True)
+class BaseStress:
+    """The normal stress on the base under all loads, on a grid.
+
+    Attributes
+    ----------
+    x_mm, y_mm : ndarray, (columns,) and (rows,)
+        Places of the grid in the sensors' frame.
+    sigma_zz_mpa : ndarray, (rows, columns)
+        Tension positive; 0 where no load is within the table's range.
+    contact_radius_mm : ndarray, (contacts,)
+    """
+
+    x_mm: Floats
+    y_mm: Floats
+    sigma_zz_mpa: Floats
+    contact_radius_mm: Floats
+
+
+def base_stress(table: InfluenceTable, request: LoadCase, x_mm: Floats, y_mm: Floats) -> BaseStress:
+    """The normal stress on the base under contacts, at the points of a grid: the linear layer's, as for point sensors.
+
+    Parameters and errors as in `answer`; `x_mm` (columns,) and `y_mm` (rows,) are the places of the grid.
+    """
+    thickness = float(checked("thickness_mm", request.thickness_mm, units_checked=True))
+    influence = _influence(table, request, 0.0)
+    pressures = _pressures(request, thickness)
+    _contacts_load(request, pressures, thickness)  # raises where contacts overlap or lie beside the skin
+    x, y = np.meshgrid(to_si("x_mm", x_mm), to_si("x_mm", y_mm))
+    stress = np.zeros(x.shape)
+    for contact, pressure in zip(request.contacts, pressures, strict=True):
+        away = x - to_si("x_mm", contact.x_mm), y - to_si("x_mm", contact.y_mm)
+        forces = (*contact.tangential_force_n, contact.normal_force_n)
+        stress += integration.stress_around(influence, thickness, pressure, forces, away)
+    return BaseStress(
+        x_mm=x_mm,
+        y_mm=y_mm,
+        sigma_zz_mpa=to_lab("sigma_zz_mpa", stress),
+        contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
+    )
+
+
 def _influence(table: InfluenceTable, request: LoadCase, rt_over_h: float) -> Influence:
     """The influence functions of the skin; InvalidInput where the table has none."""
     low, high = table.domain["poisson_ratio"]

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from underskin.physics.contact_pressure import SpherePressure
 from underskin.surrogate.influence_table import Influence, SensorStress
@@ -16,6 +17,7 @@ from underskin.units import Floats
 _FINE_CELL = 0.02  # of the thickness: below, one point a cell; γ turns over lengths of about 0.3
 _MIDDLING_CELL = 0.1  # two points each way; above, three in every _SUBCELL
 _SUBCELL = 0.4
+_RAY = 97  # places along a ray: the stress turns over lengths of 0.3 h and more
 _POINTS_AT_ONCE = 1 << 16  # of a map, which may make more than memory holds
 
 
@@ -124,6 +126,47 @@ def array_stress(influence: Influence, thickness: float, sensors: Floats, loads:
         part = influence.stress(thickness, sensors, load.positions, load.forces)
         stress, error, inside = stress + part.stress, error + part.error, inside | part.inside
     return SensorStress(stress, error, inside)
+
+
+def stress_around(
+    influence: Influence,
+    thickness: float,
+    pressure: SpherePressure,
+    force: Sequence[float],
+    away: tuple[Floats, Floats],
+) -> Floats:
+    """Stress of one contact at many places, from its course along a ray: T(r) + S(r) (F1 cos φ + F2 sin φ).
+
+    Parameters
+    ----------
+    influence : Influence
+        Of the skin, for a point sensor.
+    thickness : float
+        h [m].
+    pressure : SpherePressure
+    force : sequence of float
+        F1, F2, F3 [N], as in `contact_load`.
+    away : pair of ndarray
+        x and y of the places from the contact's centre [m], of one shape.
+
+    Returns
+    -------
+    ndarray
+        σ_zz [Pa], tension positive, of that shape; 0 beyond the table's reach.
+    """
+    r, angle = np.hypot(*away), np.arctan2(away[1], away[0])
+    ray = np.linspace(0.0, influence.reach * thickness, _RAY)
+    points = np.stack([ray, np.zeros(_RAY)], axis=-1)
+    stress = np.zeros(r.shape)
+    for unit, strength in (
+        ((0.0, 0.0, 1.0), np.full(r.shape, force[2])),
+        ((1.0, 0.0, 0.0), force[0] * np.cos(angle) + force[1] * np.sin(angle)),
+    ):
+        if strength.any():
+            load = contact_load(np.zeros(2), unit, pressure, thickness)
+            course = CubicSpline(ray, influence.stress(thickness, points, load.positions, load.forces).stress)
+            stress += strength * np.where(r <= ray[-1], course(r), 0.0)
+    return stress
 
 
 def charge(stress: Floats, d33: float, sensor_radius: float) -> Floats:

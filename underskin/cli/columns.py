@@ -51,6 +51,9 @@ _NAMES = {
     "d33_uncertainty_pc_per_n": ("d33 uncertainty", "d33 ±"),
     "x_mm": ("sensor x", "x"),
     "y_mm": ("sensor y", "y"),
+    "section_error": ("relative error of σzz inside", "error inside"),
+    "r_mm": ("distance from the axis r", "r"),
+    "sigma_zz_mpa": ("σzz on the base", "σzz on the base"),
     "charge_pc": ("charge Q", "Q"),
     "charge_error_pc": ("error of the charge", "Q ±"),
 }

@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
 from typing import Any, Literal, Self, TypeVar
+from urllib.parse import urlencode
 
 import numpy as np
 import orjson
@@ -24,6 +25,7 @@ from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
 from underskin.client.documents.design import DesignAnswer
+from underskin.client.documents.field import FieldAnswer
 from underskin.client.fleets import Fleets
 from underskin.client.http_session import Session
 from underskin.client.mechanisms import Mechanisms
@@ -130,6 +132,10 @@ class Client:
     def design(self, **fields: float) -> DesignAnswer:
         """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
         return DesignAnswer.of(self._request("POST", "/v1/design", fields))
+
+    def field(self, **fields: float) -> FieldAnswer:
+        """The stress in a section through the layer under a sphere; `fields` as `GET /v1/field` takes them."""
+        return FieldAnswer.of(self._request("GET", f"/v1/field?{urlencode(fields)}"))
 
     def tables(self) -> tuple[answers.TableEntry, ...]:
         """The tables of the service: σ and influence, which answers are computed from, and contact, reference data."""

@@ -6,10 +6,12 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
+from underskin.array_stress.answer import BaseStress
 from underskin.figures.array_map import Quantity, array_map
-from underskin.figures.style import styled
+from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats
 
+_TENSION = 0.01  # of the largest compression, below which it is not told apart by colour
 _CHARGE = Quantity("charge", "pC", "zero")
 
 
@@ -70,6 +72,52 @@ def pressure_on_array(
     figure.update_xaxes(title="x [mm]", showgrid=False, zeroline=False)
     figure.update_yaxes(title="y [mm]", showgrid=False, zeroline=False, scaleanchor="x", scaleratio=1)
     return styled(figure, "Pressure on the array")
+
+
+def stress_on_base(
+    stress: BaseStress,
+    contacts_mm: Sequence[tuple[float, float]],
+    sensors_mm: Sequence[tuple[float, float]],
+    sensor_radius_mm: float,
+) -> go.Figure:
+    """σ_zz on the base under all loads, with the outlines of contacts and sensors.
+
+    Where tension reaches a share of the compression, 0 is in the middle of the colours.
+    """
+    low, high = float(stress.sigma_zz_mpa.min()), float(stress.sigma_zz_mpa.max())
+    pulls = high > _TENSION * -low
+    reach = max(-low, high) or 1.0
+    figure = go.Figure(
+        go.Heatmap(
+            x=stress.x_mm,
+            y=stress.y_mm,
+            z=stress.sigma_zz_mpa,
+            zmin=-reach,
+            zmax=reach if pulls else 0.0,
+            zsmooth="best",
+            colorscale="PuOr" if pulls else "Cividis_r",
+            colorbar={"title": {"text": "σ<sub>zz</sub> [MPa]", "side": "right"}},
+            hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>σ<sub>zz</sub> %{z:.4g} MPa<extra></extra>",
+        )
+    )
+    contacts = [_circle(place, radius) for place, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)]
+    for name, outlines, line in (
+        ("contact", contacts, {"color": COLOURS[3], "width": 2, "dash": "dash"}),
+        ("sensor", [_circle(place, sensor_radius_mm) for place in sensors_mm], {"color": COLOURS[1], "width": 2}),
+    ):
+        figure.add_scatter(
+            x=np.concatenate([x for x, _ in outlines]),
+            y=np.concatenate([y for _, y in outlines]),
+            mode="lines",
+            name=name,
+            hoverinfo="skip",
+            line=line,
+        )
+    for update, along in ((figure.update_xaxes, stress.x_mm), (figure.update_yaxes, stress.y_mm)):
+        update(range=[float(along[0]), float(along[-1])], constrain="domain", showgrid=False, zeroline=False)
+    figure.update_xaxes(title="x [mm]")
+    figure.update_yaxes(title="y [mm]", scaleanchor="x", scaleratio=1)
+    return styled(figure, "Stress on the base")
 
 
 def _circle(centre: tuple[float, float], radius: float) -> tuple[Floats, Floats]:

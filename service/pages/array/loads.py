@@ -1,8 +1,10 @@
 """Several loads on an array, and the charge on each of its sensors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
+from urllib.parse import urlencode
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
@@ -16,16 +18,23 @@ from service.pages.array.description import (
     tried,
 )
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, csv_answer
+from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import numbers
 from service.pages.shared.html import page
-from underskin.array_stress.answer import ArrayStress
-from underskin.errors import wrong_type
+from service.usecases.tables import influence_table
+from underskin.array_stress.answer import ArrayStress, BaseStress, base_stress
+from underskin.array_stress.request import read_request
+from underskin.errors import out_of_range, wrong_type
+from underskin.units import Floats
 
 router = APIRouter(prefix="/loads")
 
 _LONGEST = 20_000  # characters of the loads
 _LOADS = "10 8 4 1\n14 16 10 3 0.5 0"
+_MOST_DRAWN = 6  # loads, of which the stress on the base is drawn
+_MOST_OUTLINES = 1000  # sensors
+_POINTS = 61  # of its grid along an axis
+_OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 _ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
 
 Loads = Annotated[str, Query(max_length=_LONGEST)]
@@ -45,7 +54,8 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         error=error,
         answer=answer,
         findings=findings(answer, lines),
-        figures=[] if answer is None else [_figure(request, document, answer)],
+        figures=[] if answer is None else [_figure(request, document, answer), *_on_base(request, document)],
+        spheres=[] if answer is None else _spheres(document, lines),
         same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
     )
 
@@ -59,10 +69,61 @@ def charge_csv(
     return csv_answer("charge", charge_columns(answer))
 
 
+@router.get("/base.csv")
+def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
+    """The normal stress on the base, a row for each point of its grid."""
+    document = _document(described(store, table, request.query_params, skin), loads)
+    stress = _base_stress(request, document)
+    x, y = np.meshgrid(stress.x_mm, stress.y_mm)
+    columns = {"x_mm": x, "y_mm": y, "sigma_zz_mpa": stress.sigma_zz_mpa}
+    return csv_answer("base", {name: column.ravel().tolist() for name, column in columns.items()})
+
+
 def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Drawn:
     places = [(load["x_mm"], load["y_mm"]) for load in document["contacts"]]
-    query = f"?{request.url.query}" if request.url.query else ""
-    return charge_figure(answer, places, f"/loads/charge.csv{query}")
+    return charge_figure(answer, places, f"/loads/charge.csv{_query(request)}")
+
+
+def _query(request: Request) -> str:
+    return f"?{request.url.query}" if request.url.query else ""
+
+
+def _on_base(request: Request, document: Mapping[str, Any]) -> list[Drawn]:
+    """The stress on the base; none where there is more than a page should wait for, or show."""
+    from underskin.figures.loads import stress_on_base
+
+    contacts, sensors = document["contacts"], document["sensors"]
+    if len(contacts) > _MOST_DRAWN or len(sensors) > _MOST_OUTLINES:
+        return []
+    places = [[(one["x_mm"], one["y_mm"]) for one in some] for some in (contacts, sensors)]
+    figure = stress_on_base(_base_stress(request, document), places[0], places[1], document["sensor_radius_mm"])
+    about = "Normal stress where the sensors are, seen from above; compression is negative. Loads add."
+    return [drawn("base", figure, about, f"/loads/base.csv{_query(request)}")]
+
+
+def _base_stress(request: Request, document: Mapping[str, Any]) -> BaseStress:
+    """On a grid over all loads and sensors; raises InvalidInput."""
+    count = len(document["contacts"])
+    if count > _MOST_DRAWN:
+        raise out_of_range("contacts", f"{count} loads", f"must be at most {_MOST_DRAWN} for the stress on the base")
+    places = (*document["contacts"], *document["sensors"])
+    x, y = (_grid([one[name] for one in places], document) for name in ("x_mm", "y_mm"))
+    return base_stress(influence_table(request.app.state.settings.tables), read_request(document), x, y)
+
+
+def _grid(places: Sequence[float], document: Mapping[str, Any]) -> Floats:
+    """Places along an axis, from a margin before the first to one behind the last."""
+    margin = document["sensor_radius_mm"] + document["thickness_mm"]
+    return np.linspace(min(places) - margin, max(places) + margin, _POINTS)
+
+
+def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:
+    """Of each load its line and the page of the stress under its sphere alone."""
+    skin = {name: document[name] for name in _OF_SKIN if name in document}
+    return [
+        (line, urlencode({**skin, "indenter_radius_mm": one["indenter_radius_mm"], "preload_n": one["normal_force_n"]}))
+        for line, one in zip(lines[:_MOST_DRAWN], document["contacts"], strict=False)
+    ]
 
 
 def _document(array: Described, loads: str) -> dict[str, Any]:

@@ -86,6 +86,7 @@ def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
         figures=shown.figures,
         error=shown.error,
         taken=sliders.taken,
+        query=urlencode({**({} if sliders.skin_id is None else {"skin": sliders.skin_id}), **sliders.typed}),
         same=_same(request, sliders.values),
     )
 

@@ -35,6 +35,7 @@ async function answer() {
   outside.hidden = !design.outside;
   outside.querySelector("span").textContent = design.outside ?? "";
   history.replaceState(null, "", `/design?${query}`);
+  document.querySelector("[data-query]").search = query;
   for (const [name, [text, exact, note]] of Object.entries(design.results)) {
     const entry = document.querySelector(`[data-result="${name}"]`);
     const value = entry.querySelector("b");

@@ -31,6 +31,7 @@ OPERATIONS = {
     ("post", "/v1/frf"): "frf_columns",
     ("post", "/v1/d33"): "d33_columns",
     ("post", "/v1/stress"): "stress",
+    ("get", "/v1/field"): "field",
     ("post", "/v1/design"): "design",
     ("get", "/v1/tables"): "tables",
     ("post", "/v1/campaigns"): "post_campaigns",

@@ -15,7 +15,16 @@ from tests.support.document_schemas import closed
 from tests.support.server import running
 
 STORED = orjson.loads(FILE.read_bytes())
-CALCULATIONS = ("sigma_one", "sigma_columns", "frf_columns", "d33_columns", "stress", "design", "umbridge_gradient")
+CALCULATIONS = (
+    "sigma_one",
+    "sigma_columns",
+    "frf_columns",
+    "d33_columns",
+    "stress",
+    "field",
+    "design",
+    "umbridge_gradient",
+)
 # Without an example: arrays and files, and answers that are the document itself or never come.
 WORKBOOKS = (
     "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet",

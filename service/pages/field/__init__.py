@@ -1,0 +1,1 @@
+"""The page of the stress under a sphere."""

@@ -1,0 +1,169 @@
+"""The stress under a sphere: section and top view, and the contact as it grows with the load."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlencode
+
+import numpy as np
+import orjson
+from fastapi import APIRouter, Request, Response
+
+from service.dependencies import Store, Table
+from service.pages.shared import same_request
+from service.pages.shared.figures import Drawn, csv_answer, drawn
+from service.pages.shared.forms import UNLIKELY, in_form_words, number
+from service.pages.shared.html import compress, page
+from service.pages.shared.skin_values import UNITS, shown
+from underskin.errors import UnderskinError
+from underskin.physics.hertz import peak_pressure
+from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
+from underskin.prediction.stress_field import StressField, stress_field
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import checked, to_lab
+
+router = APIRouter(prefix="/field")
+
+FIELDS = (
+    ("thickness_mm", "thickness h", "mm"),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
+    ("poisson_ratio", "Poisson's ratio ν", ""),
+    ("sensor_radius_mm", "sensor radius rT", "mm"),
+    ("indenter_radius_mm", "sphere radius R", "mm"),
+    ("preload_n", "force F", "N"),
+)
+_LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit in FIELDS}
+_SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
+_RADII, _DEPTHS = 73, 21
+FRAMES = 20  # of the load as it grows to the one that is asked for
+
+
+@dataclass(frozen=True)
+class ShownField:
+    """The field of a form, its numbers, and the limit of the table that it exceeds; or what is wrong with it."""
+
+    field: StressField | None
+    given: Mapping[str, float]
+    outside: str | None = None
+    error: str | None = None
+
+
+@router.get("")
+def view(request: Request, store: Store, table: Table, skin: str | None = None) -> Response:
+    """With the numbers of the address, or else those of the skin, or of the paper's prototype."""
+    values, taken = shown(store, table, request.query_params, skin, FIELDS)
+    tried = _tried(request, table, values)
+    ok = tried.field is not None and tried.outside is None
+    query = urlencode({**tried.given, **({UNITS: "yes"} if UNITS in request.query_params else {})})
+    return page(
+        request,
+        "field.html",
+        skin_id=skin,
+        fields=FIELDS,
+        values=values,
+        taken=taken,
+        units_checked=UNITS in request.query_params,
+        error=tried.error,
+        outside=tried.outside,
+        told=_told(tried.field, 0) if ok and tried.field is not None else [],
+        error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
+        linear=tried.given.get("poisson_ratio") != INCOMPRESSIBLE,
+        figures=_figures(tried.field, query) if ok and tried.field is not None else [],
+        frames=f"/field/frames?{query}",
+        count=FRAMES,
+        same=_same(request, tried.given),
+    )
+
+
+@router.get("/frames")
+def at_once(request: Request, table: Table) -> Response:
+    """What changes in the page while the load grows, a frame for each force, as JSON."""
+    from underskin.figures.stress_field import frames
+
+    given = {name: number(name, request.query_params.get(name, "")) for name, *_ in FIELDS}
+    field = _computed(table, given, FRAMES, UNITS in request.query_params)
+    rows = range(FRAMES) if field.contact.inside.all() else ()
+    content = orjson.dumps(
+        [{"told": _told(field, row), "figures": frames(field, row)} for row in rows],
+        option=orjson.OPT_SERIALIZE_NUMPY,
+    )
+    answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
+    compress(request, answer)
+    return answer
+
+
+@router.get("/section.csv")
+def section_csv(request: Request, table: Table) -> Response:
+    """The stress at every depth and distance."""
+    given = {name: number(name, request.query_params.get(name, "")) for name, *_ in FIELDS}
+    field = _computed(table, given, 1, UNITS in request.query_params)
+    r, depth = to_lab("r_mm", field.r), to_lab("depth_mm", field.depth)
+    columns: dict[str, Any] = {"depth_mm": np.repeat(depth, r.size), "r_mm": np.tile(r, depth.size)}
+    columns["sigma_zz_mpa"] = to_lab("sigma_zz_mpa", field.sigma_zz[0]).ravel()
+    return csv_answer("field", {name: column.tolist() for name, column in columns.items()})
+
+
+def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> ShownField:
+    given: dict[str, float] = {}
+    try:
+        given = {name: number(name, values[name]) for name, *_ in FIELDS}
+        field = _computed(table, given, 1, UNITS in request.query_params)
+    except UnderskinError as refused:
+        return ShownField(None, given, error=in_form_words(refused, _LABELS, unlikely=UNLIKELY))
+    return ShownField(field, given, field.limits[0])
+
+
+def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_checked: bool) -> StressField:
+    """At so many forces in equal steps up to the one given; raises InvalidInput."""
+    skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
+    indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
+    force = checked("preload_n", given["preload_n"], units_checked=units_checked)
+    with np.errstate(all="ignore"):  # what overflows is outside the table
+        return stress_field(table, skin, indenter, force * np.arange(1, count + 1) / count, _RADII, _DEPTHS)
+
+
+def _told(field: StressField, row: int) -> list[str]:
+    """What the load makes, in the order in which the page says it."""
+    contact, force = field.contact, float(field.preload[row])
+    a = float(contact.contact_radius[row])
+    mean = float(to_lab("mean_stress_mpa", contact.mean_stress[row]))
+    share = 100 * 1.5 * float(contact.rt_over_h[row]) ** 2 * float(contact.sigma[row])
+    return [
+        f"{force:.3g} N",
+        f"{to_lab('contact_radius_mm', a):.3g} mm",
+        f"{to_lab('pressure_mpa', peak_pressure(force, a)):.3g} MPa",
+        f"{to_lab('sigma_zz_mpa', -field.sigma_zz[row, -1, 0]):.3g} MPa",
+        f"{mean:.3g} MPa",
+        f"{share:.3g} %",
+    ]
+
+
+def _error_percent(field: StressField) -> float:
+    return 100 * float(field.section_error[0])
+
+
+def _figures(field: StressField, query: str) -> Sequence[Drawn]:
+    from underskin.figures.stress_field import stress_on_base, stress_section
+
+    numbers = f"/field/section.csv?{query}"
+    return [
+        drawn(
+            "section",
+            stress_section(field, 0),
+            "Normal stress in the plane through the sphere's axis; compression is negative. The colours go with the "
+            "square root of the stress.",
+            numbers,
+        ),
+        drawn(
+            "base",
+            stress_on_base(field, 0),
+            "The same where the sensors are, seen from above, in colours of its own range; the sensor averages it over "
+            "its disc.",
+            numbers,
+        ),
+    ]
+
+
+def _same(request: Request, given: Mapping[str, float]) -> same_request.SameRequest:
+    call = f"client.field({', '.join(f'{name}={value:.6g}' for name, value in given.items())})"
+    return same_request.get(request, f"/v1/field?{urlencode(given)}", call)

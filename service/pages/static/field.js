@@ -1,0 +1,60 @@
+"use strict";
+// The contact as it grows with the load: its frames come once, when somebody moves the slider or plays them.
+
+const growing = document.getElementById("growing");
+const load = document.getElementById("load");
+const play = document.getElementById("play");
+const PAUSE = 120; // ms between frames
+let frames = null;
+let playing = false;
+
+async function all_frames() {
+  frames ??= fetch(growing.dataset.frames).then((response) => response.json());
+  return frames;
+}
+
+// The figures hold what they show, so that what is saved or printed is the frame in sight.
+async function show(number) {
+  const { told, figures } = (await all_frames())[number - 1];
+  load.value = String(number);
+  load.setAttribute("aria-valuetext", told[0]);
+  document.querySelectorAll("[data-told]").forEach((entry, index) => (entry.textContent = told[index]));
+  for (const [name, traces] of Object.entries(figures)) {
+    const place = document.getElementById(`figure-${name}`);
+    const script = place.querySelector('script[type="application/json"]');
+    const figure = JSON.parse(script.textContent);
+    traces.forEach((changed, index) => Object.assign(figure.data[index], changed));
+    script.textContent = JSON.stringify(figure);
+    const plot = place.querySelector(".plot");
+    if (plot.dataset.drawn) await redraw(plot);
+  }
+}
+
+function set_playing(on) {
+  playing = on;
+  play.textContent = on ? "Pause" : "Play";
+}
+
+async function run() {
+  if (load.value === load.max) load.value = "0";
+  while (playing && load.value !== load.max) {
+    await show(Number(load.value) + 1);
+    await new Promise((done) => setTimeout(done, PAUSE));
+  }
+  set_playing(false);
+}
+
+if (growing) {
+  growing.hidden = false;
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  play.hidden = still;
+  document.getElementById("still").hidden = !still;
+  load.addEventListener("input", () => {
+    set_playing(false);
+    show(Number(load.value));
+  });
+  play.addEventListener("click", () => {
+    set_playing(!playing);
+    if (playing) run();
+  });
+}

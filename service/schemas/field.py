@@ -1,0 +1,66 @@
+"""The stress in the layer under a sphere: what is asked, and what is answered."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from service.schemas.columns import Status
+
+MOST_RADII, MOST_DEPTHS = 301, 101
+
+
+class FieldQuery(BaseModel):
+    """A skin and a sphere above the centre of a sensor, in lab units."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    thickness_mm: float = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
+    youngs_modulus_mpa: float = Field(description="Young's modulus E of the layer [MPa].", examples=[16.0])
+    sensor_radius_mm: float = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
+    indenter_radius_mm: float = Field(description="Radius R of the sphere [mm].", examples=[4.0])
+    preload_n: float = Field(description="Force F of the sphere [N].", examples=[1.0])
+    poisson_ratio: float = Field(
+        default=0.5,
+        description="Poisson's ratio ν of the layer, 0 to 0.5. Below 0.5 the stress is that of the linear layer.",
+    )
+    r_points: int = Field(
+        default=61, ge=2, le=MOST_RADII, description="Number of distances from the axis, evenly spaced from 0."
+    )
+    depth_points: int = Field(
+        default=26, ge=2, le=MOST_DEPTHS, description="Number of depths, evenly spaced from the surface to the base."
+    )
+    units_checked: bool = Field(default=False, description="Accept magnitudes that look like a slip of units.")
+
+
+class FieldAnswer(BaseModel):
+    """The stress σ_zz in the layer: exact on the surface, from the table on the base, approximate between them."""
+
+    model: Literal["layer", "linear_layer"] = Field(
+        description="`layer`: finite strain from the σ table, at ν = 0.5. `linear_layer`: small strain, at other ν."
+    )
+    table_sha256: str = Field(description="SHA-256 of the σ table, whose domain holds for both models.")
+    status: Status = Field(
+        description="`out_of_domain`: outside the table, and null what depends on it; never extrapolated."
+    )
+    limit: str | None = Field(description="Which limit it exceeds, with the highest force; null where it is `ok`.")
+    contact_radius_mm: float | None = Field(description="Radius a of the contact, Hertz [mm]; null if it overflows.")
+    a_over_h: float | None = Field(description="a/h; null if it overflows.")
+    rt_over_h: float | None = Field(description="rT/h; null if it overflows.")
+    load_parameter: float | None = Field(description="L = F/(R²E); null if it overflows.")
+    sigma: float | None = Field(description="σ of the sensor, as GET /v1/sigma has it.")
+    rel_error: float | None = Field(description="Bound on its relative error; null where no table was read.")
+    mean_stress_mpa: float | None = Field(
+        description="Mean of −σ_zz over the sensor's disc, positive in compression [MPa]."
+    )
+    section_error: float | None = Field(
+        description="Bound on the error of σ_zz between surface and base, over the largest stress at the same depth: "
+        "what finite strain changes is tabulated on the base alone, and is added in proportion to the depth."
+    )
+    r_mm: list[float] | None = Field(description="Distances from the axis of the contact [mm].")
+    depth_mm: list[float] | None = Field(
+        description="Depths below the surface, the last is the base [mm]; before deformation, like r_mm."
+    )
+    sigma_zz_mpa: list[list[float]] | None = Field(
+        description="Normal stress σ_zz per undeformed area, a row for each depth and a column for each distance; "
+        "compression is negative [MPa]."
+    )

@@ -1,0 +1,36 @@
+"""The stress in the layer under a sphere."""
+
+from typing import Any
+
+import numpy as np
+
+from service.schemas.field import FieldAnswer, FieldQuery
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.prediction.answers import lab_columns
+from underskin.prediction.stress_field import field_from_lab
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import to_lab
+
+_OPTIONS = {"r_points", "depth_points", "units_checked"}
+
+
+def field_answer(table: SigmaTable, asked: FieldQuery) -> FieldAnswer:
+    """The stress that is asked for; raises InvalidInput."""
+    given = asked.model_dump(exclude=_OPTIONS)
+    field = field_from_lab(table, given, asked.r_points, asked.depth_points, units_checked=asked.units_checked)
+    inside = bool(field.contact.inside[0])
+    return FieldAnswer(
+        model="layer" if asked.poisson_ratio == INCOMPRESSIBLE else "linear_layer",
+        table_sha256=table.sha256,
+        status="ok" if inside else "out_of_domain",
+        limit=field.limits[0],
+        **{name: _number(np.ravel(column)[0]) for name, column in lab_columns(field.contact).items()},
+        section_error=_number(field.section_error[0]),
+        r_mm=to_lab("r_mm", field.r).tolist() if inside else None,
+        depth_mm=to_lab("depth_mm", field.depth).tolist() if inside else None,
+        sigma_zz_mpa=to_lab("sigma_zz_mpa", field.sigma_zz[0]).tolist() if inside else None,
+    )
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if np.isfinite(value) else None

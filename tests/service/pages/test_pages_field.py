@@ -1,0 +1,221 @@
+"""The stress under a sphere as a page: what it shows, the load as a slider and an animation, and the ways there."""
+
+import csv
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.service.pages.conftest import Visit, visit
+from tests.support.store_server import Server
+
+QUERY = "thickness_mm=2.5&youngs_modulus_mpa=16&sensor_radius_mm=1.5&indenter_radius_mm=4&preload_n=3"
+WIDTHS = [1280, 390]
+LOAD = "Load"
+
+
+def told(visitor: Visit) -> list[str]:
+    return visitor.page.locator("[data-told]").all_inner_texts()
+
+
+def trace(visitor: Visit, figure: str, name: str | None = None) -> dict[str, Any]:
+    """A trace of a drawn figure by its name; without one the stress."""
+    found: dict[str, Any] = visitor.page.locator(f"#figure-{figure} .plot").evaluate(
+        "(plot, name) => { const one = plot._fullData.find(t => name ? t.name === name : t.type === 'heatmap');"
+        " return {x: Array.from(one.x), y: Array.from(one.y), z: one.z && Array.from(one.z, row => Array.from(row)),"
+        " zmin: one.zmin, zmax: one.zmax}; }",
+        name,
+    )
+    return found
+
+
+@pytest.fixture
+def calm(browser: Browser, idle: Server) -> Iterator[Visit]:
+    """Somebody whose system asks for less motion."""
+    for visitor in visit(browser, idle):
+        visitor.page.emulate_media(reduced_motion="reduce")
+        yield visitor
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_section_and_base_are_what_the_interface_serves(reader: Visit, width: int) -> None:
+    reader.page.set_viewport_size({"width": width, "height": 844})
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    reader.require_accessible()
+    assert reader.page.evaluate("document.documentElement.scrollWidth") <= width
+    served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY}&r_points=73&depth_points=21").json()
+    section, base = trace(reader, "section"), trace(reader, "base")
+    assert section["y"] == pytest.approx(served["depth_mm"])
+    middle = section["x"].index(0.0)
+    on_axis = [row[0] for row in served["sigma_zz_mpa"]]
+    assert [row[middle] for row in section["z"]] == pytest.approx(on_axis, abs=2e-3)
+    assert [row[:middle] for row in section["z"]] == [row[:middle:-1] for row in section["z"]]  # symmetric
+    assert base["z"][20][20] == pytest.approx(on_axis[-1], abs=2e-4)
+    assert (section["zmin"], base["zmin"]) == pytest.approx((on_axis[0], on_axis[-1]))
+    a = served["contact_radius_mm"]
+    assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(a, rel=1e-3)
+    assert max(trace(reader, "base", "contact")["y"]) == pytest.approx(a, rel=1e-3)
+    assert max(trace(reader, "base", "sensor")["x"]) == pytest.approx(1.5, rel=1e-3)
+    assert trace(reader, "section", "sensor")["y"] == [2.5, 2.5]
+    assert told(reader) == ["3 N", "0.75 mm", "2.55 MPa", "0.339 MPa", "0.221 MPa", "52.2 %"]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_a_millimetre_is_as_long_along_both_axes(reader: Visit, width: int) -> None:
+    reader.page.set_viewport_size({"width": width, "height": 844})
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    for figure in ("section", "base"):
+        lengths = reader.page.locator(f"#figure-{figure} .plot").evaluate(
+            "plot => ['xaxis', 'yaxis'].map(name => { const axis = plot._fullLayout[name];"
+            " return axis._length / Math.abs(axis.range[1] - axis.range[0]); })"
+        )
+        assert lengths[0] == pytest.approx(lengths[1], rel=0.01)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_slider_moves_the_load_by_keys(reader: Visit, width: int) -> None:
+    reader.page.set_viewport_size({"width": width, "height": 844})
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    full = trace(reader, "base")
+    slider = reader.page.get_by_label(LOAD)
+    slider.focus()
+    for _ in range(10):
+        slider.press("ArrowLeft")
+    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '1.5 N'")
+    reader.page.wait_for_function(
+        "document.querySelector('#figure-base .plot')._fullData[0].z[20][20] > -0.2"  # half of the stress or so
+    )
+    half = trace(reader, "base")
+    served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY.replace('_n=3', '_n=1.5')}").json()
+    assert half["z"][20][20] == pytest.approx(served["sigma_zz_mpa"][-1][0], abs=3e-4)
+    assert half["zmin"] == full["zmin"]  # one scale of colours for all loads
+    assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(served["contact_radius_mm"], rel=1e-3)
+    assert slider.get_attribute("aria-valuetext") == "1.5 N"
+    slider.press("End")
+    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '3 N'")
+
+
+def test_what_is_saved_is_the_load_in_sight(reader: Visit) -> None:
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    reader.page.get_by_label(LOAD).press("Home")
+    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '0.15 N'")
+    figure = reader.page.locator("#figure-base")
+    peak = "JSON.parse(document.querySelector('#figure-base script').textContent).data[0].z[20][20]"
+    reader.page.wait_for_function(f"{peak} > -0.03")
+    with reader.page.expect_download():
+        figure.get_by_role("button", name="SVG").click()
+
+
+def test_the_load_plays_to_its_end_and_pauses_by_key(reader: Visit) -> None:
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    button = reader.page.get_by_role("button", name="Play")
+    button.focus()
+    reader.page.keyboard.press("Enter")
+    reader.page.wait_for_function(
+        "(n => n > 2 && n < 18)(Number(document.getElementById('load').value))"
+        " && document.getElementById('play').textContent === 'Pause'"
+    )
+    reader.page.keyboard.press("Enter")
+    reader.page.wait_for_function("document.getElementById('play').textContent === 'Play'")
+    reader.page.wait_for_timeout(400)
+    stopped = reader.page.get_by_label(LOAD).input_value()
+    reader.page.wait_for_timeout(400)
+    assert reader.page.get_by_label(LOAD).input_value() == stopped
+    reader.page.keyboard.press("Enter")
+    reader.page.wait_for_function(
+        "document.getElementById('load').value === '20' && document.getElementById('play').textContent === 'Play'"
+    )
+    assert told(reader)[0] == "3 N"
+
+
+def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
+    calm.go(f"/field?{QUERY}")
+    calm.drawn(2)
+    assert calm.page.get_by_role("button", name="Play").count() == 0
+    assert "asks for less motion" in calm.page.get_by_role("main").inner_text()
+    calm.page.get_by_label(LOAD).press("ArrowLeft")
+    calm.page.wait_for_function("document.querySelector('[data-told]').textContent === '2.85 N'")
+    calm.require_accessible()
+
+
+def test_what_is_exact_and_what_is_not_is_said(reader: Visit) -> None:
+    reader.go(f"/field?{QUERY}")
+    reader.page.get_by_text("What is exact here").click()
+    said = reader.page.get_by_role("main").inner_text()
+    assert "in proportion to the depth" in said
+    assert "up to 17 % of the largest stress at that depth" in said  # 0.6 L^(1/3) + 2.6 L at L = 0.0117
+    reader.go(f"/field?{QUERY}&poisson_ratio=0.45")
+    reader.page.get_by_text("What is exact here").click()
+    assert "finite strain is left out" in reader.page.get_by_role("main").inner_text()
+
+
+def test_errors_stand_in_the_form_and_the_limit_is_named(reader: Visit) -> None:
+    reader.go("/field?thickness_mm=0.0025")
+    assert "thickness h [mm]" in reader.page.get_by_role("alert").inner_text()
+    assert reader.page.get_by_label("thickness h").input_value() == "0.0025"
+    reader.require_accessible()
+    reader.page.get_by_label("thickness h").fill("2,5")
+    reader.page.get_by_label("force F").fill("100")
+    reader.page.get_by_role("button", name="Compute").click()
+    reader.page.get_by_text("L = 0.391 exceeds 0.1: at most 25.6 N").wait_for()
+    assert reader.page.locator(".plot").count() == 0
+    reader.require_accessible()
+
+
+def test_design_leads_there_with_its_sliders(reader: Visit) -> None:
+    reader.go("/design")
+    reader.drawn(2)
+    with reader.page.expect_response("**/design/answer?*"):
+        reader.page.locator("#preload_n").fill("2")
+    reader.page.wait_for_function("document.querySelector('[data-query]').search.includes('preload_n=2&')")
+    reader.page.get_by_role("link", name="The stress under this sphere").click()
+    reader.drawn(2)
+    assert told(reader)[0] == "2 N"
+    assert reader.page.get_by_label("sphere radius R").input_value() == "4"
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_loads_show_the_base_and_lead_to_each_sphere(reader: Visit, width: int) -> None:
+    reader.page.set_viewport_size({"width": width, "height": 844})
+    reader.go("/loads?loads=0 0 4 1%0A%0A12 8 10 2")
+    reader.drawn(2)
+    reader.require_accessible()
+    assert reader.page.evaluate("document.documentElement.scrollWidth") <= width
+    figure = reader.page.locator("#figure-base")
+    shown = trace(reader, "base")
+    numbers = reader.page.request.get(
+        reader.address + str(figure.get_by_role("link", name="CSV").get_attribute("href"))
+    )
+    rows = list(csv.DictReader(numbers.text().splitlines()))
+    lowest = min(rows, key=lambda row: float(row["sigma_zz_mpa"]))
+    assert float(lowest["sigma_zz_mpa"]) == pytest.approx(min(map(min, shown["z"])))
+    assert (float(lowest["x_mm"]), float(lowest["y_mm"])) == pytest.approx((12.0, 8.0), abs=0.6)
+    assert shown["zmax"] == 0  # nothing pulls
+    reader.page.get_by_role("link", name="load in line 3").click()
+    reader.drawn(2)
+    assert told(reader)[0] == "2 N"
+    assert reader.page.get_by_label("sphere radius R").input_value() == "10.0"
+
+
+def test_shear_pulls_and_gets_colours_with_0_in_the_middle(reader: Visit) -> None:
+    reader.go("/loads?loads=8 8 4 1 0.8 0")
+    reader.drawn(2)
+    shown = trace(reader, "base")
+    assert shown["zmax"] == -shown["zmin"] > 0
+    assert max(map(max, shown["z"])) > 0.01 * shown["zmax"]
+
+
+def test_too_many_loads_are_not_drawn_on_the_base(reader: Visit) -> None:
+    loads = "%0A".join(f"{8 * place} 0 4 0.1" for place in range(7))
+    reader.go(f"/loads?loads={loads}")
+    reader.drawn(1)
+    assert reader.page.locator("#figure-base").count() == 0
+    answer = reader.page.request.get(f"{reader.address}/loads/base.csv?loads={loads}")
+    assert answer.status == 422
+    assert "at most 6" in answer.text()

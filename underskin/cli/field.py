@@ -1,0 +1,57 @@
+"""The command `underskin field`."""
+
+from typing import Annotated
+
+import typer
+
+
+def _number(meaning: str) -> object:
+    return typer.Option(help=meaning, metavar="NUMBER", show_default=False)
+
+
+def field(
+    thickness_mm: Annotated[float, _number("Thickness h of the layer over the sensors [mm].")],
+    youngs_modulus_mpa: Annotated[float, _number("Young's modulus E of the layer [MPa].")],
+    sensor_radius_mm: Annotated[float, _number("Radius rT of a sensor, centred under the sphere [mm].")],
+    indenter_radius_mm: Annotated[float, _number("Radius R of the sphere [mm].")],
+    preload_n: Annotated[float, _number("Force F of the sphere [N].")],
+    poisson_ratio: Annotated[
+        float, _number("Poisson's ratio, 0.5 if left out; below, the linear layer at small strain.")
+    ] = 0.5,
+    r_points: Annotated[int, typer.Option(min=2, help="Distances from the axis.", metavar="COUNT")] = 61,
+    depth_points: Annotated[int, typer.Option(min=2, help="Depths, from surface to base.", metavar="COUNT")] = 26,
+    units_checked: Annotated[
+        bool, typer.Option("--units-checked", help="Accept magnitudes that look like a slip of units.")
+    ] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Write the whole section as CSV instead of a table.")] = False,
+) -> None:
+    """The stress σ_zz in the layer under a sphere: as a table on the base, as CSV at every depth."""
+    given = {
+        "thickness_mm": thickness_mm,
+        "youngs_modulus_mpa": youngs_modulus_mpa,
+        "sensor_radius_mm": sensor_radius_mm,
+        "indenter_radius_mm": indenter_radius_mm,
+        "preload_n": preload_n,
+        "poisson_ratio": poisson_ratio,
+    }
+    import numpy as np
+
+    from underskin.cli import columns
+    from underskin.prediction.answers import lab_columns
+    from underskin.prediction.stress_field import field_from_lab
+    from underskin.surrogate.sigma_table import load_table
+    from underskin.units import to_lab
+
+    found = field_from_lab(load_table(), given, r_points, depth_points, units_checked=units_checked)
+    r, depth, stress = (
+        to_lab(name, values)
+        for name, values in (("r_mm", found.r), ("depth_mm", found.depth), ("sigma_zz_mpa", found.sigma_zz[0]))
+    )
+    limits = None if found.limits[0] is None else [found.limits[0]] * (r.size * depth.size if csv else r.size)
+    if csv:
+        section = {"depth_mm": np.repeat(depth, r.size), "r_mm": np.tile(r, depth.size), "sigma_zz_mpa": stress.ravel()}
+        columns.write_csv(section, found.contact.inside, limits, stress.size)
+        return
+    contact = {**{name: np.array(value) for name, value in given.items()}, **lab_columns(found.contact)}
+    base = {"section_error": found.section_error, "r_mm": r, "sigma_zz_mpa": stress[-1]}
+    columns.write_table({**contact, **base}, found.contact.inside, limits, r.size)
