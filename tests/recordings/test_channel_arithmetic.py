@@ -175,7 +175,7 @@ def test_what_cannot_be_parsed_is_refused_with_an_example(formula: str) -> None:
 @pytest.mark.parametrize(
     ("formula", "said"),
     [
-        ("Piezo - Load", "Piezo - Load: Piezo has the unit m, Load has the unit N"),
+        ("Piezo - Load", "Piezo - Load: Piezo has the unit nm, Load has the unit mN"),
         ("Piezo - 5", "5 has no unit"),
         ("2 [N/m] * Piezo + Piezo", "2 [N/m] * Piezo has the unit N"),
         ("Piezo - Raw", "Raw: has no unit in the file: say it in brackets"),

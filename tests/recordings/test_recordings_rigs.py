@@ -51,7 +51,7 @@ def test_the_instruments_own_give_is_subtracted() -> None:
 
 
 def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
-    with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1 or sign: -1"):
+    with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1, -1 or auto"):
         indented("-2.5")
     turned = SMALL.replace("channel: load,", "channel: load, sign: -1,").replace(
         "channel: depth,", "channel: depth, sign: 1,"

@@ -190,7 +190,7 @@ class MappedBlock:
             doubt = ""
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
-            raise self._error("channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how, doubt))
+            raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

@@ -11,7 +11,7 @@ from service.pages.shared.figures import Drawn, drawn
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
 from underskin.recordings.rig_description import RigDescription, Trim
-from underskin.units import LAB, Floats, Mask
+from underskin.units import LAB, Floats, Mask, readable_unit
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -51,9 +51,9 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
     chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_SAMPLES)).round().astype(int))
     figure = make_subplots(len(columns), 1, shared_xaxes=True, vertical_spacing=0.08)
     for row, (field, column) in enumerate(columns.items(), start=1):
-        unit = LAB[field].unit
+        unit, count_of_lab = _readable(field, column)
         for name, (colour, mask) in parts.items():
-            y = np.where(mask, column, np.nan)[chosen]
+            y = np.where(mask, column * count_of_lab, np.nan)[chosen]
             if np.isfinite(y).any():
                 figure.add_scatter(
                     x=sample[chosen],
@@ -74,6 +74,13 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
     return styled(figure, title, _EDGES + _ROW * len(columns))
 
 
+def _readable(field: str, column: Floats) -> tuple[str, float]:
+    """The unit in which a column reads well, and how many make the lab's."""
+    if field == "charge_pc":
+        return LAB[field].unit, 1.0
+    return readable_unit(field, float(np.nanmax(np.abs(column), initial=0.0)))
+
+
 def _parts(columns: Mapping[str, Floats], used: Mask) -> dict[str, tuple[str, Mask]]:
     """By name the colour of each part and where it is, (samples,); a curve is loaded up to its deepest sample."""
     left_out = {_LEFT_OUT: (_GREY, ~used)}
@@ -81,4 +88,6 @@ def _parts(columns: Mapping[str, Floats], used: Mask) -> dict[str, tuple[str, Ma
         return {_USED: (_BLUE, used)} | left_out
     depth = np.where(used & np.isfinite(columns["displacement_mm"]), columns["displacement_mm"], -np.inf)
     number, turn = np.arange(len(depth)), int(np.argmax(depth))
+    if not (used & (number < turn)).any():  # nothing is pressed in yet, such as where a sign is to be turned
+        return {_USED: (_BLUE, used)} | left_out
     return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | left_out

@@ -172,13 +172,14 @@ class _Evaluation:
                 raise self._error(f"{self._said(node)}: is a division by 0")
             return Quantity(np.divide(left.values, right.values), times(left.dimension, right.dimension, -1))
         if left.dimension != right.dimension:
-            both = (
-                f"{self._said(node.left)} has {described(left.dimension)}, "
-                f"{self._said(node.right)} has {described(right.dimension)}"
-            )
+            both = f"{self._with_unit(node.left, left)}, {self._with_unit(node.right, right)}"
             raise self._error(f"{self._said(node)}: {both}; only what has units of one kind can be added or subtracted")
         sign = 1 if isinstance(node.op, ast.Add) else -1
         return Quantity(left.values + sign * right.values, left.dimension)
+
+    def _with_unit(self, node: ast.expr, quantity: Quantity) -> str:
+        unit_words = f"the unit {quantity.label}" if quantity.label else described(quantity.dimension)
+        return f"{self._said(node)} has {unit_words}"
 
     def _said(self, node: ast.expr) -> str:
         return str(shown(_source(self.text, node)))
