@@ -32,6 +32,7 @@ RECORDING = (
     ("preload_n", "preload F", "N", ("frf",)),
     ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
     ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
+    ("stage_stiffness_n_per_mm", "spring's stiffness, if a formula subtracts it", "N/mm", ("indentation",)),
     ("sample_height_mm", "sample's height", "mm", ("compression",)),
     ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
 )

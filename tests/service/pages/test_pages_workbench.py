@@ -52,6 +52,9 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     expect(page.get_by_text(f"channel 'depth' is derived: {DEPTH}")).to_be_visible()
     expect(page.get_by_role("heading", name="Loading and way back")).to_be_visible()
     sized.drawn(2)
+    for figure in ("course", "curves"):
+        names = page.evaluate(f"document.querySelector('#figure-{figure} .plot').data.map(trace => trace.name)")
+        assert set(names) == {"loading", "way back"}
     sized.require_accessible()
     page.get_by_role("button", name="Keep 1 recording").click()
     page.wait_for_url("**/campaigns/*")

@@ -56,7 +56,7 @@ def test_a_raw_curve_gives_the_known_modulus_by_every_way_in(server: Server, tmp
     curve.write_text(text)
     url = str(server.http.base_url)
     server.place.command("import", str(curve), "--rig", str(rig), "--skin", "afm-command", "--url", url)
-    sent = {"rig": rig.read_bytes(), "file": ("afm.txt", text.encode())}
+    sent = {"rig": ("rig.json", rig.read_bytes()), "file": ("afm.txt", text.encode())}
     server.http.post("/v1/campaigns", params={"skin": "afm-http"}, files=sent).raise_for_status()
     documents = []
     for way in ("page", "command", "http"):

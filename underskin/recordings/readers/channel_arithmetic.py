@@ -6,6 +6,7 @@ nothing of it is ever run. Sums need one dimension on both sides; units are conv
 """
 
 import ast
+import dataclasses
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -38,9 +39,9 @@ class Formula:
     hold names."""
 
     text: str
-    tree: ast.expr
     names: tuple[str, ...]
     is_sum: bool
+    tree: ast.expr = dataclasses.field(compare=False)  # of the text
 
 
 Known = Callable[[str, str | None], Quantity]  # of a name and the unit stated behind it
@@ -60,7 +61,7 @@ def parse(field: str, text: str) -> Formula:
         raise InvalidInput(field, text, allowed) from None
     parser = _Parser(field, text)
     parser.check(tree)
-    return Formula(text, tree, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree))
+    return Formula(text, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree), tree)
 
 
 def evaluate(formula: Formula, known: Known, file: str, place: str) -> Quantity:
