@@ -8,11 +8,11 @@ from typing import Any
 import orjson
 from sqlalchemy import Connection
 
-from service.ingest import repeats
+from service.ingest import instruments, repeats
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
 from service.ingest.uploads import Upload
 from service.problems import Refusal
-from service.store import Database, answers, campaigns, skins
+from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
@@ -180,6 +180,8 @@ def _kept(
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=options.corrects, reason=options.reason)
     if checked.by_rig and rig is not None:
         skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
+        for instrument in checked.instruments:
+            instrument_templates.keep(connection, instrument, instruments.template_of(rig), options.sender)
     stored = [{"id": recording.id, "status": "ok", "errors": []} for recording in campaign.recordings]
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": stored + refused}
 

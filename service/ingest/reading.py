@@ -7,6 +7,7 @@ from typing import Any
 
 import orjson
 
+from service.ingest import instruments
 from service.ingest.uploads import Upload
 from service.middleware import long_json
 from service.middleware.unique_keys import require_unique_keys
@@ -42,6 +43,7 @@ class ReadCampaign:
     errors: list[dict[str, Any]] = field(default_factory=list)
     by_rig: bool = False  # whether a rig description was needed to read it
     in_list: bool = False  # whether it came in a JSON list
+    instrument: str | None = None  # that wrote the file, as `instruments.recognised` has it
 
     @property
     def recordings(self) -> int:
@@ -72,6 +74,7 @@ class CheckedCampaign:
     by_rig: bool = False
     in_list: bool = False
     unlisted: int = 0  # errors beyond those listed
+    instruments: tuple[str, ...] = ()  # that wrote its files
 
 
 @dataclass(frozen=True)
@@ -102,12 +105,16 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         campaign = ReadCampaign(upload.label, errors=[error_entry("file", upload.label, allowed, error.code)])
     except InvalidInput as error:
         campaign = ReadCampaign(upload.label, errors=[_invalid(error)])
-    return InspectedFile(kind, contents, [campaign])
+    instrument = None if contents is None else instruments.recognised(kind, contents)
+    return InspectedFile(kind, contents, [replace(campaign, instrument=instrument)])
 
 
 def checked(read: ReadCampaign) -> CheckedCampaign:
     """A campaign with its refused recordings; one of which nothing is left is refused as a whole."""
-    whole = CheckedCampaign(read.file, errors=read.errors, by_rig=read.by_rig, in_list=read.in_list)
+    written_by = () if read.instrument is None else (read.instrument,)
+    whole = CheckedCampaign(
+        read.file, errors=read.errors, by_rig=read.by_rig, in_list=read.in_list, instruments=written_by
+    )
     if read.reading is None:
         return whole
     campaign, notes = read.reading.campaign, read.reading.warnings
@@ -140,7 +147,9 @@ def joined(files_read: Sequence[ReadCampaign], name: str, skin_id: str | None) -
     by_rig = any(one.by_rig for one in files_read)
     together = checked(ReadCampaign(None, join(name, files, skin_id), by_rig=by_rig, in_list=in_list))
     origin = f"joined from {files[0][0]}" + (f" to {files[-1][0]}, {len(files)} files" if len(files) > 1 else "")
-    return replace(together, refused=unread + together.refused, notes=[origin, *together.notes])
+    written_by = tuple(dict.fromkeys(one.instrument for one in files_read if one.instrument is not None))
+    notes = [origin, *together.notes]
+    return replace(together, refused=unread + together.refused, notes=notes, instruments=written_by)
 
 
 def require_few(campaigns: int, recordings: int) -> None:

@@ -56,6 +56,18 @@ rigs = Table(
     Index("rigs_of_skin", "skin_id", "number"),
 )
 
+# Rig descriptions by the instrument whose files they read; rows are added, never altered.
+instrument_templates = Table(
+    "instrument_templates",
+    metadata,
+    Column("number", _Number, primary_key=True),
+    Column("instrument", String, nullable=False),  # digest, by service/ingest/instruments.py
+    Column("document", Text, nullable=False),  # rig/1 as JSON, without what is of a skin or of one recording
+    Column("kept_at", String, nullable=False),
+    Column("kept_from", Text),  # name of the API key
+    Index("templates_of_instrument", "instrument", "number"),
+)
+
 campaigns = Table(
     "campaigns",
     metadata,

@@ -11,7 +11,7 @@ from underskin.recordings.campaign import CompressionRecording, FrfRecording, In
 from underskin.recordings.channel_mapping import ChannelMapping, Property
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.formats import MODULES
-from underskin.recordings.rig_description import CurveChannel
+from underskin.recordings.rig_description import CurveChannel, Trim
 
 TEXT = (ROOT / "docs" / "formats.md").read_text()
 
@@ -36,7 +36,7 @@ def test_the_template_as_documented() -> None:
 
 
 def test_the_rig_description_as_documented() -> None:
-    text, _ = examples("yaml")
+    text, *_ = examples("yaml")
     rig = rig_description.parse(text.encode(), "rig.yaml")
     table = "Preload [mN];1500\n\nt [ms];Load cell;Amplifier\n0;2.25;0\n1;4.5;-0.07\n"
     channels = {**rig.document["channels"], "time_s": {"channel": "t [ms]"}}
@@ -51,7 +51,7 @@ def test_the_rig_description_as_documented() -> None:
 
 
 def test_the_spring_as_documented() -> None:
-    _, text = examples("yaml")
+    _, text, _ = examples("yaml")
     rig = rig_description.parse(text.encode(), "rig.yaml")
     table = "Piezo;Deflection\nnm;nm\n0;0\n-1;100\n-2;300\n"
     reading = read_file(table.encode(), "a.csv", rig)
@@ -60,6 +60,20 @@ def test_the_spring_as_documented() -> None:
     assert recording.displacement_mm == pytest.approx([0, 0.9e-3, 1.7e-3])  # 1 um less 0.1 um
     assert recording.force_n == pytest.approx([0, 0.3e-6, 0.9e-6])  # 100 nm times 3 N/m
     assert len(reading.warnings) == 1
+
+
+def test_derived_channels_as_documented() -> None:
+    *_, text = examples("yaml")
+    rig = rig_description.parse(text.encode(), "rig.yaml")
+    rows = "".join(f"{-sample};{max(0, sample - 1000) / 10}\n" for sample in range(2000))
+    reading = read_file(f"Height;Deflection\nnm;nm\n{rows}".encode(), "a.csv", rig)
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, IndentationRecording)
+    assert len(recording.force_n) == 1961
+    assert recording.displacement_mm[[0, -1]] == pytest.approx([19e-6, (1979 - 97.9) * 1e-6])
+    assert recording.force_n[[0, -1]] == pytest.approx([0, 97.9e-9 * 3])
+    assert recording.stage_stiffness_n_per_mm == 0.003
+    assert len(reading.warnings) == 4
 
 
 def test_a_text_of_an_instrument_as_documented() -> None:
@@ -77,6 +91,6 @@ def test_a_text_of_an_instrument_as_documented() -> None:
 def test_every_format_and_field_is_documented() -> None:
     for name in (
         *MODULES.values(),
-        *(entry.name for model in (ChannelMapping, Property, CurveChannel) for entry in fields(model)),
+        *(entry.name for model in (ChannelMapping, Property, CurveChannel, Trim) for entry in fields(model)),
     ):
         assert name in TEXT, name

@@ -51,7 +51,7 @@ def test_the_instruments_own_give_is_subtracted() -> None:
 
 
 def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
-    with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1 or sign: -1"):
+    with pytest.raises(FileError, match=r"a\.csv: channels: force falls .* say sign: 1, -1 or auto"):
         indented("-2.5")
     turned = SMALL.replace("channel: load,", "channel: load, sign: -1,").replace(
         "channel: depth,", "channel: depth, sign: 1,"
@@ -68,7 +68,7 @@ def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
         ("recording: {indenter_radius_mm", "recording: {preload_n", r"recording\.preload_n = 2\.5: must be one of"),
         ("force_n:", "charge_pc:", r"channels\.charge_pc .*must be one of"),
         ("channel: load,", "", r"channels\.force_n\.channel = None: required"),
-        ("channel: load,", "channel: load, sign: 2,", r"channels\.force_n\.sign = 2: must be 1 or -1"),
+        ("channel: load,", "channel: load, sign: 2,", r"channels\.force_n\.sign = 2: must be 1, -1 or auto"),
         ("channel: load,", "channel: load, offset: 2,", r"channels\.force_n\.offset = 2: unknown field"),
         ("sensitivity: 1e-2,", "", r"channels\.force_n\.sensitivity = None: needs a sensitivity_unit"),
         ("unit: um", "labelled: um", r"channels\.displacement_mm\.unit = None: required where labelled"),

@@ -27,9 +27,14 @@ _LOWEST = 0.15  # of the range of force on the way in, above its least: a sphere
 def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
     """Those of `force_n` and `displacement_mm` that fall while the curve is pressed."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
+    return falling(force, travel, sphere=isinstance(recording, IndentationRecording))
+
+
+def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:
+    """The same of a sphere's or a block's force and travel, (samples,) in any unit."""
     if len(force) != len(travel) or len(force) < _LEAST:
         return ()
-    if isinstance(recording, IndentationRecording):
+    if sphere:
         return _of_sphere(force, travel)
     top = int(np.argmax(np.abs(force - force[0])))
     return tuple(name for name, column in ((_FORCE, force), (_TRAVEL, travel)) if column[top] < column[0])

@@ -6,14 +6,16 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
-from underskin.recordings.channel_mapping import ChannelMapping, SignalMapping
+from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, SignalMapping
 from underskin.recordings.channels import Block, Channel, Values
+from underskin.recordings.curve_signs import falling
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, RigDescription
 from underskin.recordings.shown_values import shown
 from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats
 
+_PERCENT = 100.0
 _SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
 
 
@@ -39,6 +41,7 @@ class MappedBlock:
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise self._error("", only)
         columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
+        columns = {field: self._tared(field, column) for field, column in columns.items()}
         columns = self._without_instrument(columns)
         self._say_ranges(columns)
         self._require_known_sign(columns)
@@ -88,9 +91,34 @@ class MappedBlock:
         label = self._true_unit(channel, mapping, place)
         scale = self._scale(target, label, mapping, place)
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
-        turned = ", turned round" if mapping.sign == -1 else ""
+        sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
+        turned = ", turned round" if sign == -1 else ""
         with np.errstate(all="ignore"):
-            return channel.values * (mapping.sign or 1) * scale, f"{channel.name!r} in {label}{through}{turned}"
+            return channel.values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+
+    def _automatic_sign(self, mapping: SignalMapping) -> int:
+        """-1 where a channel falls as the curve is pressed: told from the channels as they came, so that a travel less
+        a deflection has both right."""
+        travel = self.block.channel(self.rig.channels["displacement_mm"].channel)
+        is_travel = mapping is self.rig.channels["displacement_mm"]
+        force = self.block.channel((self.rig.channels["force_n"] if is_travel else mapping).channel)
+        assert travel is not None
+        assert force is not None
+        falls = falling(force.values.real, travel.values.real, sphere=self.rig.kind == "indentation")
+        if ("displacement_mm" if is_travel else "force_n") not in falls:
+            return 1
+        self.warnings.append(f"channel {mapping.channel!r} falls as it is pressed, and was turned round")
+        return -1
+
+    def _tared(self, field: str, column: Floats) -> Floats:
+        """A column less its mean over the part of the curve that the rig description says."""
+        percent = self.rig.channels[field].tare_percent if field in self.rig.channels else None
+        if percent is None:
+            return column
+        zero = float(column[: max(1, round(percent / _PERCENT * len(column)))].mean())
+        self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over the first {percent:g} %"
+        self.warnings.append(f"{field} is 0 on average over the first {percent:g} % of each curve: it was tared so")
+        return column - zero
 
     def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:
         """The rig's unit, else the file's label.
@@ -162,7 +190,7 @@ class MappedBlock:
             doubt = ""
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
-            raise self._error("channels", Requirement(f"{reason}: say sign: 1 or sign: -1 for ", *how, doubt))
+            raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

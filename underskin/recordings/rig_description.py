@@ -11,20 +11,24 @@
 `skin` and `recording` hold campaign fields that are the same for all files; `{property: ...}` takes one from what the
 file, or the block, says about itself. `channels` says for each campaign field which channel holds it, `curves` how
 several curves in one file are told apart, `estimator` how FRFs are estimated from time series (H1, H2 or Hv).
+`derived` makes channels of others by formulas (`depth: Piezo - Deflection`), `trim` says which samples of each curve
+are used.
 """
 
+import dataclasses
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any
 
-from underskin.errors import FileError, Mention, Requirement, conflicting, not_one_of, required, too_few
+from underskin.errors import FileError, Mention, Requirement, conflicting, not_one_of, out_of_range, required, too_few
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
-from underskin.recordings.channel_mapping import ChannelMapping, Property, SignalMapping
+from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, Property, SignalMapping
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
-from underskin.recordings.readers import json_file
+from underskin.recordings.readers import channel_arithmetic, json_file
+from underskin.recordings.readers.channel_arithmetic import Formula
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.shown_values import named, shown
 from underskin.recordings.validation import mapping
@@ -33,7 +37,13 @@ SCHEMA = "rig/1"
 LARGEST_BYTES = 64_000
 _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
+_TARED = ("force_n", "charge_pc", "displacement_mm")
+_OF_CURVES = ("displacement_mm", "force_n")
 WHOLE_CURVES = ("file", "groups")  # what a curve may be, but for what a channel tells apart
+_FIELDS = (
+    *("schema", "name", "kind", "skin", "recording", "derived", "channels", "curves", "trim", "estimator"),
+    "units_checked",
+)
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
 
 
@@ -46,10 +56,33 @@ class CurveChannel:
     segments: field.Name | None = None
 
 
+def _sample(name: str, value: Any, units_checked: bool) -> int:
+    number = field.count(name, value, units_checked)
+    if number < 1:
+        raise out_of_range(name, number, "must be 1 or greater: samples are counted from 1")
+    return number
+
+
+@dataclass(frozen=True)
+class Trim:
+    """The samples of each curve that are used, from the first to the last, both counted from 1 and used too."""
+
+    first_sample: Annotated[int, _sample] | None = None
+    last_sample: Annotated[int, _sample] | None = None
+
+    @property
+    def words(self) -> str:
+        """`samples 3 to 80`, `samples from 3 on`."""
+        if self.last_sample is None:
+            return f"samples from {self.first_sample or 1} on"
+        return f"samples {self.first_sample or 1} to {self.last_sample}"
+
+
 @dataclass(frozen=True)
 class RigDescription:
     """A rig: the kind of its recordings, fields common to them, which channel is what, and what a curve is in a file:
-    `"file"`, `"groups"`, the channel that tells curves apart, or None (each part is one). `document` is as given."""
+    `"file"`, `"groups"`, the channel that tells curves apart, or None (each part is one). `derived` holds formulas by
+    the names of the channels that they make, in their order. `document` is as given."""
 
     kind: str
     skin: Mapping[str, Any]
@@ -59,6 +92,8 @@ class RigDescription:
     document: Mapping[str, Any]
     curves: str | CurveChannel | None = None
     estimator: Estimator | None = None
+    derived: Mapping[str, Formula] = dataclasses.field(default_factory=dict)
+    trim: Trim | None = None
 
 
 def parse(data: bytes, file: str) -> RigDescription:
@@ -79,15 +114,17 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 def from_dict(document: Any) -> RigDescription:
     """The rig description of a document; raises InvalidInput that names the field."""
-    fields_known = ("schema", "name", "kind", "skin", "recording", "channels", "curves", "estimator", "units_checked")
-    document = field.of_schema("rig description", document, SCHEMA, fields_known)
+    document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
     kind = document.get("kind", "frf")
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
     field.name("name", document.get("name", SCHEMA), False)
     known = {entry.name for entry in fields(KINDS[kind])} - {"kind", "estimator"}
     recording = mapping("recording", document.get("recording", {}))
+    derived = _derived(document.get("derived"))
     channels = _channels(kind, document.get("channels"))
+    for name, entry in channels.items():
+        _require_sign_to_be_told(name, entry, channels, derived)
     return RigDescription(
         kind=kind,
         skin=_known("skin", mapping("skin", document.get("skin")), {entry.name for entry in fields(SkinDescription)}),
@@ -100,6 +137,8 @@ def from_dict(document: Any) -> RigDescription:
         document=document,
         curves=_curves(document.get("curves")),
         estimator=_estimator(document.get("estimator"), channels),
+        derived=derived,
+        trim=_trim(document.get("trim")),
     )
 
 
@@ -118,6 +157,40 @@ def _curves(document: Any) -> str | CurveChannel | None:
     if (curves.channel is None) == (curves.segments is None):
         raise conflicting("curves", shown(list(document)), "must name either a channel or segments")
     return curves
+
+
+def _derived(document: Any) -> dict[str, Formula]:
+    formulas = {}
+    for name, text in mapping("derived", {} if document is None else document).items():
+        place = f"derived.{named(name)}"
+        field.name(place, name, False)
+        formulas[name] = channel_arithmetic.parse(place, field.name(place, text, False))
+    return formulas
+
+
+def _trim(document: Any) -> Trim | None:
+    if document is None:
+        return None
+    trim = field.build(Trim, "trim", document, False)
+    if trim.first_sample and trim.last_sample and trim.last_sample <= trim.first_sample:
+        raise conflicting("trim.last_sample", trim.last_sample, f"must be above first_sample, {trim.first_sample}")
+    return trim
+
+
+def _require_sign_to_be_told(
+    name: str, entry: ChannelMapping, channels: Mapping[str, ChannelMapping], derived: Mapping[str, Formula]
+) -> None:
+    """Refuses an automatic sign where curves cannot tell it, or where turning the whole would be wrong."""
+    if AUTOMATIC not in [signal.sign for signal in entry.signals]:
+        return
+    place = f"channels.{name}.sign"
+    if name not in _OF_CURVES or not all(one in channels for one in _OF_CURVES):
+        both = Requirement(Mention(_OF_CURVES[0]), " and ", Mention(_OF_CURVES[1]))
+        raise conflicting(place, AUTOMATIC, Requirement("is told from curves, which need ", both))
+    formula = derived.get(entry.channel)
+    if name == "displacement_mm" and formula is not None and formula.is_sum:
+        turned = f"cannot be told of {formula.text}, whose terms have signs of their own: say them in the formula"
+        raise conflicting(place, AUTOMATIC, turned)
 
 
 def _estimator(value: Any, channels: Mapping[str, ChannelMapping]) -> Estimator | None:
@@ -152,6 +225,11 @@ def _require_whole(place: str, signal: SignalMapping) -> None:
 def _require_of_its_field(name: str, entry: ChannelMapping, channels: Mapping[str, ChannelMapping]) -> None:
     """Refuses on one field what is for another."""
     stiffness, spring = entry.stiffness_n_per_mm, entry.spring_constant_n_per_m
+    if entry.tare_percent is not None and name not in _TARED:
+        known = Requirement(
+            "is for ", Mention("force_n"), ", ", Mention("charge_pc"), " and ", Mention("displacement_mm")
+        )
+        raise conflicting(f"channels.{name}.tare_percent", entry.tare_percent, known)
     if stiffness is not None and (name != "displacement_mm" or "force_n" not in channels):
         raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
     if entry.deflection is not None and name != "displacement_mm":

@@ -1,7 +1,7 @@
 """From an instrument's channels to a campaign, by a rig description."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import Any
 
@@ -10,7 +10,8 @@ from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Contents
 from underskin.recordings.curve_parts import curve_parts, doubts
 from underskin.recordings.mapped_block import MappedBlock
-from underskin.recordings.rig_description import BLOCK_NAME, CurveChannel, RigDescription
+from underskin.recordings.readers import derived_channels
+from underskin.recordings.rig_description import BLOCK_NAME, CurveChannel, RigDescription, Trim
 from underskin.recordings.shown_values import LONGEST_NAME
 from underskin.recordings.stated_values import common_value
 
@@ -30,6 +31,7 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
 
     Raises FileError that names the channel or property that is missing or whose unit does not fit.
     """
+    contents = derived_channels.with_derived(contents, rig.derived, lambda one: _stated(contents, one, one.name), file)
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]
     if len(blocks) < len(contents.blocks):
@@ -37,7 +39,9 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     stem = _printable(PurePath(file).stem)
     recordings = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
-    parts = curve_parts(blocks, rig.curves, file)
+    parts = [(_trimmed(block, rig.trim, file), of) for block, of in curve_parts(blocks, rig.curves, file)]
+    if rig.trim is not None:
+        warnings.append(f"of each curve, {rig.trim.words} are used")
     for number, (block, of) in enumerate(parts, start=1):
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, of)
@@ -64,6 +68,18 @@ def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[B
     raise FileError(
         file, "", f"no part holds all of the rig's channels: {missing} is missing; it has {contents.described()}"
     )
+
+
+def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:
+    """The samples that are used; those that a short curve lacks are not missed at its end."""
+    if trim is None:
+        return block
+    start = (trim.first_sample or 1) - 1
+    channels = tuple(replace(channel, values=channel.values[start : trim.last_sample]) for channel in block.channels)
+    longest = max((len(channel.values) for channel in block.channels), default=0)
+    if longest <= start:
+        raise FileError(file, "trim.first_sample", f"is {start + 1}; {block.name or 'the curve'} has {longest} samples")
+    return replace(block, channels=channels, group_starts=())
 
 
 def _channel_names(rig: RigDescription) -> Sequence[str]:

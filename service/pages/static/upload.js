@@ -64,3 +64,19 @@ if (kind) {
   kind.addEventListener("change", fit);
   fit();
 }
+
+// Dragging across the figure of the samples fills in which ones are used.
+addEventListener("drawn", ({ target: plot }) => {
+  if (plot.closest("figure")?.id !== "figure-course") return;
+  plot.on("plotly_selected", (event) => {
+    const range = event?.range && Object.entries(event.range).find(([axis]) => axis.startsWith("x"))?.[1];
+    if (!range) return;
+    const [first, last] = [...range].sort((one, other) => one - other);
+    const fields = document.querySelectorAll("[data-trim]");
+    fields[0].value = Math.max(1, Math.ceil(first));
+    fields[1].value = Math.max(2, Math.floor(last));
+    document.getElementById("mapping").open = true;
+    document.querySelector("[data-brushed]").textContent =
+      `Samples ${fields[0].value} to ${fields[1].value} are filled in below: read it with these settings.`;
+  });
+});

@@ -57,6 +57,7 @@ class FileSummary:
     skin: str | None
     known: Sequence[str] = ()  # what to know before it is kept
     day: str | None = None  # of the first recording that has a time
+    instrument: str | None = None  # that wrote it, as `instruments.recognised` has it
     parts: int = 0
     sample_rate_hz: float | None = None
     channels: Sequence[ChannelSummary] = ()
@@ -70,6 +71,7 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
     arrived = [checked(campaign) for campaign in look.campaigns]
     campaigns = [one.campaign for one in arrived if one.campaign is not None]
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
+    written_by = [one.instrument for one in look.campaigns if one.instrument is not None]
     skins = {campaign.skin.id for campaign in campaigns if campaign.skin.id is not None}
     contents = look.contents
     about: dict[str, Any] = {} if contents is None else _about(contents)
@@ -85,9 +87,17 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         campaigns=[campaign.name for campaign in campaigns],
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
+        instrument=next(iter(written_by), None),
         day=min((str(one.recorded_at)[:10] for one in recordings if one.recorded_at is not None), default=None),
         **about,
     )
+
+
+def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
+    """The recordings of a page of the list, from the one of that number on."""
+    campaigns = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]
+    recordings = [recording for campaign in campaigns for recording in campaign.recordings]
+    return [_recording(recording) for recording in recordings[first : first + MOST_LISTED]]
 
 
 def _about(contents: Contents) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from service.ingest.reading import InspectedFile
 from service.pages.shared.forms import UNLIKELY, number_or_text, worded
-from service.pages.upload import spring_mapping
+from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
@@ -32,6 +32,7 @@ RECORDING = (
     ("preload_n", "preload F", "N", ("frf",)),
     ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
     ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
+    ("stage_stiffness_n_per_mm", "spring's stiffness, if a formula subtracts it", "N/mm", ("indentation",)),
     ("sample_height_mm", "sample's height", "mm", ("compression",)),
     ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
 )
@@ -55,6 +56,7 @@ _WORDS = {
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
     "sensors": "layout",
     _RATE: "sample rate [Hz]",
+    **workbench.WORDS,
 }
 _TEXTS = ("sensor",)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
@@ -83,6 +85,8 @@ _BY_WORD = {
 
 def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
+    if field.startswith("derived."):
+        return f"formula of {field.removeprefix('derived.')}"
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 
@@ -174,11 +178,19 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
     values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
     document["recording"] = _replaced(base.get("recording", {}), values)
-    document["channels"], unsaid = spring_mapping.with_spring(
-        channels, form, _said(form, spring_mapping.SPRING), base.get("channels", {})
+    travel = {"travel": ""} if "travel" in form and "displacement_mm" in workbench.derived_fields(form) else {}
+    channels, unsaid = spring_mapping.with_spring(
+        channels, {**form, **travel}, _said(form, spring_mapping.SPRING), base.get("channels", {})
     )
-    curves = spring_mapping.curves_of(form, base.get("curves"))
-    document = _replaced(document, {"curves": curves})
+    channels = workbench.with_derived(channels, form, CHANNELS, base)
+    document["channels"] = workbench.with_tare(channels, form, base.get("channels", {}))
+    rest = {
+        "name": form.get("name", base.get("name", "")).strip() or None,
+        "derived": workbench.formulas(form, CHANNELS, base),
+        "curves": spring_mapping.curves_of(form, base.get("curves")),
+        "trim": workbench.trim_of(form, base.get("trim")),
+    }
+    document = _replaced(document, rest)
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
@@ -252,7 +264,7 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
         "channel": name,
         "unit": true_unit if true_unit and (wrong or not label or "unit" in base) else None,
         "labelled": label if wrong else None,
-        "sign": {"1": 1, "-1": -1}.get(form.get(f"sign-{number}", "")),
+        "sign": workbench.sign_of(form.get(f"sign-{number}", "")),
         "sensitivity": number_or_text(form.get(f"sensitivity-{number}", "")),
         "sensitivity_unit": form.get(f"sensitivity_unit-{number}", "").strip() or None,
         "stiffness_n_per_mm": stiffness,
@@ -260,14 +272,21 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
     return {key: value for key, value in values.items() if value is not None}
 
 
+def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription | None:
+    """The rig description in use or, without one, as the form guesses it; None where that cannot be."""
+    try:
+        return rig or rig_description.from_dict(guessed(summary.channels, summary.properties, {}))
+    except InvalidInput:
+        return None
+
+
 def mapped_file(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> MappedFile | None:
     """The campaign document of a file and what was taken for what, by the rig description or, without one, as the form
     guesses it; None where that cannot be."""
-    if look.contents is None:
+    used = rig_of(summary, rig)
+    if look.contents is None or used is None:
         return None
     try:
-        if rig is None:
-            rig = rig_description.from_dict(guessed(summary.channels, summary.properties, {}))
-        return rig_mapping.apply(rig, look.contents, summary.label)
+        return rig_mapping.apply(used, look.contents, summary.label)
     except (FileError, InvalidInput):
         return None

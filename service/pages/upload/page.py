@@ -1,7 +1,6 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 import orjson
@@ -12,27 +11,18 @@ from service.auth import session
 from service.dependencies import WRITE, Store, Table
 from service.ingest import skin_imports
 from service.ingest.accept import RIG
-from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
+from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS
 from service.ingest.uploads import received
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, attachment, csv_answer
+from service.pages.shared.figures import attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import exported_skin, similar_errors, spring_mapping
+from service.pages.upload import exported_skin, similar_errors, spring_mapping, templates, workbench
 from service.pages.upload import mapping as mappings
-from service.pages.upload.figures import figures, lines_columns, trace_columns
-from service.pages.upload.file_summary import MOST_LISTED, ChannelSummary, FileSummary, seen
-from service.pages.upload.keep import (
-    CORRECTS,
-    SKIN_FIELD,
-    counts_pressing_negative,
-    field_errors,
-    keep_good,
-    rig_in_use,
-    skin_of,
-    worth_knowing,
-)
-from service.pages.upload.mapping import mapped_file
+from service.pages.upload.figures import lines_columns, trace_columns
+from service.pages.upload.file_summary import MOST_LISTED, listed
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of
+from service.pages.upload.looking import channels_of, draw, is_unsaid, look_at_all, looked, used_twice
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
@@ -116,7 +106,7 @@ async def send(request: Request, store: Store) -> Response:
                 await run_in_threadpool(exported_skin.look, store, pending)
         else:
             async with READING_SLOTS:
-                await run_in_threadpool(_look, request, pending)
+                await run_in_threadpool(look_at_all, request, pending)
     except BaseException:
         pending_uploads.discard(pending)
         raise
@@ -124,20 +114,24 @@ async def send(request: Request, store: Store) -> Response:
 
 
 @router.get("/{upload_id}")
-def understood(request: Request, pending: Pending, store: Store, file: Annotated[int, Query(ge=0)] = 0) -> Response:
-    """What was understood, file by file."""
+def understood(
+    request: Request,
+    pending: Pending,
+    store: Store,
+    file: Annotated[int, Query(ge=0)] = 0,
+    first: Annotated[int, Query(ge=0, le=MOST_RECORDINGS)] = 0,
+) -> Response:
+    """What was understood, file by file; `first`: the number of the first recording that is listed."""
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
         return exported_skin.shown(request, pending)
     file = min(file, len(pending.files) - 1)
-    if file not in pending.drawn:
-        inspected = _looked(request, pending, file)
-        mapped = mapped_file(inspected, pending.seen[file], pending.rig)
-        pending.draw(file, figures(inspected, f"/upload/{pending.id}/{file}/", mapped))
+    draw(request, pending, file)
+    recordings = listed(looked(request, pending, file), first) if first else pending.seen[file].listed
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     about = _latest(store, pending.skin or pending.seen[file].skin)
-    channels = _channels(pending)
+    channels = channels_of(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
     return page(
@@ -150,19 +144,24 @@ def understood(request: Request, pending: Pending, store: Store, file: Annotated
         refusals=similar_errors.of_recordings(pending.seen[file]),
         figures=pending.drawn[file],
         good=sum(one.recordings for one in pending.seen),
-        refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not _unsaid(pending, one)),
-        unsaid=_unsaid(pending, pending.seen[file]),
+        refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not is_unsaid(pending, one)),
+        unsaid=is_unsaid(pending, pending.seen[file]),
+        recordings=recordings,
+        first=first,
         most_listed=MOST_LISTED,
         apart=len({one.day for one in pending.seen if one.day is not None}) > 1,
         known=known,
         skin=pending.skin or pending.seen[file].skin or "",
         channels=channels,
         passed_over=[] if stated else mappings.passed_over(channels, document),
-        twice=_twice(pending, channels),
+        twice=used_twice(pending, channels),
         document=document,
         layout=mappings.sensors_text(document),
         mapping=mappings,
         spring=spring_mapping,
+        workbench=workbench,
+        wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
+        offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
             request,
             [one.label for one in pending.seen[:_MOST_NAMED]],
@@ -187,7 +186,16 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     if not wrong:
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
         async with READING_SLOTS:
-            await run_in_threadpool(_look, request, pending)
+            await run_in_threadpool(look_at_all, request, pending)
+    return see(f"/upload/{pending.id}")
+
+
+@router.post("/{upload_id}/template", dependencies=[*WRITE, OWN_FORM])
+async def use_template(request: Request, pending: Pending, store: Store) -> Response:
+    """Reads the files as those of the same instrument were read before."""
+    await run_in_threadpool(templates.use, store, pending, _latest(store, pending.skin or pending.seen[0].skin))
+    async with READING_SLOTS:
+        await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
@@ -196,7 +204,7 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
     """Reads the files again, curves that count pressing negative turned, or as they came."""
     pending.turned = sent.get("turned") == "yes"
     async with READING_SLOTS:
-        await run_in_threadpool(_look, request, pending)
+        await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
@@ -238,65 +246,16 @@ def rig_json(pending: Pending) -> Response:
 @router.get("/{upload_id}/{file}/traces.csv")
 def traces_csv(request: Request, pending: Pending, file: int) -> Response:
     """The channels of a file's first part."""
-    return csv_answer("traces", trace_columns(_looked(request, pending, file)))
+    return csv_answer("traces", trace_columns(looked(request, pending, file)))
 
 
 @router.get("/{upload_id}/{file}/frf.csv")
 def frf_csv(request: Request, pending: Pending, file: int) -> Response:
     """The FRFs of a file."""
-    return csv_answer("frf", lines_columns(_looked(request, pending, file)))
-
-
-def _looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
-    if not 0 <= number < len(pending.files) or pending.kept_at is not None:
-        raise Missing("There is no such file in this upload.")
-    inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
-    campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
-    return replace(
-        inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns
-    )
-
-
-def _look(request: Request, pending: PendingUpload) -> None:
-    """Read every file; the figures of the first one are drawn with it."""
-    summaries: list[FileSummary] = []
-    drawn: list[Drawn] = []
-    recordings = 0
-    pending.negative = False
-    for number, upload in enumerate(pending.files):
-        inspected = _looked(request, pending, number)
-        recordings += sum(one.recordings for one in inspected.campaigns)
-        require_few(len(summaries) + len(inspected.campaigns), recordings)
-        pending.negative |= counts_pressing_negative(inspected)
-        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
-        summary = seen(upload, inspected, known)
-        mapped = mapped_file(inspected, summary, pending.rig)
-        layout = inspected.contents.layout if inspected.contents is not None else ""
-        summaries.append(replace(summary, taken=mapped.taken if mapped else {"": layout} if layout else {}))
-        if number == 0:
-            drawn = figures(inspected, f"/upload/{pending.id}/0/", mapped)
-    pending.seen, pending.drawn = summaries, {0: drawn}
+    return csv_answer("frf", lines_columns(looked(request, pending, file)))
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:
     """What the campaigns of a skin say of it."""
     row = None if skin is None else store.read(campaigns.describing, skin)
     return {} if row is None else dict(row.about["skin"])
-
-
-def _unsaid(pending: PendingUpload, file: FileSummary) -> bool:
-    """Whether nobody has said yet what the channels of a file are."""
-    return pending.rig is None and bool(file.channels)
-
-
-def _channels(pending: PendingUpload) -> list[ChannelSummary]:
-    """Of all files, by name; those that hold the mapping's channels first come first."""
-    by_name = {channel.name: channel for one in reversed(pending.seen) for channel in reversed(one.channels)}
-    return list(reversed(by_name.values()))
-
-
-def _twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[str, str]:
-    """Channels that the form took for what another one is already, and that."""
-    names = {channel.name for channel in channels}
-    used = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in pending.refused]
-    return {name: field for name, field in used if name in names and field in mappings.CHOICES}

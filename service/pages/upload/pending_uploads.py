@@ -56,6 +56,15 @@ class PendingUpload:
     kept_at: str | None = None  # the page of what was kept
     lock: threading.Lock = field(default_factory=threading.Lock)
 
+    @property
+    def is_depth_composed(self) -> bool:
+        """Whether the displacement is made of several channels: turned as a whole, its terms would be wrong."""
+        mapping = None if self.rig is None else self.rig.channels.get("displacement_mm")
+        if self.rig is None or mapping is None:
+            return False
+        formula = self.rig.derived.get(mapping.channel)
+        return mapping.deflection is not None or (formula is not None and formula.is_sum)
+
     def draw(self, number: int, figures: list[Drawn]) -> None:
         """Keep the figures of a file."""
         if len(self.drawn) >= _MOST_DRAWN:

@@ -1,0 +1,38 @@
+"""Instruments, recognised by the headings of their files, and what of a rig description is theirs."""
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import orjson
+
+from underskin.recordings.channels import Contents
+from underskin.recordings.rig_description import RigDescription
+
+_OF_INSTRUMENT = ("indenter_radius_mm", "stage_stiffness_n_per_mm", "sample_rate_hz")  # where typed, not from a file
+
+
+def recognised(kind: str, contents: Contents) -> str | None:
+    """What files of the same format with the same channels and units have in common, as a digest; None of a file
+    without channels."""
+    headings = {(channel.name, channel.unit) for block in contents.blocks for channel in block.channels}
+    if not headings:
+        return None
+    return hashlib.sha256(orjson.dumps([kind, sorted(headings)])).hexdigest()
+
+
+def template_of(rig: RigDescription) -> str:
+    """The part of a rig description (JSON) that holds for all files of an instrument: without the skin, and without
+    what was typed of one recording."""
+    document = rig.document
+    recording = {
+        name: value
+        for name, value in document.get("recording", {}).items()
+        if isinstance(value, Mapping) or name in _OF_INSTRUMENT
+    }
+    return orjson.dumps({**document, "skin": {}, "recording": recording}).decode()
+
+
+def with_skin(template: str, skin: Mapping[str, Any]) -> dict[str, Any]:
+    """The rig description (`rig/1`) of a template, for a skin of which these fields are known."""
+    return {**orjson.loads(template), "skin": dict(skin)}

@@ -1,0 +1,93 @@
+"""A recording over its samples: loading, the way back, and what the trim leaves out; brushing it sets the trim."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from service.ingest.reading import InspectedFile
+from service.pages.shared.figures import Drawn, drawn
+from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.mapping import mapped_file, rig_of
+from underskin.recordings.rig_description import RigDescription, Trim
+from underskin.units import LAB, Floats, Mask, readable_unit
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+_NAME = "course"
+_SHOWN = ("displacement_mm", "force_n", "charge_pc")
+_MOST_SAMPLES = 900
+_ROW, _EDGES = 150, 120  # pixels
+_LOADING, _BACK, _USED, _LEFT_OUT = "loading", "way back", "used", "left out"
+_BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#8a949e"
+
+
+def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> list[Drawn]:
+    """The figure of the file's first recording over time or displacement; none of a file without channels."""
+    used = rig_of(summary, rig)
+    mapped = None if used is None else mapped_file(look, summary, replace(used, trim=None))
+    if used is None or mapped is None or not mapped.document["recordings"]:
+        return []
+    first: Mapping[str, Any] = mapped.document["recordings"][0]
+    columns = {name: first[name] for name in _SHOWN if name in first and "frequency_hz" not in first}
+    if not columns or len({len(column) for column in columns.values()}) > 1:
+        return []
+    of = len(mapped.document["recordings"])
+    which = "" if of == 1 else f" of {str(first['id'])[:60]!r}, the first of {of}"
+    about = f"The recording{which}, sample by sample. Drag across the figure to choose the samples that are used."
+    return [drawn(_NAME, _figure(columns, used.trim or Trim()), about)]
+
+
+def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
+    from plotly.subplots import make_subplots
+
+    from underskin.figures.style import styled
+
+    count = len(next(iter(columns.values())))
+    sample = np.arange(1, count + 1)
+    parts = _parts(columns, (sample >= (trim.first_sample or 1)) & (sample <= (trim.last_sample or count)))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_SAMPLES)).round().astype(int))
+    figure = make_subplots(len(columns), 1, shared_xaxes=True, vertical_spacing=0.08)
+    for row, (field, column) in enumerate(columns.items(), start=1):
+        unit, count_of_lab = _readable(field, column)
+        for name, (colour, mask) in parts.items():
+            y = np.where(mask, column * count_of_lab, np.nan)[chosen]
+            if np.isfinite(y).any():
+                figure.add_scatter(
+                    x=sample[chosen],
+                    y=y.astype(np.float32),
+                    mode="lines",
+                    name=name,
+                    legendgroup=name,
+                    showlegend=row == 1,
+                    line={"color": colour, "width": 1.4, "dash": "dot" if name == _LEFT_OUT else "solid"},
+                    hovertemplate=f"{name}, sample %{{x}}: %{{y:.4g}} {unit}<extra></extra>",
+                    row=row,
+                    col=1,
+                )
+        figure.update_yaxes(title=f"{field.rpartition('_')[0]}<br>[{unit}]", fixedrange=True, row=row, col=1)
+    figure.update_xaxes(title="sample", row=len(columns), col=1)
+    figure.update_layout(dragmode="select", selectdirection="h")
+    title = "Loading and way back" if _BACK in parts else "The samples"
+    return styled(figure, title, _EDGES + _ROW * len(columns))
+
+
+def _readable(field: str, column: Floats) -> tuple[str, float]:
+    """The unit in which a column reads well, and how many make the lab's."""
+    if field == "charge_pc":
+        return LAB[field].unit, 1.0
+    return readable_unit(field, float(np.nanmax(np.abs(column), initial=0.0)))
+
+
+def _parts(columns: Mapping[str, Floats], used: Mask) -> dict[str, tuple[str, Mask]]:
+    """By name the colour of each part and where it is, (samples,); a curve is loaded up to its deepest sample."""
+    left_out = {_LEFT_OUT: (_GREY, ~used)}
+    if "displacement_mm" not in columns:
+        return {_USED: (_BLUE, used)} | left_out
+    depth = np.where(used & np.isfinite(columns["displacement_mm"]), columns["displacement_mm"], -np.inf)
+    number, turn = np.arange(len(depth)), int(np.argmax(depth))
+    if not (used & (number < turn)).any():  # nothing is pressed in yet, such as where a sign is to be turned
+        return {_USED: (_BLUE, used)} | left_out
+    return {_LOADING: (_BLUE, used & (number <= turn)), _BACK: (_ORANGE, used & (number >= turn))} | left_out

@@ -1,0 +1,78 @@
+"""Reading the files of an upload, as its rig description and its form say, and what they hold."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fastapi import Request
+
+from service.ingest.reading import InspectedFile, look, require_few
+from service.pages.shared.figures import Drawn
+from service.pages.upload import course_figure
+from service.pages.upload.figures import figures
+from service.pages.upload.file_summary import ChannelSummary, FileSummary, seen
+from service.pages.upload.keep import counts_pressing_negative, worth_knowing
+from service.pages.upload.mapping import CHOICES, mapped_file
+from service.pages.upload.pending_uploads import PendingUpload
+from service.store import Missing
+
+
+def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
+    """One file, read; raises Missing where there is none of that number."""
+    if not 0 <= number < len(pending.files) or pending.kept_at is not None:
+        raise Missing("There is no such file in this upload.")
+    inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
+    return replace(
+        inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns
+    )
+
+
+def look_at_all(request: Request, pending: PendingUpload) -> None:
+    """Read every file; the figures of the first one are drawn with it."""
+    summaries: list[FileSummary] = []
+    drawn: list[Drawn] = []
+    recordings = 0
+    pending.negative = False
+    for number, upload in enumerate(pending.files):
+        inspected = looked(request, pending, number)
+        recordings += sum(one.recordings for one in inspected.campaigns)
+        require_few(len(summaries) + len(inspected.campaigns), recordings)
+        pending.negative |= counts_pressing_negative(inspected)
+        known = worth_knowing(request, inspected, pending.skin, pending.corrects)
+        summary = seen(upload, inspected, known)
+        mapped = mapped_file(inspected, summary, pending.rig)
+        layout = inspected.contents.layout if inspected.contents is not None else ""
+        summaries.append(replace(summary, taken=mapped.taken if mapped else {"": layout} if layout else {}))
+        if number == 0:
+            drawn = _figures(pending, 0, inspected, summary)
+    pending.seen, pending.drawn = summaries, {0: drawn}
+
+
+def draw(request: Request, pending: PendingUpload, number: int) -> None:
+    """Draw the figures of a file, unless they are there."""
+    if number not in pending.drawn:
+        pending.draw(number, _figures(pending, number, looked(request, pending, number), pending.seen[number]))
+
+
+def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:
+    mapped = mapped_file(inspected, summary, pending.rig)
+    course = course_figure.course(inspected, summary, pending.rig)
+    return [*course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
+
+
+def channels_of(pending: PendingUpload) -> list[ChannelSummary]:
+    """Of all files, by name; those that hold the mapping's channels first come first."""
+    by_name = {channel.name: channel for one in reversed(pending.seen) for channel in reversed(one.channels)}
+    return list(reversed(by_name.values()))
+
+
+def used_twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[str, str]:
+    """Channels that the form took for what another one is already, and that."""
+    names = {channel.name for channel in channels}
+    used = [(str(error["value"]), error["field"].removeprefix("channels.")) for error in pending.refused]
+    return {name: field for name, field in used if name in names and field in CHOICES}
+
+
+def is_unsaid(pending: PendingUpload, file: FileSummary) -> bool:
+    """Whether nobody has said yet what the channels of a file are."""
+    return pending.rig is None and bool(file.channels)

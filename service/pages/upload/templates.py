@@ -1,0 +1,55 @@
+"""What was said of an instrument's files before, offered for the next ones."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import orjson
+
+from service.ingest.instruments import template_of, with_skin
+from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.mapping import SKIN
+from service.pages.upload.pending_uploads import PendingUpload
+from service.store import AnyRow, Database, Missing, instrument_templates
+from underskin.recordings import rig_description
+
+
+@dataclass(frozen=True)
+class OfferedTemplate:
+    """A template as the page offers it: what the instrument is called, by whom and when it was said, what it says."""
+
+    name: str
+    kept_at: str
+    kept_from: str | None
+    channels: Mapping[str, Any]
+    derived: Mapping[str, str]
+
+
+def offered(store: Database, pending: PendingUpload, file: FileSummary) -> OfferedTemplate | None:
+    """The template of the instrument that wrote a file; None where there is none, or where it is in use already."""
+    row = _latest(store, file)
+    if row is None or (pending.rig is not None and template_of(pending.rig) == row.document):
+        return None
+    if pending.rig is not None and file.recordings:
+        return None
+    document = orjson.loads(row.document)
+    about = (row.kept_at, row.kept_from, document["channels"], document.get("derived") or {})
+    return OfferedTemplate(document.get("name") or "", *about)
+
+
+def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> None:
+    """Read the upload by the template of its first file that has one; `skin`: what is known of the skin.
+
+    Raises Missing where there is none.
+    """
+    row = next((found for file in pending.seen if (found := _latest(store, file)) is not None), None)
+    if row is None:
+        raise Missing("There is no template for these files.")
+    known = {name: skin[name] for name in (*[name for name, *_ in SKIN], "sensors") if skin.get(name) is not None}
+    document = with_skin(row.document, {"poisson_ratio": 0.5, **known})
+    pending.rig, pending.draft, pending.refused = rig_description.from_dict(document), None, []
+    pending.rig_label = "rig.json"  # as the page saves it
+
+
+def _latest(store: Database, file: FileSummary) -> AnyRow | None:
+    return None if file.instrument is None else store.read(instrument_templates.latest, file.instrument)

@@ -1,0 +1,114 @@
+"""The part of a mapping form that makes curves of raw channels: derived channels, the zero of a field, the trim."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.pages.shared.forms import number_or_text
+from service.pages.upload.file_summary import FileSummary
+from underskin.recordings.channel_mapping import AUTOMATIC
+from underskin.recordings.readers.derived_channels import FIELD
+
+SIGNS = {"": "as it is", "1": "+", "-1": "−", AUTOMATIC: "automatic"}
+TARES = {
+    "force_n": ("force", ("frf", "indentation", "compression")),
+    "displacement_mm": ("displacement", ("indentation", "compression")),
+    "charge_pc": ("charge", ("frf",)),
+}  # each in words, and the kinds that have it
+TRIM = {"first_sample": "first sample used", "last_sample": "last sample used"}
+_ROWS_FREE = 2  # of derived channels
+_TARE = "tare_percent"
+WORDS = {
+    **{f"trim.{name}": words for name, words in TRIM.items()},
+    **{f"{field}.{_TARE}": f"zero of the {words}" for field, (words, _) in TARES.items()},
+}
+
+
+def sign_of(text: str) -> int | str | None:
+    """A sign as a rig description has it; None for one that is not stated."""
+    return text if text == AUTOMATIC else {"1": 1, "-1": -1}.get(text)
+
+
+def rows(document: Mapping[str, Any]) -> list[tuple[str, Any, str]]:
+    """Name, formula and field of each derived channel, and some empty rows."""
+    by_channel = {how.get("channel"): field for field, how in document.get("channels", {}).items()}
+    derived = document.get(FIELD) or {}
+    return [*((name, text, by_channel.get(name, "")) for name, text in derived.items()), *[("", "", "")] * _ROWS_FREE]
+
+
+def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, str] | None:
+    """The derived channels of a form, by name; one without a name is called after what it is. As in `base` where the
+    form has none; None where there are none."""
+    if f"{FIELD}-formula-0" not in form:
+        return base.get(FIELD)
+    found: dict[str, str] = {}
+    for number in _rows_in(form):
+        text, name = form[f"{FIELD}-formula-{number}"].strip(), _name(form, number, words)
+        if text or form.get(f"{FIELD}-name-{number}", "").strip():
+            found[name] = text
+    return found or None
+
+
+def with_derived(
+    channels: Mapping[str, Any], form: Mapping[str, str], words: Mapping[str, str], base: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The channels, where a derived one is for a field that one instead."""
+    before = base.get("channels", {})
+    if f"{FIELD}-formula-0" not in form:
+        derived = base.get(FIELD) or {}
+        return {**channels, **{field: how for field, how in before.items() if how.get("channel") in derived}}
+    result = dict(channels)
+    for number in _rows_in(form):
+        field = form.get(f"{FIELD}-is-{number}", "")
+        if field and form[f"{FIELD}-formula-{number}"].strip():
+            name = _name(form, number, words)
+            known = before.get(field, {})
+            result[field] = {**known, "channel": name} if known.get("channel") == name else {"channel": name}
+    return result
+
+
+def derived_fields(form: Mapping[str, str]) -> set[str]:
+    """The fields that derived channels are for."""
+    return {form.get(f"{FIELD}-is-{number}", "") for number in _rows_in(form)} - {""}
+
+
+def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
+    """The channels with the part of the curve over which each is 0; as in `base` where the form does not say."""
+    result = {}
+    for field, how in channels.items():
+        others = {name: value for name, value in how.items() if name != _TARE}
+        said = number_or_text(form[f"tare-{field}"]) if f"tare-{field}" in form else base.get(field, {}).get(_TARE)
+        result[field] = others if said is None else {**others, _TARE: said}
+    return result
+
+
+def trim_of(form: Mapping[str, str], base: Any) -> Any:
+    """The samples that are used; as in `base` where the form does not say."""
+    if not any(name in form for name in TRIM):
+        return base
+    said = {name: number_or_text(form.get(name, "")) for name in TRIM}
+    whole = {
+        name: int(value) if isinstance(value, float) and value.is_integer() else value for name, value in said.items()
+    }
+    return {name: value for name, value in whole.items() if value is not None} or None
+
+
+def errors_of(refused: Sequence[Mapping[str, Any]], file: FileSummary) -> dict[str, str]:
+    """What is wrong with each derived channel, by its name."""
+    found: dict[str, str] = {}
+    for error in (*refused, *file.errors):
+        place, said = error["field"], str(error["allowed"])
+        if place == "file":
+            place, _, said = said.partition(": ")
+        if place.startswith(f"{FIELD}."):
+            found.setdefault(place.removeprefix(f"{FIELD}."), said)
+    return found
+
+
+def _rows_in(form: Mapping[str, str]) -> list[int]:
+    prefix = f"{FIELD}-formula-"
+    return sorted(int(name.removeprefix(prefix)) for name in form if name.removeprefix(prefix).isdecimal())
+
+
+def _name(form: Mapping[str, str], number: int, words: Mapping[str, str]) -> str:
+    field = form.get(f"{FIELD}-is-{number}", "")
+    return form.get(f"{FIELD}-name-{number}", "").strip() or f"derived {words.get(field, str(number + 1))}"

@@ -1,0 +1,131 @@
+"""What a rig description derives, tares, trims and turns, on raw curves whose force and depth are known."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.raw_curves import DEPTH_MM, FORCE_N, OFFSET_NM, rig_of_raw_curve, text_of_raw_curve
+from underskin.errors import FileError, InvalidInput
+from underskin.recordings import read_file, rig_description
+from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.reading import Reading
+
+
+def read(text: str, **changes: Any) -> Reading:
+    return read_file(text.encode(), "afm.txt", rig_description.from_dict(rig_of_raw_curve(**changes)))
+
+
+def curve_of(reading: Reading) -> IndentationRecording:
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, IndentationRecording)
+    return recording
+
+
+def test_depth_and_force_are_derived_from_height_and_deflection() -> None:
+    reading = read(text_of_raw_curve())
+    curve = curve_of(reading)
+    np.testing.assert_allclose(curve.force_n, FORCE_N, atol=1e-11)
+    np.testing.assert_allclose(curve.displacement_mm, DEPTH_MM - 1e-6 * OFFSET_NM, atol=1e-9)
+    assert reading.warnings == [
+        "channel 'depth' is derived: -'Height (nm)' - 'Deflection (nm)'",
+        "channel 'load' is derived: k * 'Deflection (nm)'",
+        "force_n is 0 on average over the first 10 % of each curve: it was tared so",
+    ]
+    assert "its mean over the first 10 %" in reading.taken["force_n"]
+
+
+def test_a_constant_may_come_from_the_file() -> None:
+    derived = {"depth": "-'Height (nm)' - 'Deflection (nm)'", "load": "'k (N/m)' * 'Deflection (nm)'"}
+    curve = curve_of(read(text_of_raw_curve(above="k (N/m)\t3"), derived=derived))
+    np.testing.assert_allclose(curve.force_n, FORCE_N, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("trim", "kept"),
+    [
+        ({"first_sample": 11, "last_sample": 390}, slice(10, 390)),
+        ({"first_sample": 3}, slice(2, None)),
+        ({"last_sample": 1000}, slice(None)),
+    ],
+)
+def test_samples_outside_the_trim_are_left_out(trim: dict[str, int], kept: slice) -> None:
+    reading = read(text_of_raw_curve(), trim=trim)
+    curve = curve_of(reading)
+    np.testing.assert_allclose(curve.displacement_mm, (DEPTH_MM - 1e-6 * OFFSET_NM)[kept], atol=1e-9)
+    assert any(warning.startswith("of each curve, samples") for warning in reading.warnings)
+
+
+def test_each_curve_of_a_file_is_trimmed() -> None:
+    one = text_of_raw_curve()
+    rows = one.partition("\n")[2]
+    reading = read(one + "\n\n" + rows, curves="groups", trim={"first_sample": 101})
+    forces = [curve.force_n for curve in reading.campaign.recordings if isinstance(curve, IndentationRecording)]
+    assert [len(force) for force in forces] == [len(FORCE_N) - 100] * 2
+
+
+def test_a_sign_is_told_from_how_the_curve_goes() -> None:
+    channels = {
+        "displacement_mm": {
+            "channel": "Height (nm)",
+            "sign": "auto",
+            "deflection": {"channel": "Deflection (nm)", "sign": "auto"},
+        },
+        "force_n": {"channel": "Deflection (nm)", "sign": "auto", "spring_constant_n_per_m": 3, "tare_percent": 10},
+    }
+    for height in (-1, 1):
+        for deflection in (-1, 1):
+            text = text_of_raw_curve(height_sign=height, deflection_sign=deflection)
+            reading = read(text, derived={}, channels=channels)
+            curve = curve_of(reading)
+            np.testing.assert_allclose(curve.force_n, FORCE_N, atol=1e-11)
+            np.testing.assert_allclose(np.diff(curve.displacement_mm), np.diff(DEPTH_MM), atol=1e-9)
+            turned = [warning for warning in reading.warnings if "falls as it is pressed" in warning]
+            assert len(turned) == (height < 0) + (deflection < 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "said"),
+    [
+        ({"trim": {"first_sample": 0}}, "trim.first_sample", "counted from 1"),
+        ({"trim": {"first_sample": 9, "last_sample": 9}}, "trim.last_sample", "above first_sample, 9"),
+        ({"derived": {"depth": "a ** 2"}}, "derived.depth", "a ** 2: is not allowed"),
+        ({"derived": {"depth": 3}}, "derived.depth", "printable text"),
+        (
+            {"channels": {"displacement_mm": {"channel": "depth", "sign": "auto"}, "force_n": {"channel": "load"}}},
+            "channels.displacement_mm.sign",
+            "whose terms have signs of their own",
+        ),
+        ({"channels": {"force_n": {"channel": "load", "sign": "auto"}}}, "channels.force_n.sign", "told from curves"),
+        ({"channels": {"force_n": {"channel": "load", "sign": "up"}}}, "channels.force_n.sign", "1, -1 or auto"),
+        (
+            {"channels": {"force_n": {"channel": "a", "tare_percent": 101}}},
+            "channels.force_n.tare_percent",
+            "up to 100",
+        ),
+        (
+            {"channels": {"time_s": {"channel": "t", "tare_percent": 5}}},
+            "channels.time_s.tare_percent",
+            "is for force_n",
+        ),
+    ],
+)
+def test_what_a_rig_description_cannot_mean_is_refused(changes: dict[str, Any], field: str, said: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        rig_description.from_dict(rig_of_raw_curve(**changes))
+    assert refused.value.field == field
+    assert said in refused.value.allowed
+
+
+@pytest.mark.parametrize(
+    ("changes", "place", "said"),
+    [
+        ({"derived": {"Height (nm)": "1 [nm]"}}, "derived.Height (nm)", "is a channel of the file already"),
+        ({"trim": {"first_sample": 401}}, "trim.first_sample", "has 400 samples"),
+    ],
+)
+def test_what_a_file_contradicts_is_refused(changes: dict[str, Any], place: str, said: str) -> None:
+    with pytest.raises(FileError) as refused:
+        read(text_of_raw_curve(), **changes)
+    assert refused.value.place == place
+    assert said in refused.value.reason

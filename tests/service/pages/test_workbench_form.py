@@ -1,0 +1,86 @@
+"""Derived channels, zero and trim as a form has them, and what of a rig description is an instrument's."""
+
+import json
+from typing import Any
+
+import numpy as np
+
+from service.ingest.instruments import recognised, template_of, with_skin
+from service.pages.upload.mapping import document_of
+from service.pages.upload.workbench import rows
+from tests.support.raw_curves import rig_of_raw_curve
+from underskin.recordings import rig_description
+from underskin.recordings.channels import Block, Channel, Contents
+
+
+def form_of(document: dict[str, Any], **changes: str) -> dict[str, str]:
+    """What a browser sends of the part of the form that makes curves."""
+    form = {"kind": document["kind"], "units_checked": "yes", "poisson_ratio": "0.5", "indenter_radius_mm": "0.0075"}
+    for number, (name, formula, field) in enumerate(rows(document)):
+        told = {"name": name, "formula": formula, "is": field}
+        form |= {f"derived-{part}-{number}": text for part, text in told.items()}
+    form |= {f"tare-{name}": f"{how.get('tare_percent', '')}" for name, how in document["channels"].items()}
+    form |= {name: f"{value}" for name, value in document.get("trim", {}).items()}
+    return form | changes
+
+
+def test_a_form_that_nobody_changed_says_the_same() -> None:
+    document = rig_of_raw_curve(trim={"first_sample": 3, "last_sample": 90})
+    found, wrong = document_of(form_of(document), document)
+    assert wrong == []
+    assert found == document
+    assert (
+        found
+        == document_of(
+            {"kind": "indentation", "units_checked": "yes", "poisson_ratio": "0.5"} | {"indenter_radius_mm": "0.0075"},
+            document,
+        )[0]
+    )  # nor does a form without that part
+    rig_description.from_dict(found)
+
+
+def test_a_derived_channel_takes_the_place_of_the_one_that_the_table_names() -> None:
+    raw = {"channel-0": "Piezo", "is-0": "displacement_mm", "channel-1": "Bend", "is-1": "deflection", "travel": "yes"}
+    made = {"derived-formula-0": "-Piezo - Bend", "derived-is-0": "displacement_mm", "spring_constant_n_per_m": "3"}
+    document, wrong = document_of({"kind": "indentation"} | raw | made, {})
+    assert wrong == []
+    assert document["derived"] == {"derived displacement": "-Piezo - Bend"}
+    assert document["channels"] == {
+        "displacement_mm": {"channel": "derived displacement"},
+        "force_n": {"channel": "Bend", "spring_constant_n_per_m": 3.0},
+    }
+
+
+def test_an_emptied_row_is_taken_out() -> None:
+    document = rig_of_raw_curve()
+    emptied = {"derived-name-0": "", "derived-formula-0": "", "tare-force_n": ""}
+    found, _ = document_of(form_of(document, **emptied), document)
+    assert list(found["derived"]) == ["depth", "load"]
+    assert found["channels"]["force_n"] == {"channel": "load"}
+
+
+def test_a_template_holds_what_is_the_instrument_s_alone() -> None:
+    skin = {"poisson_ratio": 0.5, "thickness_mm": 2}
+    recording = {"indenter_radius_mm": 0.0075, "sensor": "s01", "recorded_at": {"property": "Date"}}
+    rig = rig_description.from_dict(rig_of_raw_curve(skin=skin, recording=recording))
+    template = json.loads(template_of(rig))
+    assert template["skin"] == {}
+    assert template["recording"] == {"indenter_radius_mm": 0.0075, "recorded_at": {"property": "Date"}}
+    again = rig_description.from_dict(with_skin(template_of(rig), {"thickness_mm": 3}))
+    assert again.skin == {"thickness_mm": 3}
+    assert again.derived.keys() == rig.derived.keys()
+
+
+def test_an_instrument_is_recognised_by_format_and_headings() -> None:
+    def contents(*headings: tuple[str, str]) -> Contents:
+        return Contents((Block("", tuple(Channel(name, unit, np.zeros(2)) for name, unit in headings)),))
+
+    one = recognised("CSV", contents(("Piezo", "nm"), ("Deflection", "nm")))
+    assert one == recognised("CSV", contents(("Deflection", "nm"), ("Piezo", "nm")))
+    others = [
+        recognised("TDMS", contents(("Piezo", "nm"), ("Deflection", "nm"))),
+        recognised("CSV", contents(("Piezo", "um"), ("Deflection", "nm"))),
+        recognised("CSV", contents(("Piezo", "nm"))),
+    ]
+    assert one not in others
+    assert recognised("CSV", Contents(())) is None

@@ -1,0 +1,196 @@
+"""Arithmetic on channels, with units: `Piezo - Deflection`, `0.05 [N/m] * 'Deflection (nm)'`.
+
+A formula holds names of channels, in quotes where one is not a single word; numbers; a unit in brackets behind either;
+`+ - * /`, a leading minus, and parentheses. Python's `ast` takes it apart, everything else in it is refused, and
+nothing of it is ever run. Sums need one dimension on both sides; units are converted.
+"""
+
+import ast
+import dataclasses
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from underskin.errors import FileError, InvalidInput
+from underskin.recordings.readers.dimensions import Exponents, described, exponents, times
+from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.shown_values import LONGEST_NAME, shown
+
+_FORM = "must be arithmetic on channels, such as Piezo - Deflection, 0.05 [N/m] * Deflection or -'Load cell'"
+_UNIT = "its unit in brackets, such as 0.05 [N/m]"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Values in SI, a scalar or (samples,), the exponents of their unit, and the unit that they came in ("" where they
+    are computed)."""
+
+    values: Any
+    dimension: Exponents
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A formula that was parsed: its text, the names in it, each once, and whether it adds or subtracts terms that both
+    hold names."""
+
+    text: str
+    names: tuple[str, ...]
+    is_sum: bool
+    tree: ast.expr = dataclasses.field(compare=False)  # of the text
+
+
+Known = Callable[[str, str | None], Quantity]  # of a name and the unit stated behind it
+
+
+def parse(field: str, text: str) -> Formula:
+    """A formula; raises InvalidInput that names the term which is none."""
+    if len(text) > LONGEST_NAME:
+        raise InvalidInput(field, shown(text), f"must have up to {LONGEST_NAME} characters")
+    text = text.strip()
+    try:
+        tree = ast.parse(text, mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        column = getattr(error, "offset", None)
+        place = f"; look at character {column}" if column else ""
+        allowed = f"{_FORM}; a name of several words in quotes, a number with {_UNIT}{place}"
+        raise InvalidInput(field, text, allowed) from None
+    parser = _Parser(field, text)
+    parser.check(tree)
+    return Formula(text, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree), tree)
+
+
+def evaluate(formula: Formula, known: Known, file: str, place: str) -> Quantity:
+    """Its value, (samples,) or a scalar; `known` gives the quantity of a name.
+
+    Raises FileError that names the term whose unit or length does not fit.
+    """
+    with np.errstate(all="ignore"):
+        return _Evaluation(formula.text, known, file, place).of(formula.tree)
+
+
+def labels(formula: Formula) -> Iterator[str]:
+    """The units stated in it."""
+    stated = (node for node in ast.walk(formula.tree) if isinstance(node, ast.Subscript))
+    return (_source(formula.text, node.slice) for node in stated)
+
+
+def _source(text: str, node: ast.expr) -> str:
+    return (ast.get_source_segment(text, node) or "").strip()
+
+
+def _name(text: str, node: ast.expr) -> str | None:
+    """The channel that a node names, as it was written (`ast` itself would normalise its letters); None for others."""
+    if isinstance(node, ast.Name):
+        return _source(text, node)
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
+
+
+class _Parser:
+    """Refuses what is no arithmetic."""
+
+    def __init__(self, field: str, text: str) -> None:
+        self.field = field
+        self.text = text
+
+    def check(self, node: ast.expr) -> None:
+        """Raises InvalidInput at the first node that is not allowed."""
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div):
+            self.check(node.left)
+            self.check(node.right)
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            self.check(node.operand)
+        elif isinstance(node, ast.Subscript) and isinstance(node.value, ast.Constant | ast.Name):
+            self.check(node.value)
+            label = _source(self.text, node.slice)
+            if exponents(label) is None:
+                raise self._error(node, f"{label!r} is no unit that is known here, such as N, mm, V, pC or N/m")
+        elif _name(self.text, node) is None:
+            self._require_number(node)
+
+    def names(self, node: ast.expr) -> Iterator[str]:
+        """The names in it, from left to right; what stands in brackets is a unit."""
+        name = _name(self.text, node)
+        if name is not None:
+            yield name
+        children = [node.value] if isinstance(node, ast.Subscript) else ast.iter_child_nodes(node)
+        for child in children:
+            if isinstance(child, ast.expr):
+                yield from self.names(child)
+
+    def adds_names(self, node: ast.expr) -> bool:
+        """Whether two terms that hold names are added or subtracted anywhere in it."""
+        sums = (one for one in ast.walk(node) if isinstance(one, ast.BinOp) and isinstance(one.op, ast.Add | ast.Sub))
+        return any(all(any(self.names(side)) for side in (one.left, one.right)) for one in sums)
+
+    def _require_number(self, node: ast.expr) -> None:
+        is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+        if not is_number:
+            raise self._error(node, f"is not allowed; a formula {_FORM}")
+        if not math.isfinite(float(node.value)):  # type: ignore[attr-defined]
+            raise self._error(node, "is too large a number")
+
+    def _error(self, node: ast.expr, reason: str) -> InvalidInput:
+        return InvalidInput(self.field, self.text, f"{shown(_source(self.text, node))}: {reason}")
+
+
+class _Evaluation:
+    """Computes a tree that `parse` has let through."""
+
+    def __init__(self, text: str, known: Known, file: str, place: str) -> None:
+        self.text = text
+        self.known = known
+        self.file = file
+        self.place = place
+
+    def of(self, node: ast.expr, label: str | None = None) -> Quantity:
+        """The quantity of a node; `label`: the unit that stands behind it."""
+        if isinstance(node, ast.Subscript):
+            return self.of(node.value, _source(self.text, node.slice))
+        name = _name(self.text, node)
+        if name is not None:
+            return self.known(name, label)
+        if isinstance(node, ast.UnaryOp):
+            operand = self.of(node.operand)
+            return Quantity(-operand.values, operand.dimension)
+        if isinstance(node, ast.BinOp):
+            return self._combined(node)
+        assert isinstance(node, ast.Constant)
+        return in_unit(float(node.value), label or "1")  # type: ignore[arg-type]
+
+    def _combined(self, node: ast.BinOp) -> Quantity:
+        left, right = self.of(node.left), self.of(node.right)
+        if np.ndim(left.values) and np.ndim(right.values) and len(left.values) != len(right.values):
+            raise self._error(f"{self._said(node.left)} and {self._said(node.right)} differ in length")
+        if isinstance(node.op, ast.Mult):
+            return Quantity(left.values * right.values, times(left.dimension, right.dimension))
+        if isinstance(node.op, ast.Div):
+            if not np.ndim(right.values) and right.values == 0:
+                raise self._error(f"{self._said(node)}: is a division by 0")
+            return Quantity(np.divide(left.values, right.values), times(left.dimension, right.dimension, -1))
+        if left.dimension != right.dimension:
+            both = f"{self._with_unit(node.left, left)}, {self._with_unit(node.right, right)}"
+            raise self._error(f"{self._said(node)}: {both}; only what has units of one kind can be added or subtracted")
+        sign = 1 if isinstance(node.op, ast.Add) else -1
+        return Quantity(left.values + sign * right.values, left.dimension)
+
+    def _with_unit(self, node: ast.expr, quantity: Quantity) -> str:
+        unit_words = f"the unit {quantity.label}" if quantity.label else described(quantity.dimension)
+        return f"{self._said(node)} has {unit_words}"
+
+    def _said(self, node: ast.expr) -> str:
+        return str(shown(_source(self.text, node)))
+
+    def _error(self, reason: str) -> FileError:
+        return FileError(self.file, self.place, reason)
+
+
+def in_unit(values: Any, label: str) -> Quantity:
+    """Values that are in a unit that is known here, `1` for numbers without one."""
+    known, dimension = unit(label), exponents(label)
+    assert dimension is not None
+    return Quantity(values if known is None else values * known.to_si, dimension, "" if known is None else label)

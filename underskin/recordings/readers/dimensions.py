@@ -1,0 +1,63 @@
+"""Products and quotients of units, as arithmetic on channels makes them: N/m times m is N."""
+
+from collections.abc import Iterable
+from itertools import product
+
+from underskin.recordings.readers.unit_labels import unit
+
+Exponents = tuple[int, int, int, int]  # of length, force, charge and time
+
+NO_DIMENSION: Exponents = (0, 0, 0, 0)
+_EXPONENTS: dict[str, Exponents] = {
+    "length": (1, 0, 0, 0),
+    "force": (0, 1, 0, 0),
+    "charge": (0, 0, 1, 0),
+    "time": (0, 0, 0, 1),
+    "pressure": (-2, 1, 0, 0),
+    "frequency": (0, 0, 0, -1),
+    "voltage": (1, 1, -1, 0),
+    "current": (0, 0, 1, -1),
+    "acceleration": (1, 0, 0, -2),
+}
+_SI = ("m", "N", "C", "s", "Pa", "Hz", "V", "A", "m/s^2")
+_PARTS = ("m", "N", "C", "s", "V")
+_SI_RATIOS = tuple(f"{above}/{below}" for above, below in product(_PARTS, _PARTS) if above != below)
+
+
+def times(first: Exponents, second: Exponents, sign: int = 1) -> Exponents:
+    """The exponents of a product; of the quotient where `sign` is -1."""
+    length, force, charge, time = (one + sign * other for one, other in zip(first, second, strict=True))
+    return length, force, charge, time
+
+
+def exponents(label: str) -> Exponents | None:
+    """Those of a unit, `1` for a number without one; None where the unit is not known here."""
+    if label == "1":
+        return NO_DIMENSION
+    known = unit(label)
+    if known is None:
+        return None
+    above, *below = known.dimension.split("/")
+    result = _EXPONENTS[above]
+    for one in below:
+        result = times(result, _EXPONENTS[one], -1)
+    return result
+
+
+def label_of(dimension: Exponents, preferred: Iterable[str]) -> str | None:
+    """A unit of these exponents: the first preferred one that has them, else that of SI; empty where they are all 0.
+
+    None where no single unit, and no quotient of two, has them.
+    """
+    if dimension == NO_DIMENSION:
+        return ""
+    return next((label for label in (*preferred, *_SI, *_SI_RATIOS) if exponents(label) == dimension), None)
+
+
+def described(dimension: Exponents) -> str:
+    """In words for an error: `m`, `N·m^-2`, "no unit"."""
+    label = label_of(dimension, ())
+    if label is not None:
+        return f"the unit {label}" if label else "no unit"
+    powers = [f"{base}^{power}" if power != 1 else base for base, power in zip(_SI, dimension, strict=False) if power]
+    return f"the unit {'·'.join(powers)}"
