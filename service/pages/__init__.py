@@ -8,6 +8,7 @@ from service.pages.campaign import changes as campaign_changes
 from service.pages.campaign import page as campaign
 from service.pages.compare import page as compare
 from service.pages.design import page as design
+from service.pages.design import search as design_search
 from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
 from service.pages.field import page as field
@@ -25,7 +26,9 @@ from service.pages.upload import page as upload
 _OF_SKINS = (
     start, example, skin, skin_changes, campaign, campaign_changes, compare, fleet, diagnosis, plan, upload
 )  # fmt: skip
-_PAGES = (*_OF_SKINS, design, field, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets)
+_PAGES = (
+    *_OF_SKINS, design, design_search, field, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets
+)  # fmt: skip
 
 router = APIRouter(include_in_schema=False)
 for _page in _PAGES:

@@ -35,6 +35,22 @@ class DesignRequest(BaseModel):
     units_checked: bool = Field(default=False, description="Accept magnitudes that look like a slip of units.")
 
 
+class DesignDemand(BaseModel):
+    """What a skin is to resolve, under which contact, and what can be made."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+    resolution_mm: float = Field(gt=0, le=1e3, description="Largest two-point separation [mm].")
+    preload_n: float = Field(gt=0, description="Force F of each of two spheres [N].")
+    indenter_radius_mm: float = Field(gt=0, description="Their radius R [mm].")
+    youngs_modulus_mpa: float = Field(gt=0, description="Young's modulus E of the layer, incompressible [MPa].")
+    d33_pc_per_n: float = Field(gt=0, description="d33 of the sensors [pC/N].")
+    dip_percent: float = Field(gt=0, le=100, description="As in `DesignRequest` [%].")
+    thinnest_mm: float = Field(ge=0, le=1e3, description="The thinnest layer that can be made [mm].")
+    least_pitch_mm: float = Field(ge=0, le=1e4, description="The smallest pitch that can be made [mm].")
+    least_frf_pc_per_n: float = Field(ge=0, le=1e6, description="Least charge over force above a sensor [pC/N].")
+
+
 class SweepAnswer(BaseModel):
     """σ and γ above a sensor along one axis, the other two as designed."""
 

@@ -8,34 +8,25 @@ from plotly.subplots import make_subplots
 
 from underskin.figures.style import COLOURS, DASHES, styled
 from underskin.prediction.skin_design import Design
-from underskin.units import to_lab
+from underskin.units import Floats, to_lab
 
 _TITLES = {"a_over_h": "a/h", "rt_over_h": "rT/h", "load_parameter": "L = F/(R²E)"}
 _SENSORS = 2  # drawn to each side of the middle one
 
 
 @dataclass(frozen=True)
-class Mark:
-    """A point on the sweeps: a/h, rT/h, L and σ there."""
+class Pinned:
+    """Another design, and what it is called, to be seen beside the one that is drawn."""
 
     name: str
-    a_over_h: float
-    rt_over_h: float
-    load_parameter: float
-    sigma: float
+    design: Design
 
 
-def design_overview(design: Design, own: Mark | None) -> go.Figure:
-    """σ and γ over each of a/h, rT/h and L, the others as designed; `own`: the skin that is varied."""
+def design_overview(design: Design, beside: Pinned | None) -> go.Figure:
+    """σ and γ over each of a/h, rT/h and L, the others as designed; `beside`: a point for another design."""
     figure = make_subplots(1, 3, shared_yaxes=True, horizontal_spacing=0.03)
-    contact = design.contact
-    chosen = Mark(
-        "this design",
-        float(contact.a_over_h),
-        float(contact.rt_over_h),
-        float(contact.load_parameter),
-        float(contact.sigma),
-    )
+    marks = [] if beside is None else [(beside, "diamond-open", COLOURS[6])]
+    marks.append((Pinned("this design", design), "circle", COLOURS[0]))
     for column, sweep in enumerate(design.sweeps, start=1):
         first = column == 1
         for name, values, colour, dash in (
@@ -48,27 +39,25 @@ def design_overview(design: Design, own: Mark | None) -> go.Figure:
                 hovertemplate=f"{_TITLES[sweep.axis]} %{{x:.4g}}<br>{name[0]} %{{y:.4g}}<extra></extra>",
                 row=1, col=column,
             )  # fmt: skip
-        for mark, symbol, colour in ((own, "diamond-open", COLOURS[6]), (chosen, "circle", COLOURS[0])):
-            if mark is not None:
-                figure.add_scatter(
-                    x=[getattr(mark, sweep.axis)], y=[mark.sigma], mode="markers", name=mark.name,
-                    legendgroup=mark.name, showlegend=first,
-                    marker={"symbol": symbol, "color": colour, "size": 12, "line": {"width": 2}},
-                    hovertemplate=f"{mark.name}<br>{_TITLES[sweep.axis]} %{{x:.4g}}<br>σ %{{y:.5g}}<extra></extra>",
-                    row=1, col=column,
-                )  # fmt: skip
+        for mark, symbol, colour in marks:
+            contact = mark.design.contact
+            figure.add_scatter(
+                x=[float(getattr(contact, sweep.axis))], y=[float(contact.sigma)], mode="markers", name=mark.name,
+                legendgroup=mark.name, showlegend=first,
+                marker={"symbol": symbol, "color": colour, "size": 12, "line": {"width": 2}},
+                hovertemplate=f"{mark.name}<br>{_TITLES[sweep.axis]} %{{x:.4g}}<br>σ %{{y:.5g}}<extra></extra>",
+                row=1, col=column,
+            )  # fmt: skip
         figure.update_xaxes(title=_TITLES[sweep.axis], row=1, col=column)
     figure.update_yaxes(title="σ and γ", rangemode="tozero", row=1, col=1)
     return styled(figure, "What reaches a sensor", 380)
 
 
-def array_response(design: Design, pitch_mm: float) -> go.Figure:
-    """Response of each sensor of a row over the contact's position along it, relative to a contact above a sensor."""
+def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None) -> go.Figure:
+    """Response of each sensor of a row over the contact's position along it, relative to a contact above a sensor; of
+    `beside` the middle sensor's."""
     figure = go.Figure()
-    offset = to_lab("x_mm", design.offset)
-    percent = 100 * design.response / design.response[0]
-    places = np.concatenate([-offset[:0:-1], offset])
-    mirrored = np.concatenate([percent[:0:-1], percent])
+    places, mirrored = _both_sides(design)
     half_width = (_SENSORS + 0.5) * pitch_mm
     for number in range(-_SENSORS, _SENSORS + 1):
         near = np.abs(places + number * pitch_mm) <= half_width
@@ -77,6 +66,14 @@ def array_response(design: Design, pitch_mm: float) -> go.Figure:
             name=f"sensor at {number * pitch_mm:g} mm",
             line={"color": COLOURS[abs(number)], "dash": DASHES[(number + _SENSORS) % len(DASHES)], "width": 1.8},
             showlegend=False, hovertemplate="contact at %{x:.3g} mm<br>sensor reads %{y:.3g} %<extra></extra>",
+        )  # fmt: skip
+    if beside is not None:
+        other, reading = _both_sides(beside.design)
+        near = np.abs(other) <= half_width
+        figure.add_scatter(
+            x=other[near], y=reading[near], mode="lines", name=beside.name,
+            line={"color": "#6b7680", "dash": "dot", "width": 2.5},
+            hovertemplate=f"{beside.name}<br>contact at %{{x:.3g}} mm<br>sensor reads %{{y:.3g}} %<extra></extra>",
         )  # fmt: skip
     half = 1e3 * design.resolution.width / 2
     if np.isfinite(half):
@@ -88,3 +85,10 @@ def array_response(design: Design, pitch_mm: float) -> go.Figure:
     figure.update_xaxes(title="place of the contact [mm]", range=[-half_width, half_width])
     figure.update_yaxes(title="response [%]")
     return styled(figure, "What a row of sensors sees", 380)
+
+
+def _both_sides(design: Design) -> tuple[Floats, Floats]:
+    """Places of the contact along the row [mm] and the reading of the sensor at 0 [%]."""
+    offset = np.asarray(to_lab("x_mm", design.offset))
+    percent = 100 * design.response / design.response[0]
+    return np.concatenate([-offset[:0:-1], offset]), np.concatenate([percent[:0:-1], percent])

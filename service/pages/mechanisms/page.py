@@ -1,29 +1,90 @@
-"""The mechanisms that diagnoses know: the lab's own, which are kept from a diagnosis and can be discarded, and all
-others.
+"""The catalogue of mechanisms: what each does to an FRF, in a picture and a formula, what acts like it, where it was
+found; and the lab's own, which are kept from a diagnosis and can be discarded.
 """
+
+import hashlib
+from collections.abc import Mapping
 
 from fastapi import APIRouter, Request, Response
 
-from service.dependencies import WRITE, Store
+from service.dependencies import WRITE, Store, Table
+from service.pages.mechanisms.picture import picture
 from service.pages.shared import same_request
+from service.pages.shared.figures import csv_answer
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page
+from service.problems import Refusal
 from service.usecases import mechanisms as usecase
+from service.usecases.mechanism_catalogue import catalogue, effect
+from service.usecases.mechanism_findings import findings
+from underskin.figures.law_effect import RIG, LawEffect
+from underskin.mechanisms import Unsupported
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/mechanisms")
 
+_SHOWN = 8  # diagnoses of each mechanism; the file of numbers has all
+
 
 @router.get("")
-def mechanisms(request: Request) -> Response:
+def mechanisms(request: Request, store: Store, table: Table) -> Response:
     """The lab's own first."""
-    entries = usecase.entries()
+    known = catalogue(store, table)
     return page(
         request,
         "mechanisms.html",
-        own=[entry for entry in entries if entry.own],
-        others=[entry for entry in entries if not entry.own],
+        own=[one for one in known.entries if one.entry.own],
+        others=[one for one in known.entries if not one.entry.own],
+        diagnoses=known.diagnoses,
+        shown=_SHOWN,
+        rig=RIG,
         same=same_request.get(request, "/v1/mechanisms", "client.mechanisms.all()"),
     )
+
+
+@router.get("/{name}/picture.svg")
+def drawn(name: str, request: Request, table: Table) -> Response:
+    """What it does to the FRF of the reference rig, or to its force curve."""
+    content = picture(name, _effect(name, table))
+    tag = f'"{hashlib.sha256(content.encode()).hexdigest()[:16]}"'
+    headers = {
+        "ETag": tag,
+        "Cache-Control": "no-cache",
+        "X-Content-Type-Options": "nosniff",
+        "Content-Security-Policy": "default-src 'none'",
+    }
+    if tag in request.headers.get("if-none-match", ""):
+        return Response(status_code=304, headers=headers)
+    return Response(content, headers=headers, media_type="image/svg+xml")
+
+
+@router.get("/{name}/effect.csv")
+def numbers(name: str, table: Table) -> Response:
+    """The numbers of the picture."""
+    shown = _effect(name, table)
+    columns: dict[str, list[float]] = {shown.axis: shown.x.tolist()}
+    for panel in shown.panels:
+        columns[f"{panel.title}, without it"] = panel.base.tolist()
+        for words, curve in zip(shown.strengths, panel.curves, strict=True):
+            columns[f"{panel.title}, {words}"] = curve.tolist()
+    return csv_answer(name, columns)
+
+
+@router.get("/{name}/found.csv")
+def found_csv(name: str, store: Store) -> Response:
+    """Every diagnosis that states it."""
+    _require_known(name)
+    rows = findings(store).by_mechanism.get(name, ())
+    columns: Mapping[str, list[object]] = {
+        "diagnosis": [one.diagnosis_id for one in rows],
+        "campaign": [one.campaign_id or "" for one in rows],
+        "skin": [one.skin_id for one in rows],
+        "name": [one.name for one in rows],
+        "ended_at": [one.at for one in rows],
+        "verdict": [one.verdict for one in rows],
+        "probability": [one.probability for one in rows],
+    }
+    return csv_answer(f"{name}-found", columns)
 
 
 @router.post("", dependencies=WRITE)
@@ -39,3 +100,18 @@ def discard(name: str, store: Store) -> Response:
     """Take it out of the catalogue."""
     store.read(usecase.discard, name)
     return see("/mechanisms")
+
+
+def _effect(name: str, table: SigmaTable) -> LawEffect:
+    """Raises Refusal 404, also where the reference rig has not what the mechanism follows."""
+    _require_known(name)
+    try:
+        return effect(name, table)
+    except Unsupported as lacking:
+        raise Refusal(404, f"There is no picture of {name!r}: {lacking.reason}.") from None
+
+
+def _require_known(name: str) -> None:
+    """Raises Refusal 404."""
+    if name not in usecase.catalogue():
+        raise Refusal(404, f"There is no mechanism {name!r}.")

@@ -68,6 +68,11 @@ def _with_unit(shown: str, exact: str, unit: str) -> Markup:
     return text + Markup('&nbsp;<span class="unit">{}</span>').format(unit) if unit else text
 
 
+def limit(value: float) -> str:
+    """A number that may be infinite."""
+    return "∞" if math.isinf(value) else f"{value:g}"
+
+
 def moment(text: str | None, *, date_only: bool = False) -> Markup:
     """A time of the store; a script turns it to the viewer's zone."""
     if text is None:
@@ -104,5 +109,5 @@ def capitalize_first(text: str) -> str:
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of,
-    "capitalize_first": capitalize_first,
+    "capitalize_first": capitalize_first, "limit": limit,
 }  # fmt: skip

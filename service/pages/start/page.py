@@ -1,5 +1,6 @@
 """The start: skins at a glance."""
 
+from contextlib import suppress
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,8 +11,11 @@ from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import prepare
 from service.pages.shared.html import page
 from service.pages.start.sparkline import sparkline
-from service.store import overview
+from service.problems import Refusal
+from service.store import Database, overview
+from service.usecases import mechanism_catalogue
 from service.usecases.scheduled_backups import ScheduledBackups, newest
+from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter()
 
@@ -53,8 +57,15 @@ def start(
         backups=_backups(request),
         same=same_request.get(request, "/v1/skins", "list(client.skins.all())"),
     )
-    answer.background = BackgroundTask(prepare)
+    answer.background = BackgroundTask(_ahead, store, table)
     return answer
+
+
+def _ahead(store: Database, table: SigmaTable) -> None:
+    """What takes long at first on pages to which this one leads."""
+    prepare()
+    with suppress(Refusal):  # which the page of mechanisms says
+        mechanism_catalogue.read_ahead(store, table)
 
 
 def _backups(request: Request) -> dict[str, Any] | None:

@@ -29,7 +29,7 @@ async function answer() {
   refused.hidden = !design.error;
   refused.textContent = design.error ?? "";
   // What was told before stands greyed beside an error: it is of other values.
-  for (const part of document.querySelectorAll(".results, figure.drawn")) part.classList.toggle("old", Boolean(design.error));
+  for (const part of document.querySelectorAll(".results, figure.drawn, [data-compared]")) part.classList.toggle("old", Boolean(design.error));
   if (design.error) return;
   if (!document.querySelector("[data-result]")) return void location.assign(`/design?${query}`); // it opened with an error
   outside.hidden = !design.outside;
@@ -42,6 +42,11 @@ async function answer() {
     value.textContent = text;
     value.title = exact;
     entry.querySelector(".quiet").textContent = note;
+  }
+  for (const [name, [stands, change]] of Object.entries(design.compared)) {
+    const row = document.querySelector(`[data-compared="${name}"]`);
+    row.querySelector("[data-stands]").textContent = stands;
+    row.querySelector("[data-change]").textContent = change;
   }
   for (const [name, figure] of Object.entries(design.figures)) {
     const place = document.getElementById(`figure-${name}`);

@@ -1,13 +1,17 @@
-"""The lab's own mechanisms on the pages: a law kept from its diagnosis, found in the catalogue, left out, discarded."""
+"""The catalogue on its page: pictures, twins, where each law was found; the lab's own, kept, left out, discarded."""
 
+import re
 from pathlib import Path
+from xml.etree import ElementTree
 
+import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.service.pages.conftest import Visit, visit
-from tests.service.routes.test_mechanisms import warmed
-from tests.support.diagnosed import sent
-from tests.support.store_server import Place, running
+from tests.service.routes.test_mechanisms import WARM, warmed
+from tests.support.diagnosed import diagnosed, report, resonant, sent
+from tests.support.store_server import Place, Server, running
+from underskin.mechanisms.registry import built_in
 
 
 def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_without_it(
@@ -52,3 +56,82 @@ def _require_accessible_at_both_widths(visitor: Visit) -> None:
         visitor.page.set_viewport_size({"width": width, "height": 900})
         assert visitor.page.evaluate("document.documentElement.scrollWidth") <= width
         visitor.require_accessible()
+
+
+def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server, reader: Visit) -> None:
+    campaign_id, diagnosis_id = diagnosed(idle, resonant("swinging"), report(), skin="found")
+    page = reader.page
+    reader.go("/mechanisms")
+    law = page.locator("#contact_resonance")
+    expect(law.get_by_text(re.compile("Found in 1 of "))).to_be_visible()
+    expect(law.get_by_role("link", name="swinging", exact=True)).to_have_attribute("href", f"/campaigns/{campaign_id}")
+    probability = law.get_by_role("link", name=re.compile("in the diagnosis of swinging"))
+    told = next(one["probability"] for one in report()["mechanisms"] if one["name"] == "contact_resonance")
+    assert float(probability.inner_text().removesuffix("%")) == pytest.approx(100 * told, abs=0.5)
+    expect(page.locator("#adhesion").get_by_text(re.compile("Found in none of "))).to_be_visible()
+    edge = page.locator("#moving_contact_edge")
+    twin = edge.get_by_role("listitem").filter(has_text="amplitude nonlinearity")
+    assert "told apart along" in twin.inner_text()
+    assert "the dynamic force" in twin.inner_text()
+    for image in page.locator("img.picture").all():
+        image.scroll_into_view_if_needed()
+    page.wait_for_function("[...document.images].every(one => one.complete && one.naturalWidth > 0)")
+    assert page.locator("img.picture").count() == len(built_in())
+    _require_accessible_at_both_widths(reader)
+    page.get_by_role("row", name="ageing").get_by_role("link").press("Enter")  # the table leads to each by keyboard
+    page.wait_for_url("**/mechanisms#ageing")
+    expect(page.locator("#ageing")).to_be_in_viewport()
+    probability.click()
+    page.wait_for_url(f"**/diagnoses/{diagnosis_id}")
+
+
+def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(idle: Server) -> None:
+    campaign_id, _ = diagnosed(idle, resonant("taken back"), report(), skin="back")
+    rows = idle.http.get("/mechanisms/contact_resonance/found.csv").text.splitlines()
+    assert rows[0] == "diagnosis,campaign,skin,name,ended_at,verdict,probability"
+    assert [row.split(",")[1] for row in rows[1:]].count(campaign_id) == 1
+    answer = idle.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "another rig"})
+    assert answer.status_code == 200, answer.text
+    left = idle.http.get("/mechanisms/contact_resonance/found.csv").text
+    assert campaign_id not in left
+
+
+def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> None:
+    answer = server.http.get("/mechanisms/adhesion/picture.svg")
+    assert answer.headers["content-type"] == "image/svg+xml"
+    tree = ElementTree.fromstring(answer.text)
+    lines = tree.findall("{http://www.w3.org/2000/svg}polyline")
+    assert len(lines) == 2 * 4  # without it and at three strengths, magnitude and phase
+    tag = {"If-None-Match": answer.headers["etag"]}
+    assert server.http.get("/mechanisms/adhesion/picture.svg", headers=tag).status_code == 304
+    header = server.http.get("/mechanisms/adhesion/effect.csv").text.splitlines()[0]
+    assert header.count("magnitude") == 4
+    for path in ("picture.svg", "effect.csv", "found.csv"):
+        assert server.http.get(f"/mechanisms/cheese/{path}").status_code == 404
+
+
+def test_the_lab_s_own_stand_beside_with_their_files(browser: Browser, tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    damped = (
+        WARM.replace("warm_amplifier", "long_cable")
+        .replace("acts_on: gain", "acts_on: frequency_response")
+        .replace("[temperature_c]", "[frequency_hz]")
+        .replace("1 + rise * (temperature_c - 23)", "1 / (1 + i * rise * frequency_hz)")
+        .replace("low: -0.1", "low: 0")
+    )
+    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        for document in (WARM, damped):
+            answer = server.http.post("/v1/mechanisms", content=document, headers={"Content-Type": "application/yaml"})
+            assert answer.status_code == 201, answer.text
+        for visitor in visit(browser, server):
+            page = visitor.page
+            visitor.go("/mechanisms")
+            own = page.get_by_role("region", name="The lab's own")
+            warm, cable = own.locator("#warm_amplifier"), own.locator("#long_cable")
+            expect(warm.get_by_text("No picture on the reference rig: not every recording has")).to_be_visible()
+            expect(cable.locator("img.picture")).to_be_visible()
+            warm.get_by_text("Its file").press("Enter")
+            assert warm.locator("pre").inner_text().strip() == WARM.strip()
+            _require_accessible_at_both_widths(visitor)
+        assert server.http.get("/mechanisms/warm_amplifier/picture.svg").status_code == 404

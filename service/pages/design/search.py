@@ -1,0 +1,129 @@
+"""The design the other way round: what is to be resolved, and which skins do."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+from urllib.parse import urlencode
+
+import numpy as np
+from fastapi import APIRouter, Depends, Request, Response
+
+from service.dependencies import Store, Table
+from service.pages.shared.figures import Drawn, csv_answer, drawn
+from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.html import page
+from service.pages.shared.skin_values import start
+from service.problems import parsed
+from service.schemas.design import DesignDemand
+from service.usecases.design_search import NEARLY, Offer, Searched, search
+from underskin.errors import UnderskinError
+
+router = APIRouter(prefix="/design/search")
+
+# Field, words, unit; where it starts, unless that is the skin's or the prototype's.
+FIELDS = (
+    ("resolution_mm", "resolution, at most", "mm", "2"),
+    ("preload_n", "force F of each load", "N", None),
+    ("indenter_radius_mm", "sphere radius R", "mm", None),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa", None),
+    ("d33_pc_per_n", "d33", "pC/N", None),
+    ("dip_percent", "dip that can be told", "%", None),
+    ("thinnest_mm", "thinnest layer that can be made", "mm", "0.2"),
+    ("least_pitch_mm", "smallest pitch that can be made", "mm", "0.5"),
+    ("least_frf_pc_per_n", "least charge over force", "pC/N", "1"),
+)
+_LABELS = {name: f"{words} [{unit}]" for name, words, unit, _ in FIELDS}
+
+
+@dataclass(frozen=True)
+class Typed:
+    """The skin from which it starts, what stands in the form, and in sentences what nobody declared."""
+
+    skin_id: str | None
+    fields: Mapping[str, str]
+    taken: Sequence[str]
+
+    @property
+    def demand(self) -> DesignDemand:
+        """What is asked; raises InvalidInput."""
+        return parsed(DesignDemand, {name: number(name, text) for name, text in self.fields.items()})
+
+
+def _typed(request: Request, store: Store, table: Table, skin: str | None = None) -> Typed:
+    given = {name: text for name, *_ in FIELDS if (text := request.query_params.get(name))}
+    words = {name: (said, unit) for name, said, unit, first in FIELDS if first is None and name not in given}
+    own, taken = start(store, table, skin, words)
+    fields = {name: given.get(name) or first or f"{own[name]:g}" for name, _, _, first in FIELDS}
+    return Typed(skin, fields, taken)
+
+
+TypedInQuery = Annotated[Typed, Depends(_typed)]
+
+
+@router.get("")
+def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
+    """The page."""
+    found, error = None, None
+    try:
+        with np.errstate(all="ignore"):
+            found = search(table, typed.demand)
+    except UnderskinError as refused:
+        error = in_form_words(refused, _LABELS)
+    return page(
+        request,
+        "design_search.html",
+        skin_id=typed.skin_id,
+        fields=[(name, words, unit, typed.fields[name]) for name, words, unit, _ in FIELDS],
+        taken=typed.taken,
+        error=error,
+        offers=[] if found is None else [(offer, _address(typed, offer)) for offer in found.offers],
+        binding=[] if found is None else found.binding,
+        count=0 if found is None else int(found.feasible.sum()),
+        of=0 if found is None else found.feasible.size,
+        figures=[] if found is None else [_figure(found, typed)],
+        nearly=100 * (1 - NEARLY),
+    )
+
+
+@router.get("/region.csv")
+def region_csv(table: Table, typed: TypedInQuery) -> Response:
+    """Every pair of thickness and sensor radius that was looked at."""
+    with np.errstate(all="ignore"):
+        found = search(table, typed.demand)
+    region = found.region
+    thickness, radius = np.meshgrid(region.thickness_mm, region.sensor_radius_mm)
+    columns = {
+        "thickness_mm": thickness,
+        "sensor_radius_mm": radius,
+        "largest_pitch_mm": region.largest_pitch_mm,
+        "frf_pc_per_n": region.frf_pc_per_n,
+        "feasible": found.feasible,
+    }
+    return csv_answer("region", {name: values.ravel().tolist() for name, values in columns.items()})
+
+
+def _figure(found: Searched, typed: Typed) -> Drawn:
+    from underskin.figures.design_region import Offered, design_region
+
+    region = found.region
+    offered = [Offered(one.merit, one.request.thickness_mm, one.request.sensor_radius_mm) for one in found.offers]
+    return drawn(
+        "region",
+        design_region(
+            region.thickness_mm,
+            region.sensor_radius_mm,
+            region.largest_pitch_mm,
+            region.frf_pc_per_n,
+            found.feasible,
+            offered,
+        ),
+        "Each square is a skin; its colour is the largest pitch that still resolves what is asked.",
+        f"/design/search/region.csv?{urlencode(typed.fields)}",
+    )
+
+
+def _address(typed: Typed, offer: Offer) -> str:
+    """The design view of an offer."""
+    values = offer.request.model_dump(exclude={"units_checked"})
+    skin = {} if typed.skin_id is None else {"skin": typed.skin_id}
+    return f"/design?{urlencode({**skin, **{name: f'{value:g}' for name, value in values.items()}})}"

@@ -1,0 +1,90 @@
+"""The numbers of a design: where they start and stand, and those of another that is pinned beside it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+from urllib.parse import parse_qsl, urlencode
+
+from fastapi import Depends, Request
+
+from service.dependencies import Store, Table
+from service.pages.shared.forms import number
+from service.pages.shared.skin_values import start
+from service.usecases.materials import MATERIALS
+from underskin.errors import InvalidInput, not_one_of
+
+# Field, words, unit, the slider's ends.
+SLIDERS = (
+    ("thickness_mm", "thickness h", "mm", 0.2, 20),
+    ("sensor_radius_mm", "sensor radius rT", "mm", 0.1, 10),
+    ("indenter_radius_mm", "sphere radius R", "mm", 0.5, 50),
+    ("preload_n", "force F", "N", 0.05, 50),
+    ("youngs_modulus_mpa", "Young's modulus E", "MPa", 0.1, 100),
+    ("d33_pc_per_n", "d33", "pC/N", 1, 100),
+    ("pitch_mm", "pitch of the array", "mm", 0.5, 50),
+    ("dip_percent", "dip that can be told", "%", 1, 50),
+)
+LABELS = {name: f"{words} [{unit}]" for name, words, unit, *_ in SLIDERS}
+WORDS = {name: (words, unit) for name, words, unit, *_ in SLIDERS if name != "dip_percent"}
+PIN, ACTION, MATERIAL = "pin", "do", "material"
+
+
+@dataclass(frozen=True)
+class Sliders:
+    """Where they start and stand, as they were `typed` and as numbers; the `pinned` design, where there is one, which
+    `pin` has as text; what is wrong with what was typed; `taken`: in sentences what of it, beyond what the address
+    gives, nobody declared."""
+
+    skin_id: str | None
+    own: Mapping[str, float]
+    typed: Mapping[str, str]
+    values: Mapping[str, float]
+    pin: str
+    pinned: Mapping[str, float] | None
+    error: InvalidInput | None
+    taken: Sequence[str]
+
+
+def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
+    """With the values of the address, or else those of the skin, or of the paper's prototype."""
+    given = {name: text for name, *_ in SLIDERS if (text := request.query_params.get(name))}
+    own, taken = start(store, table, skin, {name: words for name, words in WORDS.items() if name not in given})
+    own = {name: own[name] for name, *_ in SLIDERS}
+    values, error = _numbers(own, given)
+    pin = request.query_params.get(PIN, "")
+    pinned, wrong = _numbers(own, dict(parse_qsl(pin))) if pin else (None, None)
+    typed = {name: given.get(name) or f"{own[name]:g}" for name, *_ in SLIDERS}
+    return Sliders(skin, own, typed, values, pin, pinned, error or wrong, taken)
+
+
+SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
+
+
+def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[str, float], InvalidInput | None]:
+    values, error = dict(own), None
+    for name in own:
+        try:
+            values[name] = number(name, given[name]) if name in given else own[name]
+        except InvalidInput as wrong:
+            error = error or wrong
+    return values, error
+
+
+def after_action(request: Request, sliders: Sliders) -> str | None:
+    """Where a button of the form leads: what stands pinned, or no more, or the value of a material taken; None where
+    none was pressed. Raises InvalidInput for an unknown material."""
+    action, material = (request.query_params.get(name) for name in (ACTION, MATERIAL))
+    if action is None and material is None:
+        return None
+    typed, pin = dict(sliders.typed), sliders.pin
+    if action == "pin":
+        pin = urlencode(typed)
+    elif action == "unpin":
+        pin = ""
+    if material is not None:
+        if material not in MATERIALS:
+            raise not_one_of(MATERIAL, material, MATERIALS)
+        taken = MATERIALS[material]
+        typed[taken.field] = f"{taken.value:g}"
+    skin = {} if sliders.skin_id is None else {"skin": sliders.skin_id}
+    return f"/design?{urlencode({**skin, **typed, **({PIN: pin} if pin else {})})}"

@@ -1,0 +1,104 @@
+"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve."""
+
+from collections.abc import Sequence
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from underskin.figures.law_effect import EffectPanel, LawEffect
+from underskin.figures.style import COLOURS, GRID, INK
+from underskin.units import Floats
+
+WIDTH, HEIGHT = 440, 400
+_LEFT, _RIGHT, _PANEL, _GAP, _TOP = 62, 22, 122, 30, 18
+_DASHES = ("7 4", "", "2 3")  # weak, usual, strong
+_BASE = "#6b7680"
+_FONT = 'font-family="system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif" font-size="12"'
+_QUIET = "#55626f"
+
+
+def picture(name: str, effect: LawEffect) -> str:
+    """The panels one above the other, below them the lines with the strengths that they have."""
+    parts = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" {_FONT} fill="{INK}">',
+        f"<title>{escape(name)}</title>",
+        f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="#fff"/>',
+    ]
+    along = _scaled(_axis(effect.x, effect), _LEFT, WIDTH - _RIGHT)
+    for number, panel in enumerate(effect.panels):
+        parts += _panel(effect, panel, along, _TOP + number * (_PANEL + _GAP), last=number == len(effect.panels) - 1)
+    rows = [("without it", "", _BASE, "1 3")]
+    rows += [
+        (f"{words}:", change, colour, dash)
+        for words, change, (colour, dash) in zip(effect.strengths, effect.changes, _lines(effect), strict=True)
+    ]
+    for number, (words, change, colour, dash) in enumerate(rows):
+        y = _TOP + 2 * (_PANEL + _GAP) + 20 + 17 * number
+        parts.append(f'<path d="M8 {y - 4}h34" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>')
+        parts.append(f'<text x="50" y="{y}">{escape(words)} <tspan fill="{_QUIET}">{escape(change)}</tspan></text>')
+    return "\n".join([*parts, "</svg>\n"])
+
+
+def _lines(effect: LawEffect) -> list[tuple[str, str]]:
+    """Colour and dashes of each strength; of a single one, those of the usual one."""
+    count = len(effect.strengths)
+    places = range(count) if count > 1 else (1,)
+    return [(COLOURS[place], _DASHES[place]) for place in places]
+
+
+def _panel(effect: LawEffect, panel: EffectPanel, along: Floats, top: float, *, last: bool) -> list[str]:
+    low, high = _range([panel.base, *panel.curves])
+    bottom = top + _PANEL
+    parts = [f'<text x="{_LEFT}" y="{top - 6}">{escape(panel.title)}</text>']
+    for tick in _ticks(low, high):
+        y = bottom - (tick - low) / (high - low) * _PANEL
+        parts.append(f'<path d="M{_LEFT} {y:.1f}H{WIDTH - _RIGHT}" stroke="{GRID}"/>')
+        parts.append(f'<text x="{_LEFT - 6}" y="{y + 4:.1f}" text-anchor="end" fill="{_QUIET}">{_number(tick)}</text>')
+    ticks = (1.0, 10.0, 100.0, 1000.0) if effect.logarithmic else _ticks(float(effect.x.min()), float(effect.x.max()))
+    ends = _axis(effect.x, effect)
+    for value in ticks:
+        place = float(np.log10(value)) if effect.logarithmic else value
+        x = _LEFT + (place - ends.min()) / (ends.max() - ends.min()) * (WIDTH - _LEFT - _RIGHT)
+        parts.append(f'<path d="M{x:.1f} {top}v{_PANEL}" stroke="{GRID}"/>')
+        if last:
+            parts.append(
+                f'<text x="{x:.1f}" y="{bottom + 15}" text-anchor="middle" fill="{_QUIET}">{_number(value)}</text>'
+            )
+    if last:
+        middle = (_LEFT + WIDTH - _RIGHT) / 2
+        parts.append(f'<text x="{middle}" y="{bottom + 29}" text-anchor="middle">{escape(effect.axis)}</text>')
+    drawn = [(panel.base, _BASE, "1 3"), *((c, *line) for c, line in zip(panel.curves, _lines(effect), strict=True))]
+    for values, colour, dash in drawn:
+        down = bottom - (values - low) / (high - low) * _PANEL
+        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(along.tolist(), down.tolist(), strict=True))
+        dashes = f' stroke-dasharray="{dash}"' if dash else ""
+        parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.8"{dashes}/>')
+    return parts
+
+
+def _axis(x: Floats, effect: LawEffect) -> Floats:
+    return np.asarray(np.log10(x)) if effect.logarithmic else x
+
+
+def _scaled(values: Floats, low: float, high: float) -> Floats:
+    span = float(values.max() - values.min())
+    return np.asarray(low + (values - values.min()) / span * (high - low))
+
+
+def _range(curves: Sequence[Floats]) -> tuple[float, float]:
+    """What all curves fill, with an edge; no less than a hundredth of their size, or 1, so that nothing looks so."""
+    low, high = float(np.min(curves)), float(np.max(curves))
+    half = max((high - low) / 2 * 1.08, 0.01 * max(abs(low), abs(high)), 1e-6)
+    half = max(half, 1.0) if max(abs(low), abs(high)) < 1e-6 else half
+    return (low + high) / 2 - half, (low + high) / 2 + half
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Three to six round numbers."""
+    step = 10 ** np.floor(np.log10((high - low) / 3))
+    step = next(step * factor for factor in (1, 2, 5, 10) if (high - low) / (step * factor) <= 5)
+    return [float(round(step * k, 10)) for k in range(int(np.ceil(low / step)), int(np.floor(high / step)) + 1)]
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}".replace("-", "−")

@@ -1,0 +1,209 @@
+"""Which skins resolve what is asked: thickness, sensor radius and pitch, searched over the domain of the table.
+
+Resolution is the two-point separation of `POST /v1/design`: the distance from which on two equal contacts show as two
+wherever the row of sensors lies. A thin layer spreads the stress less, and a fine pitch samples it more densely; a
+sensor cannot be wider than the pitch, and two contacts cannot be nearer than where they touch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
+from service.usecases.design import design_answer, design_of
+from service.usecases.two_point import largest_pitch
+from underskin import Indenter, Skin
+from underskin.prediction.pressed_skin import transmission
+from underskin.surrogate.off_centre_sigma import sigma_beside
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, Mask, checked, to_lab, to_si
+
+THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
+_THICKNESSES, _RADII = 10, 6
+NEARLY = 0.95  # of the largest pitch: nearly as few sensors
+_INSIDE = 1.0001  # times the thinnest layer of the table
+_CANDIDATES = 3  # of each merit that are calculated in full
+_FINER, _TIMES = 0.99, 12  # by how much and how often a pitch is reduced until the full calculation agrees
+
+
+@dataclass(frozen=True)
+class Region:
+    """Contact radius [mm], thicknesses (n,) and sensor radii (m,) [mm]; of each pair (m, n) the largest pitch [mm] that
+    resolves what is asked, NaN where none does, and charge over force [pC/N], NaN outside the table."""
+
+    contact_radius_mm: float
+    thickness_mm: Floats
+    sensor_radius_mm: Floats
+    largest_pitch_mm: Floats
+    frf_pc_per_n: Floats
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A design that meets the demand, by the calculation of `POST /v1/design`; `merit`: what it is best in."""
+
+    merit: str
+    request: DesignRequest
+    answer: DesignAnswer
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The region, which pairs of it meet all limits, what is offered (best first), and in sentences which limit keeps
+    everything out; none of these where something is offered."""
+
+    region: Region
+    feasible: Mask
+    offers: Sequence[Offer]
+    binding: Sequence[str]
+
+
+def search(table: SigmaTable, demand: DesignDemand) -> Searched:
+    """Every design that meets a demand, and the best; raises InvalidInput."""
+    anything = {"thinnest_mm": 0.0, "least_pitch_mm": 0.0, "least_frf_pc_per_n": 0.0}
+    region = _region(table, demand.model_copy(update=anything))
+    resolves = np.isfinite(region.largest_pitch_mm)
+    limits = _limits(region, demand)
+    feasible = resolves & np.all([limit.kept for limit in limits], axis=0)
+    offers = _offers(table, demand, region, feasible)
+    return Searched(region, feasible, offers, [] if offers else _binding(table, demand, region, resolves, limits))
+
+
+@lru_cache(maxsize=32)
+def _region(table: SigmaTable, demand: DesignDemand) -> Region:
+    """All pairs, whatever can be made."""
+    indenter = Indenter.from_lab(indenter_radius_mm=demand.indenter_radius_mm)
+    force = float(checked("preload_n", demand.preload_n))
+    d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
+    any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
+    contact = float(to_lab("contact_radius_mm", transmission(table, any_skin, indenter, force).contact_radius))
+    thinnest = max(THICKNESS_MM[0], _INSIDE * contact / table.domain["a_over_h"][1])
+    thickness = _steps(thinnest, max(1.2 * demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
+    radii = _steps(RADIUS_MM[0], max(0.3 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
+    h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
+    skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
+    reached = transmission(table, skin, indenter, force)
+    pitch = np.full(h.shape, np.nan)
+    distance = float(to_si("x_mm", demand.resolution_mm))
+    if demand.resolution_mm >= 2 * contact:
+        for place in zip(*np.nonzero(reached.inside), strict=True):
+            point = [float(part[place]) for part in (reached.a_over_h, reached.rt_over_h, reached.load_parameter)]
+            offset, response = sigma_beside(table, *point)
+            if np.isfinite(response).all():
+                finest, dip = 2 * float(radius[place]), demand.dip_percent / 100
+                pitch[place] = largest_pitch(offset * float(h[place]), response, distance, finest, dip)
+    frf, largest = to_lab("frf_pc_per_n", reached.frf(d33)), to_lab("x_mm", pitch)
+    return Region(contact, thickness, radii, np.asarray(largest), np.asarray(frf))
+
+
+def _steps(low: float, high: float, most: float, count: int) -> Floats:
+    """Even in the logarithm, as numbers that one would write."""
+    return np.array([float(f"{value:.3g}") for value in np.geomspace(low, min(high, most), count)])
+
+
+@dataclass(frozen=True)
+class _Limit:
+    """Which pairs keep it, in words what would do without it, and the number of each pair of which that is the most."""
+
+    kept: Mask
+    words: str
+    number: Floats
+
+
+def _limits(region: Region, demand: DesignDemand) -> list[_Limit]:
+    """What can be made, and what must be seen."""
+    thickness = np.broadcast_to(region.thickness_mm, region.frf_pc_per_n.shape)
+    return [
+        _Limit(
+            thickness >= demand.thinnest_mm,
+            "The thinnest layer that can be made: the layer may be {:.3g} mm thick at most",
+            thickness,
+        ),
+        _Limit(
+            region.largest_pitch_mm >= demand.least_pitch_mm,
+            "The smallest pitch that can be made: the pitch may be {:.3g} mm at most",
+            region.largest_pitch_mm,
+        ),
+        _Limit(
+            region.frf_pc_per_n >= demand.least_frf_pc_per_n,
+            "The least charge over force: it is {:.3g} pC/N at most",
+            region.frf_pc_per_n,
+        ),
+    ]
+
+
+def _binding(
+    table: SigmaTable, demand: DesignDemand, region: Region, resolves: Mask, limits: Sequence[_Limit]
+) -> list[str]:
+    """Which limit keeps everything out, each with the number that would do."""
+    finest = float(region.thickness_mm[0]), RADIUS_MM[0], 2 * RADIUS_MM[0]
+    if not np.isfinite(region.frf_pc_per_n).any():
+        return [f"The table of σ: {_forward(table, demand, *finest)[1].limit}"]
+    if demand.resolution_mm < 2 * region.contact_radius_mm:
+        touching = f"at this force two of them touch at {2 * region.contact_radius_mm:.3g} mm, whatever the skin"
+        return [
+            f"The contacts themselves: {touching}. A smaller sphere, less force or a stiffer layer has smaller ones"
+        ]
+    if not resolves.any():
+        apart = _forward(table, demand, *finest)[1].two_point_separation_mm
+        reached = "tells no two contacts apart" if apart is None else f"tells them apart from {apart:.3g} mm on"
+        skin = f"h {finest[0]:g} mm, rT {finest[1]:g} mm, pitch {finest[2]:g} mm"
+        return [f"The spread of the stress: even the finest skin of the search ({skin}) {reached}"]
+    told = []
+    for limit in limits:
+        others = resolves & np.all([other.kept for other in limits if other is not limit], axis=0)
+        if others.any() and not (others & limit.kept).any():
+            told.append(limit.words.format(float(limit.number[others].max())))
+    return told or ["The limits together: no one of them alone keeps every design out"]
+
+
+def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: Mask) -> list[Offer]:
+    """The best by each merit, one that is best in several once."""
+    if not feasible.any():
+        return []
+    pitch, frf, thickness = (
+        np.where(feasible, number, -np.inf)
+        for number in (region.largest_pitch_mm, region.frf_pc_per_n, region.thickness_mm)
+    )
+    # Of those with nearly the fewest sensors the strongest signal; then the others by their pitch, all below 0.
+    few = np.where(pitch >= NEARLY * pitch.max(), frf, pitch - 2 * pitch.max())
+    # Of equally thick ones the strongest signal.
+    merits = {"fewest sensors": few, "strongest signal": frf, "thickest layer": thickness + 1e-9 * frf}
+    offers: list[Offer] = []
+    for merit, value in merits.items():
+        order = [place for place in np.argsort(-value, axis=None).tolist() if feasible.flat[place]][:_CANDIDATES]
+        made = next((one for place in order if (one := _offer(table, demand, region, place, merit)) is not None), None)
+        same = [place for place, one in enumerate(offers) if made is not None and one.request == made.request]
+        if made is not None and not same:
+            offers.append(made)
+        for place in same:
+            offers[place] = replace(offers[place], merit=f"{offers[place].merit}, {merit}")
+    return offers
+
+
+def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, merit: str) -> Offer | None:
+    """One pair with a pitch at which `POST /v1/design` says that the demand is met; None where there is none nearby."""
+    row, column = np.unravel_index(place, region.largest_pitch_mm.shape)
+    thickness, radius = float(region.thickness_mm[column]), float(region.sensor_radius_mm[row])
+    pitch = float(region.largest_pitch_mm[row, column])
+    for _ in range(_TIMES):
+        pitch = float(np.floor(100 * pitch) / 100)
+        if pitch < max(2 * radius, demand.least_pitch_mm):
+            return None
+        request, answer = _forward(table, demand, thickness, radius, pitch)
+        apart = answer.two_point_separation_mm
+        if apart is not None and apart <= demand.resolution_mm:
+            return Offer(merit, request, answer)
+        pitch *= _FINER
+    return None
+
+
+def _forward(
+    table: SigmaTable, demand: DesignDemand, thickness: float, radius: float, pitch: float
+) -> tuple[DesignRequest, DesignAnswer]:
+    """What `POST /v1/design` says of one design [mm]."""
+    asked = demand.model_dump(exclude={"resolution_mm", "thinnest_mm", "least_pitch_mm", "least_frf_pc_per_n"})
+    request = DesignRequest(thickness_mm=thickness, sensor_radius_mm=radius, pitch_mm=pitch, **asked)
+    return request, design_answer(table, request, design_of(table, request))

@@ -1,0 +1,119 @@
+"""The catalogue as it is read: each mechanism with its parameters, what acts like it, where it was found, its file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+from service.schemas.mechanisms import MechanismEntry
+from service.store import Database
+from service.usecases import mechanism_files, mechanisms
+from service.usecases.mechanism_findings import FoundIn, findings
+from underskin.figures.law_effect import LawEffect, lacking, law_effect
+from underskin.figures.law_twins import Twin, law_twins
+from underskin.mechanisms import Mechanism, Parameter
+from underskin.mechanisms.declared.document import digest
+from underskin.mechanisms.declared.mechanism import DeclaredMechanism
+from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.mechanisms.unnamed.vocabulary import followed
+from underskin.surrogate.sigma_table import SigmaTable
+
+ALIKE = 0.7  # cosine from which on another mechanism is named
+_MOST_TWINS = 4
+_OTHER_AXES = {  # those that no unnamed law follows
+    "position_mm": "the place of the sphere",
+    "phase": "the phase",
+    "sample_height_mm": "the sample's height",
+    "sample_diameter_mm": "the sample's diameter",
+}
+
+
+@dataclass(frozen=True)
+class CatalogueEntry:
+    """A mechanism: `twins` act alike on the reference recordings, the most alike first, or else `nearest` comes
+    closest; `lacking`: why there is no picture of it; `file` is the document of one of the lab's own."""
+
+    entry: MechanismEntry
+    needs: str
+    axes: Sequence[str]
+    parameters: Sequence[Parameter]
+    twins: Sequence[Twin]
+    nearest: Twin | None
+    found: Sequence[FoundIn]
+    lacking: str | None
+    file: str | None
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """All entries, and how many diagnoses there are in which one could have been found."""
+
+    entries: Sequence[CatalogueEntry]
+    diagnoses: int
+
+
+def catalogue(store: Database, table: SigmaTable) -> Catalogue:
+    """As it is now; raises Refusal 409 as `mechanisms.catalogue`."""
+    known, listed = mechanisms.catalogue(), {entry.name: entry for entry in mechanisms.entries()}
+    alike, seen = _twins(table, digest()), findings(store)
+    return Catalogue(
+        [
+            _entry(mechanism, listed[name], alike.get(name, ()), seen.by_mechanism.get(name, ()))
+            for name, mechanism in known.items()
+        ],
+        seen.diagnoses,
+    )
+
+
+def read_ahead(store: Database, table: SigmaTable) -> None:
+    """Read what takes long at first, before somebody asks for it."""
+    mechanisms.catalogue()
+    _twins(table, digest())
+    findings(store)
+
+
+def effect(name: str, table: SigmaTable) -> LawEffect:
+    """What one does to the reference rig; raises Unsupported where that has not what it follows."""
+    return _effect(name, table, digest())
+
+
+@lru_cache(maxsize=256)
+def _effect(name: str, table: SigmaTable, _own: str) -> LawEffect:
+    return law_effect(name, table)
+
+
+@lru_cache(maxsize=4)
+def _twins(table: SigmaTable, _own: str) -> Mapping[str, tuple[Twin, ...]]:
+    return law_twins(table)
+
+
+def _entry(
+    mechanism: Mechanism, entry: MechanismEntry, alike: Sequence[Twin], found: Sequence[FoundIn]
+) -> CatalogueEntry:
+    own = isinstance(mechanism, DeclaredMechanism)
+    by_name = {
+        one.name: one for kind in mechanism.kinds for one in mechanism.parameters(reference_campaign(kind), kind)
+    }
+    return CatalogueEntry(
+        entry,
+        mechanism.needs,
+        [_axis(name) for name in mechanism.axes],
+        list(by_name.values()),
+        [replace(twin, axes=tuple(map(_axis, twin.axes))) for twin in alike if twin.alike >= ALIKE][:_MOST_TWINS],
+        alike[0] if alike else None,
+        found,
+        lacking(mechanism) if own else None,
+        _file(entry) if own else None,
+    )
+
+
+def _axis(name: str) -> str:
+    """An axis in words, a column of the lab's own by its heading."""
+    return _OTHER_AXES[name] if name in _OTHER_AXES else followed(name)
+
+
+def _file(entry: MechanismEntry) -> str:
+    """The document that a lab's own mechanism was read from."""
+    assert entry.package is not None
+    path: Path = mechanism_files.folder_of_lab() / entry.package.rsplit(" ", 1)[0]
+    return path.read_text(encoding="utf-8")

@@ -1,0 +1,84 @@
+"""Where mechanisms were found in this lab: the diagnoses, of campaigns as they are now, whose reports state them.
+
+Reports do not change once they are made, so that what each states is read once and kept by its number.
+"""
+
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from weakref import WeakKeyDictionary
+
+from sqlalchemy import Connection
+
+from service.store import Database, diagnoses
+from service.store.tables import AnyRow, campaigns
+from service.store.tables import diagnoses as rows_of_diagnoses
+
+_AT_ONCE = 50  # reports
+_lock = threading.Lock()
+_read: WeakKeyDictionary[Database, dict[int, tuple[tuple[str, float], ...]]] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True)
+class FoundIn:
+    """A diagnosis that states a mechanism with a probability (0 to 1); `name` is the campaign's, or what several are
+    called."""
+
+    diagnosis_id: str
+    campaign_id: str | None
+    skin_id: str
+    name: str
+    at: str
+    verdict: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """By the mechanism's name where it was found, the latest first; and how many diagnoses were looked at."""
+
+    by_mechanism: Mapping[str, Sequence[FoundIn]]
+    diagnoses: int
+
+
+def findings(store: Database) -> Findings:
+    """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out."""
+    latest = store.read(_latest)
+    stated = _stated(store, [row.number for row in latest])
+    found: dict[str, list[FoundIn]] = {}
+    for row in latest:
+        of_one = row.kind == "campaign"
+        for name, probability in stated[row.number]:
+            entry = FoundIn(
+                row.id,
+                row.campaign_id if of_one else None,
+                row.skin_id,
+                row.campaign_name if of_one else row.name,
+                row.ended_at,
+                row.verdict,
+                probability,
+            )
+            found.setdefault(name, []).append(entry)
+    return Findings(found, len(latest))
+
+
+def _latest(connection: Connection) -> list[AnyRow]:
+    done = (rows_of_diagnoses.c.state == "done") & (rows_of_diagnoses.c.without == "[]")
+    query = diagnoses.rows().add_columns(campaigns.c.name.label("campaign_name")).where(done)
+    latest: dict[tuple[Any, ...], AnyRow] = {}
+    for row in connection.execute(query.order_by(rows_of_diagnoses.c.number)):
+        if diagnoses.outdated(row) is None:
+            latest[row.kind, row.campaign_id if row.kind == "campaign" else row.together_sha256] = row
+    return sorted(latest.values(), key=lambda row: -row.number)
+
+
+def _stated(store: Database, numbers: Sequence[int]) -> Mapping[int, tuple[tuple[str, float], ...]]:
+    """Mechanisms with their probabilities, by the diagnosis' number; those not yet read are read a few at a time."""
+    with _lock:
+        known = _read.setdefault(store, {})
+        missing = [number for number in numbers if number not in known]
+        for start in range(0, len(missing), _AT_ONCE):
+            for number, report in store.read(diagnoses.reports_of, missing[start : start + _AT_ONCE]).items():
+                known[number] = tuple((one["name"], one["probability"]) for one in report["mechanisms"])
+        return dict(known)

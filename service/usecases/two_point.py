@@ -1,0 +1,53 @@
+"""How coarse an array may be so that it still tells two equal loads apart at a distance.
+
+The criterion is that of `underskin.prediction.skin_design`: the responses of two contacts add, and they show as two
+where a sensor between two others reads less than both, by `dip` times the reading above a sensor, wherever the row of
+sensors lies and from that distance on. Here it is evaluated on few placements and distances, to search many designs.
+"""
+
+import numpy as np
+
+from underskin.units import Floats
+
+_PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
+_DISTANCES = 16
+_STEPS = 8  # of a bisection
+
+
+def largest_pitch(offset: Floats, response: Floats, distance: float, finest: float, dip: float) -> float:
+    """The largest pitch [m], from `finest` on, at which two contacts are told apart from `distance` [m] on; NaN where
+    they are not even at `finest`.
+
+    Parameters
+    ----------
+    offset, response
+        (n,) distance of a contact from the sensor's centre [m], from 0 on, and the response there [-].
+    dip
+        Over the response above a sensor [-].
+    """
+    if finest > distance or not _told_apart(offset, response, finest, distance, dip):
+        return float("nan")
+    low, high = finest, distance
+    for _ in range(_STEPS):
+        middle = (low + high) / 2
+        if _told_apart(offset, response, middle, distance, dip):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _told_apart(offset: Floats, response: Floats, pitch: float, distance: float, dip: float) -> bool:
+    """Whether two contacts show as two at this and at every larger distance, for every placement of the row."""
+    width = 2 * float(offset[int(np.argmax(response < response[0] / 2))])
+    farthest = distance + 2 * pitch + 2 * width  # beyond it each contact is seen on its own, again and again
+    half = np.linspace(distance, farthest, _DISTANCES)[:, None, None] / 2
+    count = int(np.ceil(farthest / 2 / pitch)) + 2
+    placement = pitch * np.linspace(0, 0.5, _PLACEMENTS)
+    sensors = pitch * np.arange(-count, count + 1) + placement[:, None]
+    first, second = (np.interp(np.abs(sensors + side), offset, response, right=0.0) for side in (-half, half))
+    reading = first + second
+    from_left = np.maximum.accumulate(reading, axis=2)[:, :, :-2]
+    from_right = np.maximum.accumulate(reading[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 2:]
+    depth = np.minimum(from_left, from_right) - reading[:, :, 1:-1]
+    return bool((depth.max(axis=2) >= dip * response[0]).all())

@@ -1,0 +1,203 @@
+"""What a mechanism does to the FRF of a reference rig, or to a force curve, at three strengths, by its own law.
+
+The reference rig: h 2.5 mm, rT 1.5 mm, E 2 MPa, d33 at the centre of its prior; a sphere of 4 mm above a sensor,
+preload 1 N, dynamic force 0.3 N, held for 60 s after 10,000 load cycles; its neighbours are 4 mm away. Curves: that
+sphere pressed in by 0.4 mm, or a cylinder 30 mm wide and 15 mm high compressed by 40 %.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from underskin.mechanisms import CATALOGUE, Mechanism, Model, Parameter, compose
+from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Array, Floats, to_lab
+
+RIG = "h 2.5 mm, rT 1.5 mm, E 2 MPa, sphere of 4 mm, preload 1 N, dynamic force 0.3 N, 60 s, 10,000 cycles"
+STRENGTHS = (0.5, 1.0, 2.0)  # times the usual strength
+_WEAKER = (0.25, 0.5, 1.0)  # where twice the usual one cannot be
+_QUOTED_HZ = 30.0
+_MAINS = 50.0 * np.arange(1, 7)[:, None] + np.array([-3.0, -1.5, -0.5, 0.0, 0.5, 1.5, 3.0])
+_FREQUENCY = np.unique(np.concatenate([np.geomspace(1, 1000, 160), _MAINS.ravel()]))
+
+
+@dataclass(frozen=True)
+class EffectPanel:
+    """Curves over the common axis: of the base model, and at each strength."""
+
+    title: str
+    base: Floats
+    curves: tuple[Floats, ...]
+
+
+@dataclass(frozen=True)
+class LawEffect:
+    """The common axis, logarithmic or not; the strengths in words; two panels: magnitude [pC/N] and phase [°] of an
+    FRF, or force and its change [N] of a curve. `changes`: in words how much of the first each strength changes."""
+
+    axis: str
+    x: Floats
+    logarithmic: bool
+    strengths: tuple[str, ...]
+    panels: tuple[EffectPanel, EffectPanel]
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """Of an FRF where it is largest, 30 Hz where it is the same everywhere; of a curve at its largest force."""
+        return tuple(self._change(*pair) for pair in zip(*(panel.curves for panel in self.panels), strict=True))
+
+    def _change(self, first: Floats, second: Floats) -> str:
+        base, other = (panel.base for panel in self.panels)
+        if not self.logarithmic:
+            at = int(np.argmax(base))
+            return f"{_signed(100 * (first[at] / base[at] - 1))} % at the largest force"
+        size = np.abs(first * np.exp(1j * np.radians(second)) - base * np.exp(1j * np.radians(other)))
+        at = int(np.argmin(np.abs(self.x - _QUOTED_HZ)))
+        at = int(np.argmax(size)) if size.max() > 1.001 * size[at] else at
+        percent, degrees = 100 * (first[at] / base[at] - 1), second[at] - other[at]
+        return f"{_signed(percent)} %, {_signed(degrees)}° at {float(f'{self.x[at]:.2g}'):g} Hz"
+
+
+def _signed(value: float) -> str:
+    """To two digits; what is nothing but rounding is 0."""
+    return f"{float(f'{value:.2g}'):+g}".replace("-", "−") if abs(value) > 1e-6 else "0"
+
+
+def law_effect(name: str, table: SigmaTable) -> LawEffect:
+    """What a mechanism of the catalogue does to the reference rig.
+
+    Raises
+    ------
+    Unsupported
+        Where the rig has not what the mechanism follows, such as a temperature.
+    """
+    mechanism = CATALOGUE[name]
+    return _of_frf(mechanism, table) if "frf" in mechanism.kinds else _of_curve(mechanism, table)
+
+
+def lacking(mechanism: Mechanism) -> str | None:
+    """What the reference rig has not that the mechanism follows, in words; None where it can be drawn."""
+    kind = mechanism.kinds[0]
+    return mechanism.unsupported(reference_recordings() if kind == "frf" else reference_campaign(kind), kind)
+
+
+def strengths(parameters: Sequence[Parameter]) -> list[list[float]]:
+    """Fit coordinates of the parameters at each of three strengths; once where there is none to change."""
+    if not any(_is_strength(entry) for entry in parameters):
+        return [[usual(entry) for entry in parameters]]
+    for factors in (STRENGTHS, _WEAKER):
+        rows = [[_at(entry, factor) for entry in parameters] for factor in factors]
+        pairs = [pair for row in rows for pair in zip(parameters, row, strict=True)]
+        if all(entry.bounds[0] <= at <= entry.bounds[1] for entry, at in pairs):
+            break
+    return [[float(np.clip(at, *entry.bounds)) for entry, at in zip(parameters, row, strict=True)] for row in rows]
+
+
+def reference_recordings() -> Campaign:
+    """The reference campaign of FRFs; the last recording is the one that is drawn."""
+    campaign = reference_campaign("frf")
+    first = campaign.recordings[0]
+    assert isinstance(first, FrfRecording)
+    sensor = campaign.skin.sensors[0]
+    drawn = replace(
+        first,
+        id="drawn",
+        sensor=sensor.id,
+        indenter_radius_mm=4.0,
+        preload_n=1.0,
+        dynamic_force_n=0.3,
+        position_mm=(sensor.x_mm, sensor.y_mm),
+        load_cycles=10_000,
+        dwell_s=60.0,
+        frequency_hz=_FREQUENCY,
+        frf_re_pc_per_n=np.full(len(_FREQUENCY), 5.0),
+        frf_im_pc_per_n=np.zeros(len(_FREQUENCY)),
+    )
+    return replace(campaign, recordings=(*campaign.recordings, drawn))
+
+
+def _of_frf(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
+    campaign = reference_recordings()
+    base, with_it = compose([], campaign, table), compose([mechanism.name], campaign, table)
+    last = base.recording == len(campaign.recordings) - 1
+    nuisances = [entry.start for entry in base.parameters]
+    own = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
+    rows = strengths(own)
+    without = base.predict(np.array(nuisances)).value[last]
+    found = [_excursion(with_it, own, np.array([*row, *nuisances]), last) for row in rows]
+    magnitude, phase = (
+        EffectPanel(title, of(without), tuple(of(one) for one in found))
+        for title, of in (("magnitude, pC/N", _magnitude), ("phase, degrees", _phase))
+    )
+    return LawEffect("frequency, Hz", _FREQUENCY, True, tuple(_in_words(own, row) for row in rows), (magnitude, phase))
+
+
+def _excursion(model: Model, own: Sequence[Parameter], fit: Floats, rows: Array) -> Array:
+    """The FRF [C/N]; of what acts on the scatter alone, one standard deviation of it away."""
+    prediction = model.predict(fit)
+    value = prediction.value[rows]
+    if any(entry.acts_on == "line_variance" for entry in own):
+        return np.asarray(value + np.sqrt(prediction.pickup_variance[rows] / 2) * (1 + 1j))
+    spread = [entry.from_fit(at) for entry, at in zip(own, fit, strict=False) if entry.acts_on == "gain_spread"]
+    return np.asarray(value * np.exp(sum(spread)))
+
+
+def _magnitude(frf: Array) -> Floats:
+    return np.asarray(to_lab("frf_pc_per_n", np.abs(frf)))
+
+
+def _phase(frf: Array) -> Floats:
+    return np.asarray(np.degrees(np.angle(frf)))
+
+
+def _of_curve(mechanism: Mechanism, table: SigmaTable) -> LawEffect:
+    kind = mechanism.kinds[0]
+    campaign = reference_campaign(kind)
+    campaign = replace(campaign, recordings=campaign.recordings[1:])
+    base, with_it = compose([], campaign, table, kind), compose([mechanism.name], campaign, table, kind)
+    nuisances = [entry.start for entry in base.parameters]
+    own = with_it.parameters[: len(with_it.parameters) - len(base.parameters)]
+    rows = strengths(own)
+    without = np.asarray(base.predict(np.array(nuisances)).value)
+    found = [np.asarray(with_it.predict(np.array([*row, *nuisances])).value) for row in rows]
+    recording = campaign.recordings[0]
+    assert not isinstance(recording, FrfRecording)
+    way = recording.displacement_mm
+    panels = (
+        EffectPanel("force, N", without, tuple(found)),
+        EffectPanel("change of force, N", np.zeros_like(without), tuple(one - without for one in found)),
+    )
+    return LawEffect("displacement, mm", way, False, tuple(_in_words(own, row) for row in rows), panels)
+
+
+def _is_strength(entry: Parameter) -> bool:
+    return entry.limit is not None
+
+
+def usual(entry: Parameter) -> float:
+    """The fit coordinate at which figures have it."""
+    return entry.typical if entry.shown is None else entry.to_fit(entry.shown)
+
+
+def _at(entry: Parameter, factor: float) -> float:
+    """So many times as far from where it does nothing; the shape of a law stays."""
+    middle = usual(entry)
+    if not _is_strength(entry):
+        return middle
+    limit = None if entry.moves_covariance else entry.fit_limit
+    if limit is not None:
+        return limit + factor * (middle - limit)
+    return middle + float(np.log(factor)) * (-1 if entry.limit == np.inf else 1)
+
+
+def _in_words(parameters: Sequence[Parameter], row: Sequence[float]) -> str:
+    """The strengths with their units."""
+    told = [
+        f"{entry.name.replace('_', ' ')} {float(f'{entry.from_fit(at):.2g}'):g} {entry.unit}".removesuffix(" -")
+        for entry, at in zip(parameters, row, strict=True)
+        if _is_strength(entry)
+    ]
+    return ", ".join(told) or "with it"
