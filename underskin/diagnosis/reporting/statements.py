@@ -61,7 +61,7 @@ def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...
     if answer.explanation is None and imitating:
         return "few laws without a name would look like the leading explanation in these recordings"
     if answer.explanation is None:
-        return "a smooth deviation without a known cause explains the recordings less well, or no better though it is freer"
+        return "a smooth deviation of no known cause explains the recordings less well, or no better though it is freer"
     if leader.explanation is None:
         return "what it leaves of the misfit is not noise"
     less = leader.explanation.log_evidence - answer.explanation.log_evidence
