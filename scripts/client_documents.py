@@ -18,6 +18,7 @@ from service.ingest.skin_imports import Imported
 from service.schemas.campaign_d33 import D33
 from service.schemas.campaign_document import campaign_schemas
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, CampaignResult
+from service.schemas.changes import Change
 from service.schemas.design import DesignAnswer
 from service.schemas.diagnoses import Asked, Diagnosis, DiagnosisEntry, ModelEntry, ModelVersion
 from service.schemas.field import FieldAnswer
@@ -29,7 +30,7 @@ FOLDER = Path(__file__).parents[1] / "underskin" / "client" / "documents"
 _REF = "#/components/schemas/{model}"
 _PACKAGE = "underskin.client.documents"
 _ANSWERS: tuple[type[BaseModel], ...] = (
-    *(CampaignResult, CampaignEntry, CampaignDetail, D33, SkinEntry, SkinDetail, History, Imported),
+    *(CampaignResult, CampaignEntry, CampaignDetail, D33, SkinEntry, SkinDetail, History, Change, Imported),
     *(Asked, DiagnosisEntry, Diagnosis, ModelEntry, ModelVersion, MechanismEntry, DesignAnswer, FieldAnswer),
 )
 # Of each module of classes: what its answers are about. Its models are those of the module of this name in the service.
@@ -37,6 +38,7 @@ _MODULES = {
     "campaigns": "Campaigns: what became of them, and what they hold.",
     "campaign_d33": "d33 of a campaign's sensors, and the modulus of its elastomer.",
     "skins": "Skins, what was joined to them, and d33 over time.",
+    "changes": "What was changed of campaigns and skins.",
     "skin_imports": "What an import of a skin brought.",
     "diagnoses": "Diagnoses and adopted models.",
     "report": "The report of a diagnosis (`report/1`).",

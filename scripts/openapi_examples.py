@@ -155,6 +155,23 @@ def _campaigns(walked: Walk) -> None:
     walked.ask("skin_history", "GET", "/v1/skins/{skin_id}/history", skin_id=sent["skin_id"])
     withdrawn = {"reason": "recorded with the wrong sphere"}
     walked.ask("withdraw_campaign", "POST", f"{of_campaign}/withdraw", withdrawn, campaign_id=other["id"])
+    _annotated(walked, sent["id"], other["skin_id"])
+
+
+def _annotated(walked: Walk, campaign_id: str, skin_id: str) -> None:
+    of_campaign, of_skin = "/v1/campaigns/{campaign_id}", "/v1/skins/{skin_id}"
+    campaign = {"name": "palm 3, after the bath", "remark": "wet for a day", "tags": ["wet", "batch 7"]}
+    walked.ask("annotate_campaign", "PATCH", of_campaign, campaign, campaign_id=campaign_id)
+    skin = {"title": "left palm", "remark": None, "tags": ["silicone"]}
+    walked.ask("annotate_skin", "PATCH", of_skin, skin, skin_id=skin_id)
+    trial = {**campaigns.EXAMPLE, "name": "a trial"}
+    tried = walked.ask("", "POST", "/v1/campaigns", trial, kept=False, params={"skin": "trial"})
+    reason = {"reason": "a trial"}
+    walked.ask("discard_campaign", "POST", f"{of_campaign}/discard", reason, campaign_id=tried["id"])
+    walked.ask("discard_skin", "POST", f"{of_skin}/discard", reason, skin_id="trial")
+    walked.ask("skin_changes", "GET", f"{of_skin}/changes", skin_id="trial")
+    changes = walked.ask("campaign_changes", "GET", f"{of_campaign}/changes", campaign_id=tried["id"])["changes"]
+    walked.ask("undo_change", "POST", "/v1/changes/{change_id}/undo", change_id=changes[0]["id"])
 
 
 def _diagnoses(walked: Walk) -> None:

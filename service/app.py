@@ -21,6 +21,7 @@ from service.pages.shared.html import problem_page
 from service.pages.upload.pending_uploads import PendingUploads
 from service.routes import (
     campaigns,
+    changes,
     design,
     diagnoses,
     exports,
@@ -98,20 +99,8 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
     v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
-    for noun in (
-        sigma,
-        pressed_skin,
-        stress,
-        field,
-        design,
-        tables,
-        campaigns,
-        diagnoses,
-        exports,
-        skins,
-        models,
-        mechanisms,
-    ):
+    of_skins = (campaigns, diagnoses, exports, skins, changes, models)
+    for noun in (sigma, pressed_skin, stress, field, design, tables, *of_skins, mechanisms):
         v1.include_router(noun.router)
     for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
         api.include_router(router)

@@ -6,6 +6,7 @@ from fastapi.routing import APIRoute
 from service.pages.array import loads, pressure_map
 from service.pages.campaign import changes as campaign_changes
 from service.pages.campaign import page as campaign
+from service.pages.changes import undo
 from service.pages.compare import page as compare
 from service.pages.design import page as design
 from service.pages.design import search as design_search
@@ -24,7 +25,7 @@ from service.pages.tables import page as tables
 from service.pages.upload import page as upload
 
 _OF_SKINS = (
-    start, example, skin, skin_changes, campaign, campaign_changes, compare, fleet, diagnosis, plan, upload
+    start, example, skin, skin_changes, campaign, campaign_changes, undo, compare, fleet, diagnosis, plan, upload
 )  # fmt: skip
 _PAGES = (
     *_OF_SKINS, design, design_search, field, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets

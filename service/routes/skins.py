@@ -23,7 +23,7 @@ def listed(
 ) -> models.SkinList:
     """Those joined to another are under that one."""
     rows = store.read(skins.listed, id_contains, cursor, limit + 1)
-    page = [models.SkinEntry(id=row.id, created_at=row.created_at, campaigns=row.campaigns) for row in rows[:limit]]
+    page = [usecase.entry(row) for row in rows[:limit]]
     return models.SkinList(skins=page, next=rows[limit - 1].id if len(rows) > limit else None)
 
 

@@ -110,6 +110,9 @@ class CampaignEntry(BaseModel):
     withdrawn_at: str | None = Field(description="When it was withdrawn, UTC.")
     withdraw_reason: str | None = Field(description="Why.")
     withdrawn_from: str | None = Field(description="Name of the API key that withdrew it.")
+    discarded_at: str | None = Field(description="When it was put away as a mere trial, UTC; lists leave it out.")
+    remark: str | None = Field(description="What the lab noted of it.")
+    tags: list[str] = Field(description="Words that the lab finds it by.")
 
 
 class CampaignList(BaseModel):

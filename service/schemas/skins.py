@@ -22,6 +22,8 @@ class SkinEntry(BaseModel):
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
     campaigns: int = Field(description="How many campaigns it and the skins joined to it have, in any state.")
+    title: str | None = Field(description="What the lab calls it beside its id.")
+    tags: list[str] = Field(description="Words that the lab finds it by.")
 
 
 class SkinList(BaseModel):
@@ -36,6 +38,10 @@ class SkinDetail(BaseModel):
 
     id: str = Field(description="Its id.")
     created_at: str = Field(description="When its first campaign arrived, UTC.")
+    title: str | None = Field(description="What the lab calls it beside its id.")
+    remark: str | None = Field(description="What the lab noted of it.")
+    tags: list[str] = Field(description="Words that the lab finds it by.")
+    discarded_at: str | None = Field(description="When it was put away, UTC; lists leave it out.")
     joined: list[JoinedSkin] = Field(description="Skins that count as this one.")
     differences: list[str] = Field(
         description="What skins that count as one declare differently, in words; figures use each campaign's own.",

@@ -1,5 +1,5 @@
-"""What a lab writes to a skin or a campaign afterwards: its name, a remark, tags. And skins that hold nothing in use,
-put away: they are in no list, and everything of them can still be read.
+"""What a lab writes to a skin or a campaign afterwards: its name, a remark, tags. And skins that hold nothing in use
+and campaigns that nothing builds on, put away: they are in no list, and everything of them can still be read.
 """
 
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from sqlalchemy import Connection, func, select, update
 from service.store import campaigns as kept_campaigns
 from service.store import changes, skins
 from service.store.errors import Conflict, Missing
-from service.store.tables import campaigns
+from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses
 from service.store.tables import skins as skin_rows
 from service.store.times import now
 
@@ -41,6 +41,47 @@ def of_skin(connection: Connection, root: str, values: Mapping[str, str | None],
         before = {name: getattr(row, name) for name in after}
         connection.execute(update(skin_rows).where(skin_rows.c.id == root).values(**after))
         changes.record(connection, "annotate", root, made_from, before=before, after=after)
+
+
+def discard_campaign(connection: Connection, campaign_id: str, reason: str, made_from: str | None) -> None:
+    """Put a campaign away, withdrawn; raises Missing, or Conflict where something builds on it."""
+    row = kept_campaigns.find(connection, campaign_id, lock=True)
+    builds_on = _builds_on(connection, row)
+    if builds_on is not None:
+        raise Conflict(f"Campaign {campaign_id!r} {builds_on}.")
+    after: dict[str, str | None] = {"discarded_at": now()}
+    if row.withdrawn_at is None:
+        after |= {"withdrawn_at": after["discarded_at"], "withdraw_reason": reason, "withdrawn_from": made_from}
+    before = {name: getattr(row, name) for name in after}
+    values = {**after, "revision": campaigns.c.revision + 1}
+    connection.execute(update(campaigns).where(campaigns.c.id == campaign_id).values(**values))
+    changes.record(
+        connection,
+        "discard",
+        row.skin_id,
+        made_from,
+        campaign_id=campaign_id,
+        reason=reason,
+        before=before,
+        after=after,
+    )
+
+
+def may_be_discarded(connection: Connection, row: AnyRow) -> bool:
+    """Whether nothing builds on a campaign, and it was not put away."""
+    return _builds_on(connection, row) is None
+
+
+def _builds_on(connection: Connection, row: AnyRow) -> str | None:
+    """Why a campaign is no mere trial; None where it is."""
+    if row.discarded_at is not None:
+        return "was discarded already"
+    if row.corrects is not None or row.corrected_by is not None:
+        return "is part of a correction: withdraw it"
+    alone = select(diagnoses.c.number).where(diagnoses.c.campaign == row.number)
+    together = select(diagnosed_campaigns.c.diagnosis).where(diagnosed_campaigns.c.campaign == row.number)
+    diagnosed = any(connection.execute(query.limit(1)).first() is not None for query in (alone, together))
+    return "was diagnosed: withdraw it" if diagnosed else None
 
 
 def discard(connection: Connection, root: str, reason: str, made_from: str | None) -> None:

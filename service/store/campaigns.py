@@ -20,6 +20,7 @@ from underskin.recordings.repeats import digest
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]
 _AT_A_TIME = 8  # recordings read at once for a document
 TIME = func.coalesce(campaigns.c.recorded_at, campaigns.c.received_at)  # of recording; of arrival without one
+LISTED = campaigns.c.discarded_at.is_(None)
 CURRENT = campaigns.c.withdrawn_at.is_(None) & campaigns.c.corrected_by.is_(None)
 _IN_STATE = {
     "current": CURRENT,
@@ -89,6 +90,7 @@ def add(
     keep(connection, row, campaign.recordings, [{}] * len(campaign.recordings))
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
+        changes.record(connection, "correct", skin_id, arrival.received_from, campaign_id=campaign_id, reason=reason)
     return campaign_id, skin_id
 
 
@@ -130,7 +132,7 @@ def find(connection: Connection, campaign_id: str, *, lock: bool = False) -> Any
 
 def listed(connection: Connection, filters: CampaignFilters, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of campaigns, the latest arrival first, those that arrived before the number `before`."""
-    query = select(campaigns)
+    query = select(campaigns).where(LISTED)
     if filters.skin is not None:
         query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(filters.skin))))
     if filters.state is not None:
@@ -148,7 +150,7 @@ def listed(connection: Connection, filters: CampaignFilters, before: int | None,
 
 def by_time(connection: Connection, root: str, before: int | None, limit: int) -> Sequence[AnyRow]:
     """Rows of all campaigns of a skin, the one recorded last first, those before the campaign numbered `before`."""
-    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root)))
+    query = select(campaigns).where(campaigns.c.skin_id.in_(skins.members(root)), LISTED)
     if before is not None:
         time_before = select(TIME).where(campaigns.c.number == before).scalar_subquery()
         query = query.where((time_before > TIME) | ((time_before == TIME) & (campaigns.c.number < before)))

@@ -5,14 +5,14 @@ Rows are added and never altered; what takes a change back is a change of its ow
 
 import secrets
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 from sqlalchemy import Connection, insert, select
 
+from service.schemas.changes import Action
+from service.store.errors import Missing
 from service.store.tables import AnyRow, changes, skins
 from service.store.times import now
-
-Action = Literal["annotate", "withdraw", "exclude", "join", "discard", "undo"]
 
 
 def record(
@@ -43,6 +43,14 @@ def record(
         "undoes": undoes,
     }
     connection.execute(insert(changes), row)
+
+
+def find(connection: Connection, change_id: str) -> AnyRow:
+    """A change; raises Missing."""
+    row = connection.execute(select(changes).where(changes.c.id == change_id)).first()
+    if row is None:
+        raise Missing(f"There is no change {change_id!r}.")
+    return row
 
 
 def of_campaign(connection: Connection, campaign_id: str) -> Sequence[AnyRow]:

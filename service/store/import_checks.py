@@ -5,12 +5,13 @@ Every check raises InvalidInput, or pydantic's ValidationError, KeyError or Type
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import orjson
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from service.schemas.campaigns import RecordingResult
+from service.schemas.changes import Action
 from service.store import codec
 from service.store.skins import require_usable
 from underskin.errors import conflicting, unreadable
@@ -83,6 +84,7 @@ class CampaignRow(ImportedRow):
     withdrawn_from: Text | None = None
     remark: Remark | None = None
     tags: Text | None = None
+    discarded_at: Time | None = None
 
 
 class ExclusionRow(ImportedRow):
@@ -97,7 +99,7 @@ class ChangeRow(ImportedRow):
     """A row of changes, but for its number."""
 
     id: ChangeId
-    action: Literal["annotate", "withdraw", "exclude", "join", "discard", "undo"]
+    action: Action
     skin_id: str
     campaign_id: CampaignId | None
     recording: str | None
@@ -137,6 +139,22 @@ class PutAway(ImportedRow):
     discarded_at: Time
 
 
+class ListedCampaign(Listed):
+    """A campaign before it is put away."""
+
+    withdrawn_at: None = None
+    withdraw_reason: None = None
+    withdrawn_from: None = None
+
+
+class PutAwayCampaign(PutAway):
+    """A campaign afterwards; withdrawn with it, where it was in use."""
+
+    withdrawn_at: Time | None = None
+    withdraw_reason: Text | None = None
+    withdrawn_from: Text | None = None
+
+
 class Joining(ImportedRow):
     """A skin before it is joined to another, with all that count as it."""
 
@@ -154,6 +172,8 @@ _OF_CAMPAIGN: _Values = {
     "annotate": (OfCampaign, OfCampaign),
     "withdraw": (Nothing, Nothing),
     "exclude": (Nothing, Nothing),
+    "correct": (Nothing, Nothing),
+    "discard": (ListedCampaign, PutAwayCampaign),
 }
 
 

@@ -1,8 +1,8 @@
 """The tables of the store. What a table of an older version lacks is added by service/store/migrations.
 
 Times are text, ISO 8601 in UTC with microseconds (`2017-05-03T09:00:00.000000Z`): they sort as text on every database.
-Nothing is deleted: a campaign is withdrawn or corrected, a recording excluded, a skin joined to another or put away, a
-model withdrawn, each with who, when and why, and the rows stay.
+Nothing is deleted: a campaign is withdrawn, corrected or put away, a recording excluded, a skin joined to another or
+put away, a model withdrawn, each with who, when and why, and the rows stay.
 """
 
 from typing import Any, TypeAlias
@@ -93,6 +93,7 @@ campaigns = Table(
     Column("withdrawn_from", Text),  # name of the API key
     Column("remark", Text),
     Column("tags", Text),  # with commas between them
+    Column("discarded_at", String),  # in no list from then on; withdrawn as well
     Index("campaigns_of_skin", "skin_id", "number"),
 )
 

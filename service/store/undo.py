@@ -10,27 +10,29 @@ from service.store import campaigns as kept_campaigns
 from service.store import changes as kept
 from service.store import skins
 from service.store.diagnosed_together import has_one_of
-from service.store.errors import Conflict, Missing
+from service.store.errors import Conflict
 from service.store.skin_changes import numbers_of
-from service.store.tables import AnyRow, campaigns, changes, diagnoses, models, recordings
+from service.store.tables import AnyRow, campaigns, diagnoses, models, recordings
 from service.store.tables import skins as skin_rows
+from service.store.times import now
 
-_FIGURES = ("withdraw", "exclude", "join")  # what changes figures
+_FIGURES = ("withdraw", "exclude", "correct", "join")  # what changes figures; so does putting a campaign away
 
 
 def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:
     """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
-    change = connection.execute(select(changes).where(changes.c.id == change_id)).first()
-    if change is None:
-        raise Missing(f"There is no change {change_id!r}.")
+    change = kept.find(connection, change_id)
     if change.campaign_id is not None:  # before the skin, as all that change a campaign
         kept_campaigns.find(connection, change.campaign_id, lock=True)
     members = skins.members(skins.require_root(connection, change.skin_id))
     skins.lock(connection, connection.execute(members).scalars().all())
-    why_not = standing(connection, change, _of_same(connection, change))
+    why_not = standing(connection, change, of_same(connection, change))
     if why_not is not None:
         raise Conflict(f"This cannot be undone: {why_not}.")
-    _TAKE_BACK[change.action](connection, change)
+    if change.action == "correct":
+        _uncorrect(connection, change, made_from)
+    else:
+        _TAKE_BACK[change.action](connection, change)
     kept.record(
         connection,
         "undo",
@@ -59,10 +61,11 @@ def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) 
         return "a later change builds on it"
     if change.action == "join" and not _joined_still(connection, change):
         return "the skins were joined otherwise since"
-    return _built_since(connection, change) if change.action in _FIGURES else None
+    return _built_since(connection, change) if _of_figures(change) else None
 
 
-def _of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
+def of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
+    """All changes of its campaign, or of its skin itself, the latest first."""
     if change.campaign_id is not None:
         return kept.of_campaign(connection, change.campaign_id)
     return kept.of_skin(connection, skins.require_root(connection, change.skin_id))
@@ -70,9 +73,13 @@ def _of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
 
 def _stacks(change: AnyRow, other: AnyRow) -> bool:
     """Whether a later change of the same rests on the earlier one."""
-    if other.action == "undo" or (change.action in _FIGURES) != (other.action in _FIGURES):
+    if other.action == "undo" or _of_figures(change) != _of_figures(other):
         return False
-    return change.action in _FIGURES or other.skin_id == change.skin_id
+    return _of_figures(change) or other.skin_id == change.skin_id
+
+
+def _of_figures(change: AnyRow) -> bool:
+    return change.action in _FIGURES or (change.action == "discard" and change.campaign_id is not None)
 
 
 def _joined_still(connection: Connection, change: AnyRow) -> bool:
@@ -111,6 +118,18 @@ def _include(connection: Connection, change: AnyRow) -> None:
     _campaign(connection, change, excluded=campaigns.c.excluded - 1, revision=campaigns.c.revision + 1)
 
 
+def _uncorrect(connection: Connection, change: AnyRow, made_from: str | None) -> None:
+    """Use the campaign again that was corrected, and withdraw the one that took its place."""
+    newer = kept_campaigns.find(connection, change.campaign_id)
+    older = kept_campaigns.find(connection, newer.corrects, lock=True)
+    raised = campaigns.c.revision + 1
+    withdrawn = {"withdrawn_at": now(), "withdrawn_from": made_from, "withdraw_reason": "the correction was undone"}
+    _campaign(connection, change, **withdrawn, revision=raised)
+    again = update(campaigns).where(campaigns.c.number == older.number)
+    connection.execute(again.values(corrected_by=None, revision=raised))
+    skins.bring_back(connection, skins.require_root(connection, older.skin_id))
+
+
 def _part(connection: Connection, change: AnyRow) -> None:
     """Let the skin that was joined, and those that counted as it, count for themselves again."""
     other, members = change.before["skin_id"], change.before["members"]
@@ -121,7 +140,10 @@ def _part(connection: Connection, change: AnyRow) -> None:
 
 
 def _as_before(connection: Connection, change: AnyRow) -> None:
-    if change.campaign_id is not None:
+    if change.action == "discard" and change.campaign_id is not None:
+        _campaign(connection, change, **change.before, revision=campaigns.c.revision + 1)
+        skins.bring_back(connection, skins.require_root(connection, change.skin_id))
+    elif change.campaign_id is not None:
         _campaign(connection, change, **change.before)
     else:
         connection.execute(update(skin_rows).where(skin_rows.c.id == change.skin_id).values(**change.before))

@@ -9,7 +9,7 @@ from sqlalchemy import Connection
 
 from service.schemas.campaigns import CampaignDetail, CampaignEntry, RecordingEntry, RecordingResult
 from service.store import AnyRow, Database, campaigns, codec, undo
-from service.usecases import d33_cache
+from service.usecases import annotations, d33_cache
 from underskin.recordings.campaign import to_dict
 from underskin.recordings.readers import hdf5_file
 from underskin.surrogate.sigma_table import SigmaTable
@@ -17,8 +17,9 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 def entry(row: AnyRow) -> dict[str, Any]:
     """The fields of CampaignEntry from a row of the store."""
-    names = set(CampaignEntry.model_fields) - {"state", "file"}
-    return {name: getattr(row, name) for name in names} | {"state": campaigns.state(row), "file": row.source}
+    names = set(CampaignEntry.model_fields) - {"state", "file", "tags"}
+    told = {"state": campaigns.state(row), "file": row.source, "tags": annotations.words(row.tags)}
+    return {name: getattr(row, name) for name in names} | told
 
 
 def detail(connection: Connection, campaign_id: str) -> CampaignDetail:
@@ -46,7 +47,8 @@ def take_back(store: Database, table: SigmaTable, change_id: str, made_from: str
     """Undo a change, and compute d33 anew where it changes figures; raises Missing, Conflict."""
     change = store.write(undo.undo, change_id, made_from)
     if change.campaign_id is not None and change.action != "annotate":
-        d33_cache.derive(store, table, [change.campaign_id])
+        corrected = store.read(campaigns.find, change.campaign_id).corrects if change.action == "correct" else None
+        d33_cache.derive(store, table, [name for name in (change.campaign_id, corrected) if name is not None])
 
 
 def json_parts(store: Database, row: AnyRow) -> Iterator[bytes]:

@@ -1,53 +1,46 @@
 """What was changed of a skin or a campaign, in words: who, when, why, and whether it can be undone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
+from service.schemas.changes import Change
 from service.store import AnyRow, changes, undo
 
 _MOST = 20  # the latest, of which it is said whether they can be undone
 _NAMES = ("name", "title")
+_DONE = {"withdraw": "withdrawn", "discard": "discarded", "correct": "put in the place of another campaign"}
+_KEPT = set(Change.model_fields) - {"statement", "undone", "may_be_undone"}
 
 
-@dataclass(frozen=True)
-class ShownChange:
-    """A change in words; `undone`: by a later one."""
-
-    id: str
-    words: str
-    at: str
-    made_from: str | None
-    reason: str | None
-    undone: bool
-    may_be_undone: bool
-
-
-def of_campaign(connection: Connection, campaign_id: str) -> list[ShownChange]:
+def of_campaign(connection: Connection, campaign_id: str) -> list[Change]:
     """The latest changes of a campaign and of its recordings."""
     return _shown(connection, changes.of_campaign(connection, campaign_id))
 
 
-def of_skin(connection: Connection, root: str) -> list[ShownChange]:
+def of_skin(connection: Connection, root: str) -> list[Change]:
     """The latest changes of a skin itself."""
     return _shown(connection, changes.of_skin(connection, root))
 
 
-def _shown(connection: Connection, rows: Sequence[AnyRow]) -> list[ShownChange]:
+def one(connection: Connection, change_id: str) -> Change:
+    """A change by its id; raises Missing."""
+    row = changes.find(connection, change_id)
+    rows = undo.of_same(connection, row)
+    return next(change for change in _shown(connection, rows, len(rows)) if change.id == change_id)
+
+
+def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) -> list[Change]:
     by_id = {row.id: row for row in rows}
     undone = {row.undoes for row in rows}
     return [
-        ShownChange(
-            row.id,
-            f"undone: {_words(by_id[row.undoes])}" if row.undoes in by_id else _words(row),
-            row.at,
-            row.made_from,
-            row.reason,
-            row.id in undone,
-            undo.standing(connection, row, rows) is None,
+        Change(
+            **{name: getattr(row, name) for name in _KEPT},
+            statement=f"undone: {_words(by_id[row.undoes])}" if row.undoes in by_id else _words(row),
+            undone=row.id in undone,
+            may_be_undone=undo.standing(connection, row, rows) is None,
         )
-        for row in rows[:_MOST]
+        for row in rows[:most]
     ]
 
 
@@ -58,6 +51,6 @@ def _words(row: AnyRow) -> str:
     if row.action == "join":
         return f"skin {row.before['skin_id']} joined"
     if row.action != "annotate":
-        return {"withdraw": "withdrawn", "discard": "discarded"}.get(row.action, row.action)
+        return _DONE.get(row.action, row.action)
     renamed = [f"renamed from “{row.before[name] or row.skin_id}”" for name in _NAMES if name in row.before]
     return ", ".join(renamed + [f"{name} changed" for name in ("remark", "tags") if name in row.before])

@@ -12,7 +12,7 @@ from service.problems import Refusal
 from service.schemas import skins as models
 from service.schemas.skins import SkinDetail
 from service.store import AnyRow, Database, Missing, campaigns, inversions, skins
-from service.usecases import adopted_models, d33_cache
+from service.usecases import adopted_models, annotations, d33_cache
 from underskin import InvalidInput
 from underskin.errors import conflicting
 from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
@@ -38,6 +38,12 @@ def join(store: Database, skin_id: str, other: str, reason: str, joined_from: st
         skins.join(connection, skin_id, other, reason, joined_from)
 
 
+def entry(row: AnyRow) -> models.SkinEntry:
+    """A row of a list of skins."""
+    tags = annotations.words(row.tags)
+    return models.SkinEntry(id=row.id, created_at=row.created_at, campaigns=row.campaigns, title=row.title, tags=tags)
+
+
 def detail(connection: Connection, skin_id: str) -> SkinDetail:
     """A skin and those joined to it; of a joined one, the skin that it counts as. Raises Missing."""
     row = skins.find(connection, skins.require_root(connection, skin_id))
@@ -47,6 +53,10 @@ def detail(connection: Connection, skin_id: str) -> SkinDetail:
     return SkinDetail(
         id=row.id,
         created_at=row.created_at,
+        title=row.title,
+        remark=row.remark,
+        tags=annotations.words(row.tags),
+        discarded_at=row.discarded_at,
         joined=[joined(other) for other in others],
         differences=differences(connection, [row.id, *(other.id for other in others)]),
         rig=None if rig is None else orjson.loads(rig),
@@ -195,6 +205,8 @@ def _left_out(
 ) -> tuple[list[models.LeftOutCampaign], list[models.LeftOutRecording]]:
     whole, single = [], []
     for row in campaigns.of_skin(connection, root):
+        if row.discarded_at is not None:
+            continue
         if row.id in repeated and row.id not in used:
             repeat = repeated[row.id]
             whole.append(models.LeftOutCampaign(campaign_id=row.id, reason=repeat.words, repeats=repeat.campaign_id))

@@ -91,6 +91,25 @@ def test_the_residual_is_what_was_measured_less_what_is_predicted(sticky: Shown,
     assert (most > 5 * NOISE_N) == (which == "before")
 
 
+def test_only_the_true_law_leaves_its_residuals_on_the_noise_s_band(sticky: Shown) -> None:
+    inside: dict[str, list[bool]] = {"before": [], "after": []}
+    for curve in sticky.curves:
+        for which, told in inside.items():
+            depth, left = in_lab_units(sticky.figure, curve.name, f"residual {which}")
+            turn = int(depth.argmax())
+            for way, own in (("in", slice(None, turn + 1)), ("back", slice(turn + 1, None))):
+                place, high = in_lab_units(sticky.figure, curve.name, f"noise {way} {which} high")
+                low = in_lab_units(sticky.figure, curve.name, f"noise {way} {which} low")[1]
+                np.testing.assert_array_equal(low, -high)
+                assert (np.diff(place) >= 0).all()  # the area is filled in one direction
+                told += list(np.abs(left[own]) <= np.interp(depth[own], place, high))
+    assert len(inside["after"]) > 100
+    assert np.mean(inside["after"]) > 0.9
+    assert np.mean(inside["before"]) < 0.5
+    shown_once = [trace for trace in sticky.figure.data if trace.visible and trace.showlegend and "noise" in trace.name]
+    assert len(shown_once) == 1
+
+
 @pytest.mark.parametrize("recording", ["c01", "c02"])
 def test_marks_stand_where_contact_begins_and_where_it_jumps(sticky: Shown, recording: str) -> None:
     document, truth = adhesive_curves()
@@ -158,7 +177,7 @@ def test_one_recording_is_seen_at_a_time_the_worst_explained_first(sticky: Shown
 def test_the_figure_of_many_long_recordings_stays_small(sticky: Shown) -> None:
     curve = sticky.curves[0]
     many = [replace(curve, name=f"recording {number}") for number in range(40)]
-    assert len(curve_figure(many, "indentation", "Hertz's law", "adhesion").to_json()) < 300_000
+    assert len(curve_figure(many, "indentation", "Hertz's law", "adhesion").to_json()) < 400_000
 
 
 def test_names_reach_plotly_as_text(sticky: Shown) -> None:
@@ -176,7 +195,10 @@ def test_names_reach_plotly_as_text(sticky: Shown) -> None:
 
 def test_a_compression_has_no_jumps_and_one_model_where_nothing_is_added() -> None:
     figure = shown(compression_campaign(), "compression").figure
-    assert {trace.meta["shows"] for trace in figure.data} == {"measured", "after", "residual after", "contact point"}
+    band = {f"noise {way} after {edge}" for way in ("in", "back") for edge in ("low", "high")}
+    assert {trace.meta["shows"] for trace in figure.data} == {
+        "measured", "after", "residual after", "contact point", *band
+    }  # fmt: skip
     assert figure.layout.xaxis2.title.text == "displacement from the contact point [mm]"
     assert figure.layout.title.text == "Force against displacement"
 

@@ -61,8 +61,11 @@ def test_a_report_without_an_answer_says_what_is_lacking() -> None:
 
 
 def test_figures_stand_where_they_belong_and_are_not_escaped() -> None:
-    shown = body_of(EMPTY, {"where": '<div id="figure-where"></div>'})
-    assert shown.index("Nothing was located") < shown.index('<div id="figure-where"></div>')
+    names = ("frf", "where", "explanations", "parameters")
+    shown = body_of(EMPTY, {name: f'<div id="{name}"></div>' for name in names})
+    places = [shown.index(f'<div id="{name}"></div>') for name in names]
+    assert places == sorted(places)
+    assert places[2] < shown.index("<h2>Where</h2>") < shown.index("<h2>What</h2>") < places[3]
 
 
 def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:

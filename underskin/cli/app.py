@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from underskin.cli import changes, diagnose, field, mechanism, other_packages, store, stored, stress, watch
+from underskin.cli import annotations, changes, diagnose, field, mechanism, other_packages, store, stored, stress, watch
 from underskin.cli.rigs import EstimatorOption, RigOption
 from underskin.errors import UnderskinError
 
@@ -221,6 +221,10 @@ for _command in (
     changes.correct,
     changes.join,
     changes.adopt,
+    annotations.annotate,
+    annotations.discard,
+    annotations.changes,
+    annotations.undo,
     watch.watch,
 ):
     app.command(no_args_is_help=True)(_command)

@@ -18,6 +18,7 @@ from underskin.client.content_key import label_of
 from underskin.client.counted_file import CountedFile
 from underskin.client.documents.campaign_d33 import D33
 from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
+from underskin.client.documents.changes import Change
 from underskin.client.documents.diagnoses import Asked, ModelEntry, ModelVersion
 from underskin.client.documents.document import Document
 from underskin.client.documents.skin_imports import Imported
@@ -162,6 +163,18 @@ class Campaigns:
         body = {"recording": recording, "reason": reason}
         return CampaignDetail.of(self._session.json("POST", _path(campaign_id, "exclusions"), json=body))
 
+    def annotate(self, campaign_id: str, **fields: str | Sequence[str] | None) -> CampaignDetail:
+        """Rename a campaign or change its notes or tags: `name`, `remark`, `tags`; what is not given stays."""
+        return CampaignDetail.of(self._session.json("PATCH", _path(campaign_id), json=fields))
+
+    def discard(self, campaign_id: str, reason: str) -> CampaignDetail:
+        """Put a trial that nothing builds on away: withdrawn and in no list; it can still be read."""
+        return CampaignDetail.of(self._session.json("POST", _path(campaign_id, "discard"), json={"reason": reason}))
+
+    def changes(self, campaign_id: str) -> list[Change]:
+        """What was changed of a campaign, the latest first; `client.undo` takes a change back."""
+        return list(map(Change.of, self._session.json("GET", _path(campaign_id, "changes"))["changes"]))
+
 
 class Skins:
     """Skins: list, join, d33 over time, campaigns diagnosed together, adopted models, export."""
@@ -181,6 +194,18 @@ class Skins:
         """Count the skin `other` as `skin_id` from now on."""
         body = {"skin_id": other, "reason": reason}
         return SkinDetail.of(self._session.json("POST", _skin(skin_id, "join"), json=body))
+
+    def annotate(self, skin_id: str, **fields: str | Sequence[str] | None) -> SkinDetail:
+        """Name a skin or change its notes or tags: `title`, `remark`, `tags`; what is not given stays."""
+        return SkinDetail.of(self._session.json("PATCH", _skin(skin_id), json=fields))
+
+    def discard(self, skin_id: str, reason: str) -> SkinDetail:
+        """Put a skin without campaigns in use away: in no list until a campaign arrives for it."""
+        return SkinDetail.of(self._session.json("POST", _skin(skin_id, "discard"), json={"reason": reason}))
+
+    def changes(self, skin_id: str) -> list[Change]:
+        """What was changed of a skin itself, the latest first; `client.undo` takes a change back."""
+        return list(map(Change.of, self._session.json("GET", _skin(skin_id, "changes"))["changes"]))
 
     def history(self, skin_id: str, *, model: ModelName = "paper") -> History:
         """d33 of each sensor over time, its trend, and what is left out."""

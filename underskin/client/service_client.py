@@ -24,10 +24,11 @@ from numpy.typing import ArrayLike
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
 from underskin.client.diagnoses import Diagnoses
+from underskin.client.documents.changes import Change
 from underskin.client.documents.design import DesignAnswer
 from underskin.client.documents.field import FieldAnswer
 from underskin.client.fleets import Fleets
-from underskin.client.http_session import Session
+from underskin.client.http_session import Session, path_of
 from underskin.client.mechanisms import Mechanisms
 from underskin.units import Floats
 
@@ -144,6 +145,11 @@ class Client:
             answers.TableEntry(**{**entry, "axes": tuple(answers.TableAxis(**axis) for axis in entry["axes"])})
             for entry in document["tables"]
         )
+
+    def undo(self, change_id: str) -> Change:
+        """Take a change back that `client.campaigns.changes` or `client.skins.changes` lists, unless something builds
+        on it."""
+        return Change.of(self._request("POST", path_of("changes", change_id, "undo")))
 
     def health(self) -> str:
         """`ok` while the process answers; needs no key."""

@@ -28,7 +28,8 @@ class Quantity:
     `against`: `others` greys what does not differ from the others beyond chance, and the colours reach at least as far
     as chance does; `zero` the same from 0, with 0 in the middle of the colours; `nothing` colours from 0 upwards, or
     between `ends`, which several maps may have in common. `differing`: which sensors differ, where a test of its own
-    has told, as that of a trend does.
+    has told, as that of a trend does. `intervals`: each sensor's own of 95 %; without them 1.96 uncertainties to each
+    side are told.
     """
 
     name: str
@@ -36,6 +37,7 @@ class Quantity:
     against: Literal["others", "zero", "nothing"] = "others"
     ends: tuple[float, float] | None = None
     differing: tuple[bool, ...] | None = None
+    intervals: tuple[tuple[float | None, float | None], ...] | None = None
 
 
 D33 = Quantity("d33", "pC/N")
@@ -77,7 +79,12 @@ def array_map(
                 name=_names(quantity)[name],
                 text=[_id(sensors[row]) for row in rows],
                 textfont={"size": 12 if len(sensors) <= 16 else 9, "color": [_ink(colours[row]) for row in rows]},
-                customdata=[_told(sensors[row], reasons[row], value[row], uncertainty[row], quantity) for row in rows],
+                customdata=[
+                    _told(
+                        sensors[row], reasons[row], value[row], _interval(row, value, uncertainty, quantity), quantity
+                    )
+                    for row in rows
+                ],
                 hovertemplate="%{customdata}<br>x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
                 # In the middle of its disc, in the disc's colour: it carries the colours' scale and the legend.
                 marker={
@@ -170,16 +177,24 @@ def _id(name: str) -> str:
     return label(name if len(name) <= _LONGEST_ID else name[: _LONGEST_ID - 1] + "…")
 
 
-def _told(name: str, reason: str, value: float, uncertainty: float, quantity: Quantity) -> str:
+def _interval(row: int, value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[float, float] | None:
+    """Of 95 %; None where it is not known."""
+    if quantity.against == "nothing" or not np.isfinite(uncertainty[row]):
+        return None
+    if quantity.intervals is not None:
+        low, high = quantity.intervals[row]
+        return None if low is None or high is None else (low, high)
+    half = SDS_OF_95 * uncertainty[row]
+    return value[row] - half, value[row] + half
+
+
+def _told(name: str, reason: str, value: float, interval: tuple[float, float] | None, quantity: Quantity) -> str:
     """What is said of a sensor under the pointer."""
     text = f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)
     if not np.isfinite(value):
         return f"{text}<br>{quantity.name} not known"
     text += f"<br>{quantity.name} {value:.5g} {quantity.unit}"
-    if quantity.against == "nothing" or not np.isfinite(uncertainty):
-        return text
-    half = SDS_OF_95 * uncertainty
-    return f"{text}<br>95 %: {value - half:.4g} to {value + half:.4g}"
+    return text if interval is None else f"{text}<br>95 %: {interval[0]:.4g} to {interval[1]:.4g}"
 
 
 def _ink(colour: str) -> str:

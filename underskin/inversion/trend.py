@@ -52,6 +52,14 @@ def trend(time: ArrayLike, value: ArrayLike, uncertainty: ArrayLike) -> Trend | 
     return Trend(slope, error, float(2 * stdtr(freedom, -abs(slope / error))))
 
 
+def interval(slope: float, slope_uncertainty: float, count: int) -> tuple[float, float]:
+    """The slope's 95 % interval through `count` values, by Student's t of count − 2 degrees of freedom."""
+    from scipy.special import stdtrit
+
+    half = float(stdtrit(count - 2, 1 - SIGNIFICANT / 2)) * slope_uncertainty
+    return slope - half, slope + half
+
+
 def holm(p_values: Sequence[float]) -> list[float]:
     """The p-values adjusted for their number, in the order given (Holm 1979)."""
     order = np.argsort(p_values, kind="stable")

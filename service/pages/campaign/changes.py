@@ -1,5 +1,5 @@
-"""What is changed on the page of a campaign: its name, remark and tags, recordings excluded, the campaign withdrawn;
-and such a change taken back.
+"""What is changed on the page of a campaign: its name, remark and tags, recordings excluded, the campaign withdrawn or
+put away.
 """
 
 from collections.abc import Callable
@@ -11,9 +11,8 @@ from service.dependencies import WRITE, CampaignId, Store, Table, sender
 from service.pages.campaign.page import shown
 from service.pages.shared.forms import Form, annotated, attempted, reason, see
 from service.store import Database, annotations, campaigns
+from service.usecases import annotations as written
 from service.usecases.campaigns import exclude as exclude_recording
-from service.usecases.campaigns import take_back
-from underskin.recordings import validation
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/campaigns/{campaign_id}", dependencies=WRITE)
@@ -24,8 +23,8 @@ def annotate(request: Request, campaign_id: CampaignId, sent: Form, store: Store
     """Change name, remark and tags."""
 
     def do() -> None:
-        name = validation.name("name", sent.get("name", "").strip(), False)
-        store.write(annotations.of_campaign, campaign_id, {"name": name, **annotated(sent)}, sender(request))
+        values = {"name": written.name(sent.get("name", "")), **annotated(sent)}
+        store.write(annotations.of_campaign, campaign_id, values, sender(request))
 
     return _done(request, campaign_id, store, table, "annotate", sent, do)
 
@@ -50,14 +49,14 @@ def withdraw(request: Request, campaign_id: CampaignId, sent: Form, store: Store
     return _done(request, campaign_id, store, table, "withdraw", sent, do)
 
 
-@router.post("/undo")
-def undo(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
-    """Take a change back, while nothing builds on it."""
+@router.post("/discard")
+def discard(request: Request, campaign_id: CampaignId, sent: Form, store: Store, table: Table) -> Response:
+    """Put a trial into no list any more."""
 
     def do() -> None:
-        take_back(store, table, sent.get("change", ""), sender(request))
+        store.write(annotations.discard_campaign, campaign_id, reason(sent), sender(request))
 
-    return _done(request, campaign_id, store, table, "undo", sent, do)
+    return _done(request, campaign_id, store, table, "discard", sent, do)
 
 
 def _done(

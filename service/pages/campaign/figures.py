@@ -100,7 +100,7 @@ def _title(recording: FrfRecording, show: str) -> str:
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
     """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
-    from underskin.figures.array_map import array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     if answer["band"] is None:
         return []
@@ -114,6 +114,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
     titles = [f"{name}, sensor {sensor}" for name, sensor in zip(rows["recording"], rows["sensor"], strict=True)]
     place, chosen = f"/campaigns/{row.id}", _chosen(answer)
     chosen = f"?{chosen}" if chosen else ""
+    quantity = Quantity("d33", "pC/N", intervals=tuple(zip(low, high, strict=True)))
     return [
         drawn(
             "preload",
@@ -130,7 +131,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
         ),
         drawn(
             "map",
-            array_map(names, x_mm, y_mm, d33, uncertainty, reasons, chosen=sensor),
+            array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor),
             f"Each sensor where it lies, coloured by its d33. {told_apart(d33, uncertainty)} {CLICK}",
             f"{place}/d33.csv{chosen}",
         ),

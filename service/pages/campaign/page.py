@@ -12,7 +12,7 @@ from service.pages.shared.figures import csv_answer, csv_of_rows
 from service.pages.shared.forms import RefusedForm, in_form_words, number
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
-from service.store import Database, campaigns, diagnoses
+from service.store import Database, annotations, campaigns, diagnoses
 from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
@@ -70,6 +70,7 @@ def shown(
         latest = diagnoses.listed(connection, diagnoses.DiagnosisFilters(campaign=campaign_id), None, _MOST_DIAGNOSES)
         verdict_of = verdicts.of_rows(connection, latest)
         changed = changes.of_campaign(connection, campaign_id)
+        may_be_discarded = annotations.may_be_discarded(connection, row)
     try:
         band = _band(*typed)
         answer, numbers = d33_cache.with_numbers(store, table, row, band)
@@ -87,6 +88,7 @@ def shown(
         refused=refused,
         band_typed=typed,
         changes=changed,
+        may_be_discarded=may_be_discarded,
         row=row,
         state=campaigns.state(row),
         answer=answer,

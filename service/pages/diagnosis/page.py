@@ -36,7 +36,8 @@ _ABOUT = {
     "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
     "predicted on the band that 95 % of the noise stays in. A double click shows residuals beyond the panel.",
     "curve": "One recording with the models before and after, the worst explained one first; below, measured less "
-    "predicted. A double click shows all of the air, another one the contact.",
+    "predicted on the band that 95 % of the noise stays in. A double click shows all of the air, another one the "
+    "contact.",
     "before_after": "Each point a recording, or a part of its lines, both axes alike; the grey band holds 95 % of "
     "the noise.",
     "explanations": "What the recordings say of each explanation, the stated one on top.",

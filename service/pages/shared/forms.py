@@ -14,6 +14,7 @@ from fastapi.responses import RedirectResponse
 from service.auth import session
 from service.problems import Refusal
 from service.store import Conflict, Missing
+from service.usecases import annotations
 from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, UnderskinError, out_of_range, wrong_type
 from underskin.recordings.readers import text
 
@@ -25,7 +26,6 @@ _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma withou
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
 _TANGENTIAL = ("Fx", "Fy")
-_LONGEST_REMARK, _LONGEST_TAGS = 10_000, 500
 _LABELS = {
     "name": "Name",
     "title": "Name",
@@ -71,15 +71,8 @@ def reason(sent: dict[str, str]) -> str:
 
 
 def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:
-    """Remark and tags of a form, the tags once each with commas between them; None where empty. Raises InvalidInput."""
-    remark = sent.get("remark", "").replace("\r\n", "\n").strip()
-    tags = ", ".join(dict.fromkeys(tag for part in sent.get("tags", "").split(",") if (tag := " ".join(part.split()))))
-    for name, typed, most in (("remark", remark, _LONGEST_REMARK), ("tags", tags, _LONGEST_TAGS)):
-        if len(typed) > most or "\x00" in typed:
-            raise out_of_range(
-                name, f"{len(typed)} characters", f"must have at most {most} characters, none of them null"
-            )
-    return {"remark": remark or None, "tags": tags or None}
+    """Remark and tags of a form as they are kept, None where empty. Raises InvalidInput."""
+    return {"remark": annotations.remark(sent.get("remark")), "tags": annotations.tags([sent.get("tags", "")])}
 
 
 def see(path: str) -> RedirectResponse:

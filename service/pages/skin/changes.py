@@ -1,5 +1,5 @@
 """What is asked for and changed on the page of a skin: diagnosed together, its model withdrawn, another one joined, its
-title, remark and tags; put away; and such a change taken back.
+title, remark and tags; put away.
 """
 
 from collections.abc import Callable
@@ -15,10 +15,9 @@ from service.problems import parsed
 from service.schemas.diagnoses import AskForSkin
 from service.schemas.skins import Join
 from service.store import Database, annotations, models, skins
+from service.usecases import annotations as written
 from service.usecases import diagnoses as diagnosis_usecase
 from service.usecases import skins as usecase
-from service.usecases.campaigns import take_back
-from underskin.recordings import validation
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/skins/{skin_id}", dependencies=WRITE)
@@ -58,8 +57,7 @@ def annotate(request: Request, skin_id: SkinId, sent: Form, store: Store, table:
     """Change title, remark and tags."""
 
     def do() -> None:
-        title = sent.get("title", "").strip()
-        values = {"title": validation.name("title", title, False) if title else None, **annotated(sent)}
+        values = {"title": written.title(sent.get("title")), **annotated(sent)}
         _of_root(store, skin_id, annotations.of_skin, values, sender(request))
 
     return _done(request, skin_id, store, table, "annotate", sent, do)
@@ -73,16 +71,6 @@ def discard(request: Request, skin_id: SkinId, sent: Form, store: Store, table: 
         _of_root(store, skin_id, annotations.discard, reason(sent), sender(request))
 
     return _done(request, skin_id, store, table, "discard", sent, do)
-
-
-@router.post("/undo")
-def undo(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Table) -> Response:
-    """Take a change back, while nothing builds on it."""
-
-    def do() -> None:
-        take_back(store, table, sent.get("change", ""), sender(request))
-
-    return _done(request, skin_id, store, table, "undo", sent, do)
 
 
 def _of_root(store: Database, skin_id: str, change: Callable[..., object], *values: object) -> None:

@@ -5,8 +5,9 @@ from typing import Any, Literal
 from urllib.parse import quote
 
 from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensors_of
-from service.schemas.skins import History, SensorHistory
+from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
+from underskin.inversion.trend import interval
 
 Shown = Literal["d33", "uncertainty", "trend"]
 By = Literal["paper", "adopted"]
@@ -17,13 +18,24 @@ _QUANTITIES: dict[Shown, tuple[str, str, str, str, Literal["others", "zero", "no
     "uncertainty": ("d33_uncertainty_pc_per_n", "d33_uncertainty_pc_per_n", "uncertainty of d33", "pC/N", "nothing"),
     "trend": ("slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "trend", "pC/N a year", "zero"),
 }
+_ENDS: dict[Shown, tuple[str, str]] = {
+    "d33": ("d33_low_pc_per_n", "d33_high_pc_per_n"),
+    "trend": ("slope_low_pc_per_n_per_year", "slope_high_pc_per_n_per_year"),
+}  # columns of 95 % intervals
 _RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
 
 
 def map_rows(row: AnyRow, answer: Mapping[str, Any], history: History) -> list[dict[str, Any]]:
     """Each sensor of a campaign's answer, with its place and, where it has one, its trend."""
-    trends = {entry.sensor: entry.trend.model_dump() for entry in history.sensors if entry.trend is not None}
+    trends = {
+        entry.sensor: _trend(entry.trend, len(entry.points)) for entry in history.sensors if entry.trend is not None
+    }
     return [{**sensor, **trends.get(sensor["sensor"], {})} for sensor in sensors_of(row, answer)]
+
+
+def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:
+    low, high = interval(line.slope_pc_per_n_per_year, line.slope_uncertainty_pc_per_n_per_year, count)
+    return {**line.model_dump(), "slope_low_pc_per_n_per_year": low, "slope_high_pc_per_n_per_year": high}
 
 
 def drawn_map(
@@ -35,7 +47,9 @@ def drawn_map(
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
     significant = tuple(row.get("significant", False) for row in rows) if show == "trend" else None
-    quantity = Quantity(name, unit, against, differing=significant)
+    ends = _ENDS.get(show)
+    own = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
+    quantity = Quantity(name, unit, against, differing=significant, intervals=own)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     values, uncertainties = columns_of(rows, value, uncertainty)
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)

@@ -96,16 +96,33 @@ const seen = new IntersectionObserver(
   },
   { rootMargin: "400px" },
 );
-// On paper a figure is as wide as the sheet, whatever the window's width is.
+// On paper a figure is as wide as the sheet, whatever the window's width is; those of a report's summary share a sheet
+// with its text, and what is folded below it is unfolded.
 const SHEET = 680;
+let unfolded = [];
+function on_sheet(place) {
+  const long = document.querySelector(".report .summary.long") !== null;
+  const height = place ? (long ? 170 : 210) : (long ? 260 : 340);
+  const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
+  return { width: place ? SHEET / 2 - 5 : SHEET, height, margin, "font.size": 8 };
+}
 addEventListener("beforeprint", () => {
+  unfolded = [...document.querySelectorAll(".report details:not([open])")];
+  for (const part of unfolded) part.open = true;
+  const summary = [...document.querySelectorAll(".three .plot")];
   for (const plot of document.querySelectorAll(".plot")) {
     draw(plot);
-    Plotly.relayout(plot, { autosize: false, width: Math.min(SHEET, plot.clientWidth) });
+    const place = summary.indexOf(plot);
+    const size = place < 0 ? { width: Math.min(SHEET, plot.clientWidth) } : on_sheet(place);
+    Plotly.relayout(plot, { autosize: false, ...size });
   }
 });
 addEventListener("afterprint", () => {
-  for (const plot of document.querySelectorAll(".plot")) Plotly.relayout(plot, { autosize: true, width: null });
+  for (const part of unfolded) part.open = false;
+  for (const plot of document.querySelectorAll(".plot")) {
+    if (plot.closest(".three")) redraw(plot);
+    else Plotly.relayout(plot, { autosize: true, width: null });
+  }
 });
 
 function prepare(root) {

@@ -47,10 +47,11 @@ class Visit:
         self.page.goto(self.address + path)
 
     def drawn(self, count: int) -> None:
-        """Wait until so many figures are drawn, scrolling as a reader would."""
+        """Wait until so many figures are drawn, unfolding a report and scrolling as a reader would."""
         self.page.wait_for_function(  # a link just clicked may not have led there yet
             "n => document.readyState === 'complete' && document.querySelectorAll('.plot').length >= n", arg=count
         )
+        self.page.evaluate("document.querySelectorAll('.report .part').forEach((part) => (part.open = true))")
         for plot in self.page.locator(".plot").all():
             plot.scroll_into_view_if_needed()
         self.page.wait_for_function(

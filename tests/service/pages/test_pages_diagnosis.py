@@ -2,56 +2,24 @@
 
 import csv
 from copy import deepcopy
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import httpx
-import orjson
 import pytest
 
-from service.store import database, diagnoses
 from tests.service.pages.conftest import Visit
+from tests.service.pages.finished import Made, keep, made_of
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.adhesive_curves import adhesive_figure
-from tests.support.diagnosed import asked, resonant, sent, table
+from tests.support.diagnosed import asked, resonant, sent
 from tests.support.store_server import Server
-from underskin import __version__
-from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.figures import figures
-from underskin.diagnosis.reporting.report import report
-from underskin.recordings.campaign import parse
 
 LINES = 30
 
 
-@dataclass(frozen=True)
-class Made:
-    """What a worker would have made of `resonant`."""
-
-    report: dict[str, Any]
-    figures: dict[str, str]
-
-
 @pytest.fixture(scope="module")
 def made() -> Made:
-    found = diagnose(parse(resonant("array", lines=LINES)), table())
-    document = report(found)
-    plain = orjson.loads(orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
-    return Made(plain, {name: figure.to_json() for name, figure in figures(found, document).items()})
-
-
-def keep(server: Server, document: dict[str, Any], made: Made, skin: str) -> str:
-    """The id of a diagnosis that is done."""
-    campaign_id = sent(server, document, skin)
-    store = database(server.place.database_url, server.place.folder)
-    with store.writing() as connection:
-        basis = diagnoses.Basis(table().sha256, __version__)
-        row = diagnoses.ask(connection, campaign_id, basis, None)
-        while (claimed := diagnoses.claim(connection, "test", basis)) is not None:
-            assert diagnoses.finish(connection, claimed.number, "test", made.report, made.figures)
-    store.close()
-    return str(row.id)
+    return made_of(resonant("array", lines=LINES))
 
 
 def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server) -> None:

@@ -3,15 +3,27 @@
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import orjson
 import pytest
+from scipy import stats
 
 from service.pages.skin.figures import drawn_map, map_rows
-from service.schemas.skins import History, SensorHistory, TrendAnswer
+from service.schemas.skins import History, Point, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import SIGNIFICANT, holm, trend
 
 GREY = "#cfd4d9"
+
+
+def points(values: list[float]) -> list[Point]:
+    return [
+        Point(
+            campaign_id=f"c{year}", time=f"20{10 + year}-01-01T00:00:00Z", time_is="recorded", model="paper",
+            model_id=None, d33_pc_per_n=value, d33_uncertainty_pc_per_n=0.001,
+        )
+        for year, value in enumerate(values)
+    ]  # fmt: skip
 
 
 def history(d33: list[list[float]], uncertainty: float) -> History:
@@ -28,7 +40,7 @@ def history(d33: list[list[float]], uncertainty: float) -> History:
             p_value_adjusted=p,
             significant=p < SIGNIFICANT,
         )
-        sensors.append(SensorHistory(sensor=f"s{number}", points=[], trend=answer, no_trend=None))
+        sensors.append(SensorHistory(sensor=f"s{number}", points=points(d33[number]), trend=answer, no_trend=None))
     return History(
         skin_id="palm", joined=[], sensors=sensors, left_out_campaigns=[], left_out_points=[], left_out_recordings=[]
     )
@@ -50,3 +62,25 @@ def test_a_slope_is_coloured_where_its_trend_is_significant(d33: list[list[float
     shapes: list[dict[str, Any]] = orjson.loads(str(drawn.json))["layout"]["shapes"]
     assert [shape["fillcolor"] not in (GREY, "#ffffff") for shape in shapes] == [*coloured, False]
     assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
+
+
+@pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])
+def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_significant(
+    values: list[float],
+) -> None:
+    row = cast(
+        "AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": [{"id": "s0", "x_mm": 0, "y_mm": 0}]}})
+    )
+    of_skin = history([values], 0.001)
+    rows = map_rows(row, {"sensors": [{"sensor": "s0", "flags": []}]}, of_skin)
+    figure = orjson.loads(str(drawn_map("palm", row, rows, "trend", "paper", None).json))
+    ((told,),) = [trace["customdata"] for trace in figure["data"]]
+    low, high = (float(end) for end in told.partition("95 %: ")[2].split(" to "))
+    line = of_skin.sensors[0].trend
+    assert line is not None
+    assert (low < 0 < high) is not line.significant
+    times = np.arange(len(values), dtype=float)
+    fit = stats.linregress(times, values)
+    error = max(fit.stderr, 0.001 / np.sqrt(np.sum((times - times.mean()) ** 2)))  # scatter, or the uncertainty told
+    half = stats.t.ppf(0.975, len(values) - 2) * error
+    assert (low, high) == pytest.approx((fit.slope - half, fit.slope + half), rel=2e-3)

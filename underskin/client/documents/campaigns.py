@@ -168,6 +168,15 @@ class CampaignDetail(Document):
     withdrawn_from: str | None
     """Name of the API key that withdrew it."""
 
+    discarded_at: str | None
+    """When it was put away as a mere trial, UTC; lists leave it out."""
+
+    remark: str | None
+    """What the lab noted of it."""
+
+    tags: tuple[str, ...]
+    """Words that the lab finds it by."""
+
     skin: Skin
     """The skin as the campaign declares it."""
 
@@ -232,6 +241,15 @@ class CampaignEntry(Document):
 
     withdrawn_from: str | None
     """Name of the API key that withdrew it."""
+
+    discarded_at: str | None
+    """When it was put away as a mere trial, UTC; lists leave it out."""
+
+    remark: str | None
+    """What the lab noted of it."""
+
+    tags: tuple[str, ...]
+    """Words that the lab finds it by."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -168,6 +168,18 @@ class SkinDetail(Document):
     created_at: str
     """When its first campaign arrived, UTC."""
 
+    title: str | None
+    """What the lab calls it beside its id."""
+
+    remark: str | None
+    """What the lab noted of it."""
+
+    tags: tuple[str, ...]
+    """Words that the lab finds it by."""
+
+    discarded_at: str | None
+    """When it was put away, UTC; lists leave it out."""
+
     joined: tuple[JoinedSkin, ...]
     """Skins that count as this one."""
 
@@ -190,3 +202,9 @@ class SkinEntry(Document):
 
     campaigns: int
     """How many campaigns it and the skins joined to it have, in any state."""
+
+    title: str | None
+    """What the lab calls it beside its id."""
+
+    tags: tuple[str, ...]
+    """Words that the lab finds it by."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from underskin.diagnosis.data.curve_samples import finite_samples
 from underskin.diagnosis.data.thinning import way_along
-from underskin.diagnosis.inference.curve_nuisances import cell_response
+from underskin.diagnosis.inference.curve_nuisances import CellResponse, cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.reporting.numbers import place_of
 from underskin.recordings.campaign import Campaign, CurveRecording
@@ -31,9 +31,11 @@ class Mark:
 
 @dataclass(frozen=True)
 class CurvePrediction:
-    """Of one curve by one explanation: the force of its rows (rows,), and where contact begins."""
+    """Of one curve by one explanation: the force of its rows (rows,), the standard deviation about it that noise and
+    the errors that neighbouring samples share leave (rows,), and where contact begins."""
 
     force_n: Floats
+    deviation_n: Floats
     contact: Mark
 
 
@@ -87,6 +89,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     force = explanation.model.predict(explanation.point.fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
     reading = cell.reading(lines, force)
+    deviation = _deviation(problem, explanation, cell)
     predicted = []
     for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
         assert isinstance(entry, CurveRecording)
@@ -94,8 +97,19 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
         # What the cell shows in the air just before, a drift included, whatever describes it
         in_air = np.flatnonzero(entry.displacement_mm[: int(entry.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[own][in_air[-1]] if len(in_air) else cell.offset[own][0]
-        predicted.append(CurvePrediction(reading[own], Mark(contact, float(shown))))
+        predicted.append(CurvePrediction(reading[own], deviation[own], Mark(contact, float(shown))))
     return predicted
+
+
+def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResponse) -> Floats:
+    """Of each row about what the cells show (rows,) [N]: less than the noise, for zero, drift and gain were fitted."""
+    lines, levels = problem.lines, explanation.best.levels
+    assert lines.smooth is not None
+    shared = [
+        np.diag(lines.smooth.part(np.arange(own.start, own.stop)).covariance(levels.smooth)) for own in lines.spans
+    ]
+    variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
+    return np.sqrt(np.maximum(variance, 0.0))
 
 
 def _shown(

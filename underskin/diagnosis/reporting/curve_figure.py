@@ -1,4 +1,5 @@
-"""The figure of curves: force against depth with the models before and after, below what each leaves, and the marks.
+"""The figure of curves: force against depth with the models before and after and the marks, below what each leaves on
+the noise's band.
 
 One recording is shown at a time; a menu chooses. What a colour means, a dash and a marker mean as well: orange, dashed
 and a square are the model before; blue, solid and a circle the one after; black is what was measured.
@@ -14,14 +15,16 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.curve_data import CurvePrediction, Mark, ShownCurve
+from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.units import Floats, readable_unit
 
 _MOST_CURVES = 12
-_MEASURED, _BEFORE, _AFTER = "#000000", "#D55E00", "#0072B2"
+_MEASURED, _BEFORE, _AFTER, _BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 _TITLES = {"indentation": "Force against depth", "compression": "Force against displacement"}
 _LOADED = 0.02  # of the largest force, from which on a curve is in view from the start
 _ROOM = 0.4, 0.05  # of what is in view: the air beside it, if there is any, and the edge
+_ALONG = 40  # points along an edge of the band
 _HEIGHT, _PANEL = 460, 150  # pixels
 
 
@@ -103,6 +106,7 @@ class _Curve:
             predicted = self._predicted(model).force_n
             traces.append(self._trace(model.shows, curve.displacement_mm, predicted, largest, look))
             look |= {"showlegend": False, "xaxis": f"x{row}", "yaxis": f"y{row}"}
+            traces += self._band(model, most, row)
             traces.append(self._trace(f"residual {model.shows}", curve.displacement_mm, left, most, look))
             which = "residual" if alone else f"residual<br>{model.shows}"
             layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
@@ -112,6 +116,25 @@ class _Curve:
         view = self._view()
         layout |= {f"xaxis{row}.range": view for row in ("", *range(2, last + 1))}
         return _Drawing(f"{curve.name}: {curve.left_percent:.2g} % left", traces, layout)
+
+    def _band(self, model: _Model, most: float, row: int) -> list[dict[str, Any]]:
+        """What holds 95 % of the residuals of an exact law, on the way in and on the way back."""
+        curve = self._curve
+        half = SDS_OF_95 * curve.after.deviation_n
+        turn = int(curve.displacement_mm.argmax())
+        edge: dict[str, Any] = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip"}
+        edge |= {"xaxis": f"x{row}", "yaxis": f"y{row}", "showlegend": False}
+        edge |= {"name": "95 % of the noise", "legendgroup": "band"}
+        traces = []
+        for name, way in (("in", slice(None, turn + 1)), ("back", slice(turn, None))):
+            order = np.argsort(curve.displacement_mm[way])  # an area is filled in one direction
+            order = order[np.unique(np.linspace(0, len(order) - 1, _ALONG).astype(int))]
+            place, high = curve.displacement_mm[way][order], half[way][order]
+            filled = {**edge, "fill": "tonexty", "fillcolor": _BAND}
+            filled["showlegend"] = row == 2 and name == "in"
+            traces.append(self._trace(f"noise {name} {model.shows} low", place, -high, most, edge))
+            traces.append(self._trace(f"noise {name} {model.shows} high", place, high, most, filled))
+        return traces
 
     def _predicted(self, model: _Model) -> CurvePrediction:
         return self._curve.before if model.shows == "before" else self._curve.after

@@ -51,7 +51,8 @@ class _Trace(NamedTuple):
 
 def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Figure:
     """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
-    are one. `layout.meta` has the recordings' names and sensors, and what each trace shows."""
+    are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them, and
+    what each trace shows."""
     models = [_Model("after", after, _AFTER, "solid", "circle")]
     if before:
         models.insert(0, _Model("before", before, _BEFORE, "dash", "square-open"))
@@ -89,6 +90,11 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         meta={
             "recordings": [one.name for one in recordings],
             "sensors": [one.sensor for one in recordings],
+            "indenters_mm": [one.indenter_radius_mm for one in recordings],
+            "preloads_n": [one.preload_n for one in recordings],
+            "left_percent": [
+                [float(f"{left:.3g}") for left in (one.left_before, one.left_after)] for one in recordings
+            ],
             "shows": [trace.shows for trace in traces],
         },
     )

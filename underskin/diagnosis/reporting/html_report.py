@@ -51,39 +51,49 @@ _FILTERS = (
     *(first_and_rest, in_percent, lacking_part),
 )
 
+_OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
 Report = Mapping[str, Any]
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 
 
 @cache
-def _macros() -> Any:
+def _templates() -> Environment:
     loader = PackageLoader("underskin.diagnosis.reporting")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    environment.filters |= {function.__name__: function for function in _FILTERS}
+    environment.filters |= {function.__name__: function for function in (*_FILTERS, of_summary)}
     environment.globals |= {"catalogue": CATALOGUE, "EXPLAINED": EXPLAINED}
-    return environment.get_template("report.html").module
+    return environment
+
+
+def _macros(template: str) -> Any:
+    return _templates().get_template(template).module
+
+
+def of_summary(drawn: FigureHtml) -> list[str]:
+    """The figures of the summary, three at most: measured beside both models, where, how probable each answer is."""
+    return [name for name in _OF_SUMMARY if name in drawn][:3]
 
 
 def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    return str(_macros().page(report, drawn, get_plotlyjs() if drawn else ""))
+    return str(_macros("file.html").page(report, drawn, get_plotlyjs() if drawn else ""))
 
 
 def body_of(report: Report, drawn: FigureHtml) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
-    return str(_macros().body(report, drawn))
+    return str(_macros("report.html").body(report, drawn))
 
 
 def provenance(report: Report) -> str:
     """With what it was made, as HTML."""
-    return str(_macros().provenance(report["provenance"]))
+    return str(_macros("report.html").provenance(report["provenance"]))
 
 
 def plan_of(planned: Mapping[str, Any]) -> str:
     """A report's `next_experiment` that is not empty, as HTML."""
-    return str(_macros().plan(planned))
+    return str(_macros("report.html").plan(planned))
 
 
 def of_report(report: Report) -> dict[str, go.Figure]:

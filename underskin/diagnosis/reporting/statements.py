@@ -61,7 +61,7 @@ def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...
     if answer.explanation is None and imitating:
         return "few laws without a name would look like the leading explanation in these recordings"
     if answer.explanation is None:
-        return "a smooth discrepancy without a name explains the recordings less well, or no better at a higher price"
+        return "a smooth deviation of no known cause explains the recordings less well, or no better though it is freer"
     if leader.explanation is None:
         return "what it leaves of the misfit is not noise"
     less = leader.explanation.log_evidence - answer.explanation.log_evidence
@@ -85,7 +85,7 @@ UNDECIDABLE: Mapping[Undecidable, str] = {
 
 CONFOUNDED: Mapping[Likeness, str] = {
     Likeness.NOISE: "at a typical strength it stays within the noise here",
-    Likeness.TAKEN_UP: "at a typical strength, d33, E and h within their tolerances take up what it does here",
+    Likeness.TAKEN_UP: "at a typical strength it looks here like another d33, E or h within their tolerances",
     Likeness.IMITATED: "what {mechanism} typically does to these recordings, {other} can do as well",
     Likeness.IMITATES: "what {other} typically does to these recordings, {mechanism} can do as well",
     Likeness.FITS_AS_WELL: "{other} explains these recordings about as well as {mechanism}",
@@ -108,7 +108,7 @@ def location_statement(
     if len(undecidable) == len(axes) and undecidable:
         return f"Whether the misfit depends on {listed(undecidable)}, this design cannot tell."
     if not telling:
-        return f"The misfit depends on none of the axes beyond chance{tail}."
+        return f"The misfit changes with nothing that was varied, beyond chance{tail}."
     names = listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
     if agrees:
         return (

@@ -1,0 +1,1 @@
+"""Changes of campaigns and skins, taken back."""

@@ -1,0 +1,98 @@
+"""A report on paper: its summary is the first page whole, what is folded below it follows."""
+
+import re
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page
+
+from tests.service.pages.conftest import Visit
+from tests.service.pages.finished import Made, keep, made_of
+from tests.support.diagnosed import resonant
+from tests.support.store_server import Server
+
+LINES = 30
+_SENTENCE = "Compressible layer: the skin can be squeezed together a little in volume, which shows beside the sensors. "
+_WIDE = "document.documentElement.scrollWidth <= innerWidth"
+
+
+@pytest.fixture(scope="module")
+def made() -> Made:
+    return made_of(resonant("array", lines=LINES))
+
+
+@pytest.fixture(params=["short", "long"])
+def printed(request: pytest.FixtureRequest, made: Made) -> Made:
+    """A report as it comes, and one with as much to say as any of thousands had."""
+    if request.param == "short":
+        return made
+    wordy = deepcopy(made.report)
+    first = wordy["statement"].partition(". ")[0]
+    wordy["statement"] = f"{first}. " + 13 * _SENTENCE
+    finding = {"code": "outlier", "recording": "r1", "field": "frf"}
+    wordy["findings"] = [{**finding, "statement": f"{number}: {2 * _SENTENCE}"} for number in range(8)]
+    return Made(wordy, made.figures)
+
+
+def sheets(page: Page) -> int:
+    """Pages of the PDF that the browser prints."""
+    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4")))
+
+
+def require_summary_on_first_sheet(page: Page) -> None:
+    """The whole is longer than the summary, which is one sheet: alone, and before the rest begins on the next."""
+    assert sheets(page) > 1
+    assert page.evaluate("getComputedStyle(document.querySelector('.summary')).breakAfter") == "auto"  # on the screen
+    page.emulate_media(media="print")
+    assert page.evaluate("getComputedStyle(document.querySelector('.summary')).breakAfter") == "page"
+    page.evaluate("document.querySelectorAll('details.part, .screen').forEach((part) => (part.style.display = 'none'))")
+    page.evaluate("document.querySelector('.summary').style.breakAfter = 'auto'")  # nothing comes after it now
+    assert sheets(page) == 1
+
+
+def test_the_summary_of_a_page_is_one_sheet(reader: Visit, idle: Server, printed: Made) -> None:
+    page = reader.page
+    skin = f"sheet{len(printed.report['statement'])}"
+    reader.go(f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), printed, skin)}")
+    folded = page.locator("details.part")
+    assert folded.count() >= 5
+    assert not any(part.get_attribute("open") is not None for part in folded.all())
+    for plot in page.locator(".three .plot").all():
+        plot.scroll_into_view_if_needed()
+        plot.locator(".main-svg").first.wait_for()
+    require_summary_on_first_sheet(page)
+    assert not any(part.get_attribute("open") is not None for part in folded.all())  # as it was before printing
+
+
+def test_the_summary_of_a_saved_file_is_one_sheet(reader: Visit, idle: Server, printed: Made, tmp_path: Path) -> None:
+    page = reader.page
+    skin = f"file{len(printed.report['statement'])}"
+    place = f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), printed, skin)}"
+    file = tmp_path / "report.html"
+    file.write_bytes(idle.http.get(f"{place}/report.html").content)
+    page.goto(file.as_uri())
+    page.wait_for_function("() => document.querySelectorAll('.three .main-svg').length >= 3")
+    require_summary_on_first_sheet(page)
+    reader.wrong.clear()  # the file itself is not of the server
+
+
+@pytest.mark.parametrize("width", [1180, 390])
+def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server, made: Made, width: int) -> None:
+    page = reader.page
+    page.set_viewport_size({"width": width, "height": 800})
+    skin = f"folded{width}"
+    reader.go(f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), made, skin)}")
+    summary = page.locator(".summary")
+    assert "No d33" in summary.inner_text()
+    assert "by noise alone" in summary.inner_text()
+    assert "These recordings cannot tell whether there is also" in summary.inner_text()
+    reader.require_accessible()
+    assert page.evaluate(_WIDE)
+    better = page.locator("details.part > summary", has_text="How much better")
+    better.focus()
+    page.keyboard.press("Enter")
+    figure = page.locator("#figure-before_after .main-svg").first
+    figure.wait_for()
+    assert page.evaluate(_WIDE)
+    reader.require_accessible()
