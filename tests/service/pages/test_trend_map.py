@@ -42,7 +42,13 @@ def history(d33: list[list[float]], uncertainty: float) -> History:
         )
         sensors.append(SensorHistory(sensor=f"s{number}", points=points(d33[number]), trend=answer, no_trend=None))
     return History(
-        skin_id="palm", joined=[], sensors=sensors, left_out_campaigns=[], left_out_points=[], left_out_recordings=[]
+        skin_id="palm",
+        joined=[],
+        differences=[],
+        sensors=sensors,
+        left_out_campaigns=[],
+        left_out_points=[],
+        left_out_recordings=[],
     )
 
 
