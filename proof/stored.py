@@ -6,7 +6,7 @@ A run that was stopped resumes; a result of changed sources is calculated again.
 import hashlib
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from functools import partial
@@ -17,15 +17,12 @@ import proof
 import rig
 import underskin
 from proof.cases import Case
+from proof.imported import of_a_diagnosis
 from underskin.parallel import processes
 from underskin.source_digest import source_digest
 
 Item = TypeVar("Item")
 FAILED = "failed"
-_NOT_OF_ONE_CAMPAIGN = (
-    "underskin.cli.", "underskin.client.", "underskin.figures.", "underskin.recordings.readers.",
-    "underskin.diagnosis.several.",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,16 +34,22 @@ class Work:
     count: int | None = None
 
 
-def sources(*packages: str, without: tuple[str, ...] = ()) -> str:
-    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`), but for
-    what is in the packages `without`."""
+def sources(*packages: str) -> str:
+    """Digest (`underskin.source_digest`) of packages of this project, or of files in them (`package/pattern`)."""
+    return _digest(_texts(*packages))
+
+
+def _texts(*packages: str) -> dict[str, str]:
     roots = {module.__name__: Path(str(module.__file__)).parent for module in (underskin, rig, proof)}
-    texts = {
+    return {
         ".".join([name, *path.relative_to(roots[name]).with_suffix("").parts]): path.read_text(encoding="utf-8")
         for name, _, file in (package.partition("/") for package in packages)
         for path in roots[name].rglob(file or "*.py")
     }
-    return source_digest({name: text for name, text in texts.items() if not name.startswith(without)})[:16]
+
+
+def _digest(texts: Mapping[str, str]) -> str:
+    return source_digest(texts)[:16]
 
 
 def digest_of(document: Any) -> str:
@@ -92,7 +95,7 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
 
 def of_diagnosis() -> str:
     """Digest of the library's sources on which a report of one campaign can depend."""
-    return sources("underskin", without=_NOT_OF_ONE_CAMPAIGN)
+    return _digest(of_a_diagnosis(_texts("underskin")))
 
 
 def diagnosing() -> str:

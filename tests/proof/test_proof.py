@@ -16,6 +16,7 @@ from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
+from proof.imported import of_a_diagnosis
 from proof.judge import QUIET, Judged, judge
 from proof.real import recorded
 from proof.results import PARTS
@@ -107,6 +108,21 @@ def test_the_digest_follows_the_sources() -> None:
     assert sources("underskin") != sources("rig")
     assert sources("proof/ideal*.py") != sources("proof")
     assert sources("rig") == sources("rig")
+
+
+def test_a_diagnosis_depends_on_what_it_imports_and_on_every_law_alone() -> None:
+    texts = {
+        "underskin.__init__": "from underskin.cli.app import main",
+        "underskin.diagnosis.pipeline": "def begin():\n    from underskin.physics import hertz",
+        "underskin.physics.__init__": "",
+        "underskin.physics.hertz": "import underskin.units",
+        "underskin.physics.field": "import underskin.units",
+        "underskin.units": "from underskin import cli",
+        "underskin.mechanisms.laws.creep": "",
+        "underskin.cli.app": "",
+    }
+    left_out = {"underskin.__init__", "underskin.physics.field", "underskin.cli.app"}
+    assert set(of_a_diagnosis(texts)) == set(texts) - left_out
 
 
 def test_drawn_cases_tell_nothing_of_the_truth() -> None:
