@@ -54,7 +54,8 @@ class FieldAnswer(BaseModel):
     )
     section_error: float | None = Field(
         description="Bound on the error of σ_zz between surface and base, over the largest stress at the same depth: "
-        "what finite strain changes is tabulated on the base alone, and is added in proportion to the depth."
+        "what finite strain changes is tabulated on the base alone, and is added in proportion to the depth; null for "
+        "`linear_layer`, which leaves finite strain out."
     )
     r_mm: list[float] | None = Field(description="Distances from the axis of the contact [mm].")
     depth_mm: list[float] | None = Field(

@@ -18,14 +18,14 @@ def field_answer(table: SigmaTable, asked: FieldQuery) -> FieldAnswer:
     """The stress that is asked for; raises InvalidInput."""
     given = asked.model_dump(exclude=_OPTIONS)
     field = field_from_lab(table, given, asked.r_points, asked.depth_points, units_checked=asked.units_checked)
-    inside = bool(field.contact.inside[0])
+    inside, tabulated = bool(field.contact.inside[0]), asked.poisson_ratio == INCOMPRESSIBLE
     return FieldAnswer(
-        model="layer" if asked.poisson_ratio == INCOMPRESSIBLE else "linear_layer",
+        model="layer" if tabulated else "linear_layer",
         table_sha256=table.sha256,
         status="ok" if inside else "out_of_domain",
         limit=field.limits[0],
         **{name: _number(np.ravel(column)[0]) for name, column in lab_columns(field.contact).items()},
-        section_error=_number(field.section_error[0]),
+        section_error=_number(field.section_error[0]) if tabulated else None,
         r_mm=to_lab("r_mm", field.r).tolist() if inside else None,
         depth_mm=to_lab("depth_mm", field.depth).tolist() if inside else None,
         sigma_zz_mpa=to_lab("sigma_zz_mpa", field.sigma_zz[0]).tolist() if inside else None,

@@ -37,6 +37,7 @@ def field(
     import numpy as np
 
     from underskin.cli import columns
+    from underskin.physics.skin import INCOMPRESSIBLE
     from underskin.prediction.answers import lab_columns
     from underskin.prediction.stress_field import field_from_lab
     from underskin.surrogate.sigma_table import load_table
@@ -53,5 +54,6 @@ def field(
         columns.write_csv(section, found.contact.inside, limits, stress.size)
         return
     contact = {**{name: np.array(value) for name, value in given.items()}, **lab_columns(found.contact)}
-    base = {"section_error": found.section_error, "r_mm": r, "sigma_zz_mpa": stress[-1]}
+    error = {"section_error": found.section_error} if poisson_ratio == INCOMPRESSIBLE else {}  # else linear throughout
+    base = {**error, "r_mm": r, "sigma_zz_mpa": stress[-1]}
     columns.write_table({**contact, **base}, found.contact.inside, limits, r.size)

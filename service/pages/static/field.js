@@ -7,6 +7,8 @@ const play = document.getElementById("play");
 const PAUSE = 120; // ms between frames
 let frames = null;
 let playing = false;
+let wanted = 0; // the frame that was asked for last
+let run_number = 0;
 
 async function all_frames() {
   frames ??= fetch(growing.dataset.frames).then((response) => response.json());
@@ -15,7 +17,9 @@ async function all_frames() {
 
 // The figures hold what they show, so that what is saved or printed is the frame in sight.
 async function show(number) {
+  wanted = number;
   const { told, figures } = (await all_frames())[number - 1];
+  if (wanted !== number) return; // a later one took this one's place
   load.value = String(number);
   load.setAttribute("aria-valuetext", told[0]);
   document.querySelectorAll("[data-told]").forEach((entry, index) => (entry.textContent = told[index]));
@@ -27,6 +31,7 @@ async function show(number) {
     script.textContent = JSON.stringify(figure);
     const plot = place.querySelector(".plot");
     if (plot.dataset.drawn) await redraw(plot);
+    if (wanted !== number) return;
   }
 }
 
@@ -36,12 +41,13 @@ function set_playing(on) {
 }
 
 async function run() {
-  if (load.value === load.max) load.value = "0";
-  while (playing && load.value !== load.max) {
-    await show(Number(load.value) + 1);
+  const own = ++run_number;
+  let number = load.value === load.max ? 0 : Number(load.value);
+  while (playing && own === run_number && number < Number(load.max)) {
+    await show(++number);
     await new Promise((done) => setTimeout(done, PAUSE));
   }
-  set_playing(false);
+  if (own === run_number) set_playing(false);
 }
 
 if (growing) {

@@ -85,9 +85,9 @@ def test_the_slider_moves_the_load_by_keys(reader: Visit, width: int) -> None:
     slider.focus()
     for _ in range(10):
         slider.press("ArrowLeft")
-    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '1.5 N'")
+    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '1.5 N'")
     reader.page.wait_for_function(
-        "document.querySelector('#figure-base .plot')._fullData[0].z[20][20] > -0.2"  # half of the stress or so
+        "() => document.querySelector('#figure-base .plot')._fullData[0].z[20][20] > -0.2"  # half of the stress or so
     )
     half = trace(reader, "base")
     served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY.replace('_n=3', '_n=1.5')}").json()
@@ -96,17 +96,17 @@ def test_the_slider_moves_the_load_by_keys(reader: Visit, width: int) -> None:
     assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(served["contact_radius_mm"], rel=1e-3)
     assert slider.get_attribute("aria-valuetext") == "1.5 N"
     slider.press("End")
-    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '3 N'")
+    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '3 N'")
 
 
 def test_what_is_saved_is_the_load_in_sight(reader: Visit) -> None:
     reader.go(f"/field?{QUERY}")
     reader.drawn(2)
     reader.page.get_by_label(LOAD).press("Home")
-    reader.page.wait_for_function("document.querySelector('[data-told]').textContent === '0.15 N'")
+    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '0.15 N'")
     figure = reader.page.locator("#figure-base")
     peak = "JSON.parse(document.querySelector('#figure-base script').textContent).data[0].z[20][20]"
-    reader.page.wait_for_function(f"{peak} > -0.03")
+    reader.page.wait_for_function(f"() => {peak} > -0.03")
     with reader.page.expect_download():
         figure.get_by_role("button", name="SVG").click()
 
@@ -118,18 +118,18 @@ def test_the_load_plays_to_its_end_and_pauses_by_key(reader: Visit) -> None:
     button.focus()
     reader.page.keyboard.press("Enter")
     reader.page.wait_for_function(
-        "(n => n > 2 && n < 18)(Number(document.getElementById('load').value))"
+        "() => (n => n > 2 && n < 18)(Number(document.getElementById('load').value))"
         " && document.getElementById('play').textContent === 'Pause'"
     )
     reader.page.keyboard.press("Enter")
-    reader.page.wait_for_function("document.getElementById('play').textContent === 'Play'")
+    reader.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
     reader.page.wait_for_timeout(400)
     stopped = reader.page.get_by_label(LOAD).input_value()
     reader.page.wait_for_timeout(400)
     assert reader.page.get_by_label(LOAD).input_value() == stopped
     reader.page.keyboard.press("Enter")
     reader.page.wait_for_function(
-        "document.getElementById('load').value === '20' && document.getElementById('play').textContent === 'Play'"
+        "() => document.getElementById('load').value === '20' && document.getElementById('play').textContent === 'Play'"
     )
     assert told(reader)[0] == "3 N"
 
@@ -140,7 +140,7 @@ def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
     assert calm.page.get_by_role("button", name="Play").count() == 0
     assert "asks for less motion" in calm.page.get_by_role("main").inner_text()
     calm.page.get_by_label(LOAD).press("ArrowLeft")
-    calm.page.wait_for_function("document.querySelector('[data-told]').textContent === '2.85 N'")
+    calm.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.85 N'")
     calm.require_accessible()
 
 
@@ -173,7 +173,7 @@ def test_design_leads_there_with_its_sliders(reader: Visit) -> None:
     reader.drawn(2)
     with reader.page.expect_response("**/design/answer?*"):
         reader.page.locator("#preload_n").fill("2")
-    reader.page.wait_for_function("document.querySelector('[data-query]').search.includes('preload_n=2&')")
+    reader.page.wait_for_function("() => document.querySelector('[data-query]').search.includes('preload_n=2&')")
     reader.page.get_by_role("link", name="The stress under this sphere").click()
     reader.drawn(2)
     assert told(reader)[0] == "2 N"

@@ -97,7 +97,7 @@ def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
 
 
 def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:
-    for path in ("/", "/skins/many", place, "/upload", "/design", "/loads?thickness_mm=x", "/d33", "/fleets"):
+    for path in ("/", "/skins/many", place, "/upload", "/design", "/loads?thickness_mm=x", "/field", "/d33", "/fleets"):
         dark.go(path)
         ground = dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
         assert ground == "rgb(20, 25, 31)", path

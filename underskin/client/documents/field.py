@@ -45,7 +45,8 @@ class FieldAnswer(Document):
 
     section_error: float | None
     """Bound on the error of σ_zz between surface and base, over the largest stress at the same depth: what finite
-    strain changes is tabulated on the base alone, and is added in proportion to the depth."""
+    strain changes is tabulated on the base alone, and is added in proportion to the depth; null for `linear_layer`,
+    which leaves finite strain out."""
 
     r_mm: tuple[float, ...] | None
     """Distances from the axis of the contact [mm]."""
