@@ -47,6 +47,24 @@ def kept_by_page(server: Server, text: str, skin: str) -> None:
         client.post(f"{address}/keep", data={"skin": skin} | token)
 
 
+def test_a_depth_of_several_channels_is_not_flipped_as_a_whole(server: Server) -> None:
+    """Height less deflection, of a height that falls, is no depth turned round: the modulus would be wrong."""
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+        token = {"form_token": token_of(client.get("/upload").text)}
+        text = text_of_raw_curve(above="# not flipped").encode()
+        address = client.post("/upload", data=token, files={"file": ("afm.txt", text)}).headers["location"]
+        token = {"form_token": token_of(client.get(address).text)}
+        wrong = {"derived-formula-1": "'Height (nm)' - 'Deflection (nm)'"}
+        client.post(f"{address}/mapping", data=FORM | wrong | token)
+        page = client.get(address).text
+        assert "each with a sign of its own" in page
+        assert "Flip what is counted negative" not in page
+        client.post(f"{address}/signs", data={"turned": "yes"} | token)
+        assert "were turned" not in client.get(address).text
+        client.post(f"{address}/mapping", data=FORM | token)
+        assert "each with a sign of its own" not in client.get(address).text
+
+
 @pytest.mark.slow
 def test_a_raw_curve_gives_the_known_modulus_by_every_way_in(server: Server, tmp_path: Path) -> None:
     text = text_of_raw_curve(noise_nm=2, seed=900411)
