@@ -144,6 +144,11 @@ def test_what_a_rig_description_cannot_mean_is_refused(changes: dict[str, Any], 
     [
         ({"derived": {"Height (nm)": "1 [nm]"}}, "derived.Height (nm)", "is a channel of the file already"),
         ({"trim": {"first_sample": 401}}, "trim.first_sample", "has 400 samples"),
+        (
+            {"derived": {"depth": "'Height (nm)' - 'Deflection (nm)'", "load": "3 [N/m] * 'Deflection (nm)'"}},
+            "derived.depth",
+            "turn the terms of 'Height (nm)' - 'Deflection (nm)'",
+        ),
     ],
 )
 def test_what_a_file_contradicts_is_refused(changes: dict[str, Any], place: str, said: str) -> None:
