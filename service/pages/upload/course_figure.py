@@ -35,8 +35,8 @@ def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None
     if not columns or len({len(column) for column in columns.values()}) > 1:
         return []
     of = len(mapped.document["recordings"])
-    which = "" if of == 1 else f" of {str(first['id'])[:60]!r}, the first of {of}"
-    about = f"The recording{which}, sample by sample. Drag across the figure to choose the samples that are used."
+    which = "The recording" if of == 1 else f"{str(first['id'])[:60]!r}, the first of {of} recordings"
+    about = f"{which}, sample by sample. Drag across the figure to choose the samples that are used."
     return [drawn(_NAME, _figure(columns, used.trim or Trim()), about)]
 
 
