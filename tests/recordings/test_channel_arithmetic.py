@@ -33,20 +33,28 @@ OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": opera
 
 @dataclass
 class Measured:
-    """A value with its dimension, as a textbook combines them; None as dimension: it cannot be."""
+    """A value with its dimension, as a textbook combines them; None as dimension: it cannot be. `cancels`: a sum in it
+    is so much less than its terms that rounding decides."""
 
     values: Any
     powers: tuple[int, ...] | None
+    cancels: bool = False
 
     def combined(self, sign: str, other: "Measured") -> "Measured":
-        if self.powers is None or other.powers is None:
-            return Measured(None, None)
+        cancels = self.cancels or other.cancels
+        if self.powers is None or other.powers is None or cancels:
+            return Measured(None, None, cancels)
         if sign in "+-":
+            values = OPERATORS[sign](self.values, other.values)
+            terms = np.maximum(np.abs(self.values), np.abs(other.values))
             alike = self.powers == other.powers
-            return Measured(OPERATORS[sign](self.values, other.values), self.powers if alike else None)
+            return Measured(values, self.powers if alike else None, bool(np.any(np.abs(values) < 1e-4 * terms)))
         turn = 1 if sign == "*" else -1
         powers = tuple(a + turn * b for a, b in zip(self.powers, other.powers, strict=True))
         return Measured(OPERATORS[sign](self.values, other.values), powers)
+
+    def negative(self) -> "Measured":
+        return Measured(None if self.powers is None else -self.values, self.powers, self.cancels)
 
 
 NUMBERS = st.floats(0.1, 100).map(lambda number: float(f"{number:.4g}"))
@@ -64,9 +72,7 @@ def together(parts: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
     both = st.tuples(parts, st.sampled_from("+-*/"), parts).map(
         lambda one: (f"({one[0][0]} {one[1]} {one[2][0]})", one[0][1].combined(one[1], one[2][1]))
     )
-    negative = parts.map(
-        lambda one: (f"-{one[0]}", Measured(None if one[1].powers is None else -one[1].values, one[1].powers))
-    )
+    negative = parts.map(lambda one: (f"-{one[0]}", one[1].negative()))
     return both | negative
 
 
@@ -104,15 +110,15 @@ ALL = tuple(Channel(f"in {label}", label, SAMPLES) for label in UNITS)
 def test_values_and_units_are_those_of_a_textbook(case: tuple[str, Measured]) -> None:
     formula, expected = case
     whole = f"{formula} * ('in mm' / 'in mm')"  # a channel, also where all terms are constants
+    assume(not expected.cancels)
     if expected.powers is None:
-        with pytest.raises(FileError, match=r"units of one kind|which no channel can have|division by 0"):
+        with pytest.raises(FileError, match=r"units of one kind"):
             derived(whole, *ALL)
         return
     try:
         channel = derived(whole, *ALL)
     except FileError as error:
         assume("which no channel can have" not in error.reason)
-        assume("is a division by 0" not in error.reason)
         raise
     np.testing.assert_allclose(in_si(channel), np.ones(4) * expected.values, rtol=1e-9)
     assert powers_of(channel.unit) == expected.powers

@@ -8,7 +8,7 @@ import pytest
 from tests.support.raw_curves import DEPTH_MM, FORCE_N, OFFSET_NM, rig_of_raw_curve, text_of_raw_curve
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, rig_description
-from underskin.recordings.campaign import IndentationRecording
+from underskin.recordings.campaign import CompressionRecording, IndentationRecording
 from underskin.recordings.reading import Reading
 
 
@@ -84,6 +84,28 @@ def test_a_sign_is_told_from_how_the_curve_goes() -> None:
             assert len(turned) == (height < 0) + (deflection < 0)
 
 
+@pytest.mark.parametrize(("force", "travel"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
+def test_the_signs_of_a_block_are_told_from_its_largest_force(force: int, travel: int) -> None:
+    strain = np.concatenate([np.linspace(0, 0.2, 50), np.linspace(0.2, 0, 50)])
+    rows = "".join(f"{travel * one:.6f};{force * 40 * one:.6f}\n" for one in strain)
+    rig = rig_description.from_dict(
+        {
+            "schema": "rig/1",
+            "kind": "compression",
+            "skin": {"poisson_ratio": 0.5},
+            "recording": {"sample_height_mm": 10, "sample_diameter_mm": 20},
+            "channels": {
+                "displacement_mm": {"channel": "Crosshead", "sign": "auto"},
+                "force_n": {"channel": "Load", "sign": "auto"},
+            },
+        }
+    )
+    (block,) = read_file(f"Crosshead;Load\nmm;N\n{rows}".encode(), "block.csv", rig).campaign.recordings
+    assert isinstance(block, CompressionRecording)
+    np.testing.assert_allclose(block.displacement_mm, strain, atol=1e-6)
+    np.testing.assert_allclose(block.force_n, 40 * strain, atol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("changes", "field", "said"),
     [
@@ -122,6 +144,11 @@ def test_what_a_rig_description_cannot_mean_is_refused(changes: dict[str, Any], 
     [
         ({"derived": {"Height (nm)": "1 [nm]"}}, "derived.Height (nm)", "is a channel of the file already"),
         ({"trim": {"first_sample": 401}}, "trim.first_sample", "has 400 samples"),
+        (
+            {"derived": {"depth": "'Height (nm)' - 'Deflection (nm)'", "load": "3 [N/m] * 'Deflection (nm)'"}},
+            "derived.depth",
+            "turn the terms of 'Height (nm)' - 'Deflection (nm)'",
+        ),
     ],
 )
 def test_what_a_file_contradicts_is_refused(changes: dict[str, Any], place: str, said: str) -> None:

@@ -9,6 +9,7 @@ from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, SignalMapping
 from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
+from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, RigDescription
 from underskin.recordings.shown_values import shown
@@ -188,6 +189,11 @@ class MappedBlock:
             reason = "force falls as the displacement grows, and compression is positive here"
             how = (Mention("displacement_mm"), " and ", Mention("force_n"))
             doubt = ""
+            depth = self.rig.channels["displacement_mm"].channel
+            formula = self.rig.derived.get(depth)
+            if formula is not None and formula.is_sum:
+                turn = f"turn the terms of {formula.text} that fall as it is pressed"
+                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}")
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
             raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))

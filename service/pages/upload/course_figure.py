@@ -11,14 +11,14 @@ from service.pages.shared.figures import Drawn, drawn
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
 from underskin.recordings.rig_description import RigDescription, Trim
-from underskin.units import LAB, Floats, Mask, readable_unit
+from underskin.units import LAB, Floats, Indices, Mask, readable_unit
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 _NAME = "course"
 _SHOWN = ("displacement_mm", "force_n", "charge_pc")
-_MOST_SAMPLES = 900
+_MOST_BINS = 400  # of many samples, the lowest and the highest of each are drawn
 _ROW, _EDGES = 150, 120  # pixels
 _LOADING, _BACK, _USED, _LEFT_OUT = "loading", "way back", "used", "left out"
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#8a949e"
@@ -35,8 +35,8 @@ def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None
     if not columns or len({len(column) for column in columns.values()}) > 1:
         return []
     of = len(mapped.document["recordings"])
-    which = "" if of == 1 else f" of {str(first['id'])[:60]!r}, the first of {of}"
-    about = f"The recording{which}, sample by sample. Drag across the figure to choose the samples that are used."
+    which = "The recording" if of == 1 else f"{str(first['id'])[:60]!r}, the first of {of} recordings"
+    about = f"{which}, sample by sample. Drag across the figure to choose the samples that are used."
     return [drawn(_NAME, _figure(columns, used.trim or Trim()), about)]
 
 
@@ -48,10 +48,10 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
     count = len(next(iter(columns.values())))
     sample = np.arange(1, count + 1)
     parts = _parts(columns, (sample >= (trim.first_sample or 1)) & (sample <= (trim.last_sample or count)))
-    chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_SAMPLES)).round().astype(int))
     figure = make_subplots(len(columns), 1, shared_xaxes=True, vertical_spacing=0.08)
     for row, (field, column) in enumerate(columns.items(), start=1):
         unit, count_of_lab = _readable(field, column)
+        chosen = _extremes(column)
         for name, (colour, mask) in parts.items():
             y = np.where(mask, column * count_of_lab, np.nan)[chosen]
             if np.isfinite(y).any():
@@ -72,6 +72,13 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
     figure.update_layout(dragmode="select", selectdirection="h")
     title = "Loading and way back" if _BACK in parts else "The samples"
     return styled(figure, title, _EDGES + _ROW * len(columns))
+
+
+def _extremes(column: Floats) -> Indices:
+    """Which samples to draw: all, or the lowest and the highest of each of as many bins as a figure resolves."""
+    bins = np.array_split(np.arange(len(column)), min(_MOST_BINS, len(column)))
+    ends = [(part[np.argmin(column[part])], part[np.argmax(column[part])]) for part in bins]
+    return np.unique([0, *(end for pair in ends for end in pair), len(column) - 1])
 
 
 def _readable(field: str, column: Floats) -> tuple[str, float]:

@@ -185,6 +185,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     pending.refused = [entry for error in wrong for entry in field_errors(error)]
     if not wrong:
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
+        pending.turned &= not pending.is_depth_composed
         async with READING_SLOTS:
             await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
@@ -202,7 +203,7 @@ async def use_template(request: Request, pending: Pending, store: Store) -> Resp
 @router.post("/{upload_id}/signs", dependencies=WRITE)
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again, curves that count pressing negative turned, or as they came."""
-    pending.turned = sent.get("turned") == "yes"
+    pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
     async with READING_SLOTS:
         await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")

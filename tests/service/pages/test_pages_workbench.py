@@ -69,6 +69,7 @@ def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     page = sized.page
     look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
     fill_in(page)
+    assert page.get_by_role("region", name="Formulas").evaluate("box => box.scrollWidth <= box.clientWidth")
     for typed, said in (
         ("'Height (nm)' ** 2", "'Height (nm)' ** 2: is not allowed"),
         ("'Height (nm)' - 5 [N]", "5 [N] has the unit N; only what has units of one kind"),

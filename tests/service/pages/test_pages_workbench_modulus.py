@@ -1,5 +1,6 @@
 """Raw curves of height and deflection, from the upload page to the modulus: the same by page, command line and HTTP."""
 
+import html
 import json
 import re
 from pathlib import Path
@@ -45,6 +46,35 @@ def kept_by_page(server: Server, text: str, skin: str) -> None:
             "derived force": DERIVED["load"],
         }
         client.post(f"{address}/keep", data={"skin": skin} | token)
+
+
+def test_a_depth_of_several_channels_is_not_flipped_as_a_whole(server: Server) -> None:
+    """Height less deflection, of a height that falls, is no depth turned round: the modulus would be wrong."""
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+        token = {"form_token": token_of(client.get("/upload").text)}
+        text = text_of_raw_curve(above="# not flipped").encode()
+        address = client.post("/upload", data=token, files={"file": ("afm.txt", text)}).headers["location"]
+        token = {"form_token": token_of(client.get(address).text)}
+        wrong = {"derived-formula-1": "'Height (nm)' - 'Deflection (nm)'"}
+        client.post(f"{address}/mapping", data=FORM | wrong | token)
+        page = html.unescape(client.get(address).text)
+        beside = re.search(r'id="derived-wrong-1">([^<]*)<', page)
+        assert beside is not None
+        assert "turn the terms of 'Height (nm)' - 'Deflection (nm)' that fall as it is pressed" in beside[1]
+        assert "Flip what is counted negative" not in page
+        spring = {"channel-0": "Height (nm)", "is-0": "displacement_mm", "sign-0": "1", "travel": "yes"}
+        spring |= {"channel-1": "Deflection (nm)", "is-1": "deflection", "sign-1": "1", "spring_constant_n_per_m": "3"}
+        plain = {name: "" if name.startswith("derived") else value for name, value in FORM.items()}
+        client.post(f"{address}/mapping", data=plain | spring | token)
+        page = client.get(address).text
+        assert "each with a sign of its own" in page
+        assert "Flip what is counted negative" not in page
+        client.post(f"{address}/signs", data={"turned": "yes"} | token)
+        assert "were turned" not in client.get(address).text
+        client.post(f"{address}/mapping", data=plain | spring | token | {"sign-0": "auto"})
+        page = client.get(address).text
+        assert "<b>1</b> recording understood" in page
+        assert "each with a sign of its own" not in page
 
 
 @pytest.mark.slow
