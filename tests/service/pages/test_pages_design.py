@@ -114,3 +114,5 @@ def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:
     refused = server.http.get("/design/search/region.csv?resolution_mm=-1")
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["field"] == "resolution_mm"
+    text = server.http.get("/design/search?resolution_mm=60", headers={"Accept": "text/html"}).text
+    assert "resolution, at most [mm]: 60" in text
