@@ -21,7 +21,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
-_THICKNESSES, _RADII = 10, 6
+_THICKNESSES, _RADII = 8, 6
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
 _CANDIDATES = 3  # of each merit that are calculated in full
