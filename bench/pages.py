@@ -35,6 +35,9 @@ def measure() -> list[Figure]:
             "The same, one sensor's lines": f"/campaigns/{whole}?show=s07",
             "Design": "/design?skin=palm-3",
             "Design, a slider's answer": "/design/answer?thickness_mm=3",
+            "Designs that resolve 3 mm": "/design/search?resolution_mm=3",
+            "Mechanisms": "/mechanisms",
+            "Mechanisms, a picture": "/mechanisms/adhesion/picture.svg",
         }
         address = f"http://127.0.0.1:{server.port}"
         with httpx.Client(base_url=address, headers={"Accept": "text/html"}, timeout=60) as client:

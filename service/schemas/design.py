@@ -40,7 +40,7 @@ class DesignDemand(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
-    resolution_mm: float = Field(gt=0, le=1e3, description="Largest two-point separation [mm].")
+    resolution_mm: float = Field(gt=0, le=50, description="Largest two-point separation [mm].")
     preload_n: float = Field(gt=0, description="Force F of each of two spheres [N].")
     indenter_radius_mm: float = Field(gt=0, description="Their radius R [mm].")
     youngs_modulus_mpa: float = Field(gt=0, description="Young's modulus E of the layer, incompressible [MPa].")

@@ -21,11 +21,11 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
-_THICKNESSES, _RADII = 10, 6
+_THICKNESSES, _RADII = 8, 6
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
 _CANDIDATES = 3  # of each merit that are calculated in full
-_FINER, _TIMES = 0.99, 12  # by how much and how often a pitch is reduced until the full calculation agrees
+_FINER, _TIMES = 0.995, 6  # beyond what it misses by, and how often, a pitch is reduced until it meets the demand
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,15 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
     contact = float(to_lab("contact_radius_mm", transmission(table, any_skin, indenter, force).contact_radius))
     thinnest = max(THICKNESS_MM[0], _INSIDE * contact / table.domain["a_over_h"][1])
-    thickness = _steps(thinnest, max(1.2 * demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
-    radii = _steps(RADIUS_MM[0], max(0.3 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
+    thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
+    radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
     h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
     skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
     reached = transmission(table, skin, indenter, force)
     pitch = np.full(h.shape, np.nan)
     distance = float(to_si("x_mm", demand.resolution_mm))
     if demand.resolution_mm >= 2 * contact:
-        for place in zip(*np.nonzero(reached.inside), strict=True):
+        for place in zip(*np.nonzero(reached.inside & (2 * radius <= distance / 2)), strict=True):
             point = [float(part[place]) for part in (reached.a_over_h, reached.rt_over_h, reached.load_parameter)]
             offset, response = sigma_beside(table, *point)
             if np.isfinite(response).all():
@@ -196,7 +196,7 @@ def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, 
         apart = answer.two_point_separation_mm
         if apart is not None and apart <= demand.resolution_mm:
             return Offer(merit, request, answer)
-        pitch *= _FINER
+        pitch *= _FINER * (1.0 if apart is None else demand.resolution_mm / apart)
     return None
 
 

@@ -3,6 +3,9 @@
 The criterion is that of `underskin.prediction.skin_design`: the responses of two contacts add, and they show as two
 where a sensor between two others reads less than both, by `dip` times the reading above a sensor, wherever the row of
 sensors lies and from that distance on. Here it is evaluated on few placements and distances, to search many designs.
+
+The pitch cannot exceed half the distance: where the middle between the contacts lies midway between two sensors, each
+of these is then nearer to its contact than the sensor beyond it and reads more, so that nothing dips.
 """
 
 import numpy as np
@@ -11,7 +14,7 @@ from underskin.units import Floats
 
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
 _DISTANCES = 16
-_STEPS = 8  # of a bisection
+_STEPS = 7  # of a bisection
 
 
 def largest_pitch(offset: Floats, response: Floats, distance: float, finest: float, dip: float) -> float:
@@ -25,9 +28,9 @@ def largest_pitch(offset: Floats, response: Floats, distance: float, finest: flo
     dip
         Over the response above a sensor [-].
     """
-    if finest > distance or not _told_apart(offset, response, finest, distance, dip):
+    if finest > distance / 2 or not _told_apart(offset, response, finest, distance, dip):
         return float("nan")
-    low, high = finest, distance
+    low, high = finest, distance / 2
     for _ in range(_STEPS):
         middle = (low + high) / 2
         if _told_apart(offset, response, middle, distance, dip):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.figures.law_effect import usual
-from underskin.mechanisms import CATALOGUE, Normal, Unsupported, compose
+from underskin.mechanisms import CATALOGUE, Mechanism, Normal, Stage, Unsupported, compose
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats
@@ -69,9 +69,14 @@ def _alike(name: str, left: Mapping[str, Floats]) -> tuple[Twin, ...]:
     for other in left:
         if other != name:
             rival = CATALOGUE[other]
-            alone = _in_one(own.axes, rival.axes), _in_one(own.kinds, rival.kinds)
+            alone = _in_one(_axes(own), _axes(rival)), _in_one(own.kinds, rival.kinds)
             twins.append(Twin(other, float(abs(left[name] @ left[other])), *alone))
     return tuple(sorted(twins, key=lambda twin: -twin.alike))
+
+
+def _axes(mechanism: Mechanism) -> tuple[str, ...]:
+    """Axes on which it shows; a lab's own law of lines names those that it reads, and turns the phase too."""
+    return (*mechanism.axes, "phase") if mechanism.stage is Stage.LINES else mechanism.axes
 
 
 def _in_one(own: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:

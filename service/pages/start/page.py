@@ -1,6 +1,7 @@
 """The start: skins at a glance."""
 
 from contextlib import suppress
+from functools import cache
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -61,8 +62,9 @@ def start(
     return answer
 
 
+@cache
 def _ahead(store: Database, table: SigmaTable) -> None:
-    """What takes long at first on pages to which this one leads."""
+    """What takes long at first on pages to which this one leads; once."""
     prepare()
     with suppress(Refusal):  # which the page of mechanisms says
         mechanism_catalogue.read_ahead(store, table)

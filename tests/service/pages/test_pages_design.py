@@ -110,7 +110,9 @@ def test_where_no_skin_does_the_limit_is_named(reader: Visit) -> None:
 def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:
     lines = server.http.get("/design/search/region.csv?resolution_mm=2").text.splitlines()
     assert lines[0] == "thickness_mm,sensor_radius_mm,largest_pitch_mm,frf_pc_per_n,feasible"
-    assert len(lines) == 61
+    assert len(lines) == 49
     refused = server.http.get("/design/search/region.csv?resolution_mm=-1")
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["field"] == "resolution_mm"
+    text = server.http.get("/design/search?resolution_mm=60", headers={"Accept": "text/html"}).text
+    assert "resolution, at most [mm]: 60" in text

@@ -34,7 +34,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
             page.wait_for_url("**/mechanisms")
             own = page.get_by_role("region", name="The lab's own")
             expect(own.get_by_role("heading", name="warm_amplifier")).to_be_visible()
-            expect(own.get_by_text("The gain follows the temperature.")).to_be_visible()
+            expect(own.get_by_text("The gain follows the temperature.", exact=True)).to_be_visible()
             expect(page.get_by_role("row", name="adhesion")).to_be_visible()
             _require_accessible_at_both_widths(visitor)
 
