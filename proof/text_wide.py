@@ -39,6 +39,12 @@ def by_subset(judged: Sequence[Result]) -> str:
     subsets["physics outside the catalogue hidden"] = outside
     for verdict in _VERDICTS:
         subsets[f"`{verdict}`"] = [entry for entry in stated if entry["verdict"] == verdict]
+    agreeing = [entry for entry in stated if entry["verdict"] == "no_mismatch"]
+    subsets["`no_mismatch`, nothing hidden"] = [entry for entry in agreeing if not entry["hidden"]]
+    subsets["`no_mismatch`, effects of the catalogue hidden"] = [
+        entry for entry in agreeing if entry["hidden"] and entry not in outside
+    ]
+    subsets["`no_mismatch`, physics outside the catalogue hidden"] = [e for e in agreeing if e in outside]
     subsets["quotable"] = [entry for entry in stated if entry["quotable"]]
     subsets["one sensor"] = [entry for entry in stated if entry["sensors"] == 1]
     subsets["two sensors"] = two = [entry for entry in stated if entry["sensors"] == 2]

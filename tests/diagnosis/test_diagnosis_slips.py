@@ -151,6 +151,24 @@ def test_rms_is_told_beside_a_scatter_that_no_rig_has(factor: float, table: Sigm
     assert named(inspected) == [Reason.AMPLITUDE_FACTOR]
 
 
+@pytest.mark.parametrize("number", [274, 297])
+def test_presses_that_miss_their_place_are_no_factor(number: int, table: SigmaTable) -> None:
+    """One sensor, presses beside it that scatter by 0.45 mm: such a miss lowers the level, some by half and more."""
+    description = drawn(961377, number, "none")
+    description["noise"]["position_mm"] = 0.45
+    made, _ = from_dict(recorded_campaign(record(description)))
+    assert Reason.AMPLITUDE_FACTOR not in named(inspect(made, table))
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_peak_to_peak_is_told_where_the_two_levels_overlap(factor: float, table: SigmaTable) -> None:
+    """A campaign of the rig whose places scatter: 15 % of its recordings lie far from either level."""
+    made, _ = from_dict(recorded_campaign(record(drawn(944207, 59, "none"))))
+    off = np.random.default_rng(11).random(len(made.recordings)) < 1 / 3
+    inspected = inspect(changed(made, lambda entry, n: times(entry, factor if off[n] else 1.0)), table)
+    assert named(inspected) == [Reason.AMPLITUDE_FACTOR]
+
+
 def test_a_warm_up_is_told_where_nothing_else_moves_the_levels(table: SigmaTable) -> None:
     """A campaign of the rig of one sensor, its preloads in rising order, that starts at 0.8 of its level."""
     made, _ = from_dict(recorded_campaign(record(drawn(900500, 14, "none"))))

@@ -66,6 +66,12 @@ def test_tables_count_what_they_say() -> None:
     assert "| all | 1 of 2" in shown
     assert "| physics outside the catalogue hidden | 0 of 1" in shown
     assert "| two sensors, nothing or effects of the catalogue hidden | 1 of 1" in shown
+    agreeing = [{**entry, "verdict": "no_mismatch", "hidden": hidden} for hidden in ([], ["ageing"], ["rattle"])]
+    shown = by_subset([*agreeing, {**agreeing[1], "held": False}, {**entry, "hidden": ["ageing"]}])
+    assert "| `no_mismatch` | 3 of 4" in shown
+    assert "| `no_mismatch`, nothing hidden | 1 of 1" in shown
+    assert "| `no_mismatch`, effects of the catalogue hidden | 1 of 2" in shown
+    assert "| `no_mismatch`, physics outside the catalogue hidden | 1 of 1" in shown
     one = {"hidden": ["ageing"], "visible": True, "right": True, "alarm": True, "held": False}
     quiet = {"hidden": [], "visible": True, "right": False, "alarm": True, "held": True}
     row = by_priors({"own": [one, quiet]}).splitlines()[2]

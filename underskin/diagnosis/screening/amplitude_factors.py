@@ -21,8 +21,8 @@ from underskin.units import Floats, Mask
 _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
 _MEANT = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
-_GAIN, _GAIN_ALONE, _COST = 7.5, 14.0, 1.0  # of ln evidence, if one recording is off, and per ln of choices
-_WELL = 0.7  # of the recordings at least lie within a third of ln c of one of the two levels
+_GAIN, _GAIN_UNSURE, _COST = 7.5, 14.0, 1.0  # of ln evidence, where a chance is likelier, and per ln of choices
+_WELL, _APART = 0.7, 0.85  # of the recordings lie within a third of ln c of their level: at least, and of levels apart
 _MOST, _FEW, _MANY = 0.5, 0.1, 12  # the first two of the recordings
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
 # Where a law along an axis may be at work as well: twice is no law, and √2 is a chance unless it is sharp.
@@ -32,11 +32,13 @@ _SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
 
 @dataclass(frozen=True)
 class Step:
-    """A factor, the recordings that have it, and by how much ln evidence gains on its cost."""
+    """A factor, the recordings that have it, by how much ln evidence gains on its cost, and the share of all recordings
+    that lie within a third of its logarithm of their level."""
 
     factor: float
     off: Mask
     gain: float
+    near: float
 
 
 def amplitude_step(levels: Levels) -> Step | None:
@@ -50,10 +52,15 @@ def amplitude_step(levels: Levels) -> Step | None:
 
 
 def _least_gain(step: Step) -> float:
-    """A few of many recordings that are √2 off may have missed their place."""
+    """A few of many recordings that are √2 off may have missed their place.
+
+    One recording may be off by chance. Two levels of which one is half the other may be one where they overlap: presses
+    that miss their place only lower the level, and halves of such a skewed distribution fit better than the whole.
+    """
     if len(step.off) > _MANY and step.off.mean() < _FEW and abs(log(step.factor)) < _PLAIN_SIZE:
         return np.inf
-    return _GAIN if step.off.sum() > 1 else _GAIN_ALONE
+    skewed = log(step.factor) < -_PLAIN_SIZE and step.near <= _APART
+    return _GAIN_UNSURE if skewed or step.off.sum() == 1 else _GAIN
 
 
 def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
@@ -88,9 +95,10 @@ def _step(levels: Levels, factor: float, base: float) -> Step | None:
         if exact and follows_an_axis(off, levels.axes):
             within = _PLAIN_WITHIN if abs(size) > _PLAIN_SIZE else _SHARP_WITHIN
             exact = abs(away) + deviation < within
-        if exact and (np.abs(fit.residual(value)) < 0.35 * abs(size)).mean() > _WELL:
+        near = float((np.abs(fit.residual(value)) < 0.35 * abs(size)).mean())
+        if exact and near > _WELL:
             cost = _COST * log(comb(len(off), int(off.sum())))
-            found.append(Step(factor, off, fit.evidence - base - cost))
+            found.append(Step(factor, off, fit.evidence - base - cost, near))
     return max(found, key=lambda step: step.gain, default=None)
 
 
