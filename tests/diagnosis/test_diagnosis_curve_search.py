@@ -10,10 +10,14 @@ from scipy import optimize
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves
+from tests.support.kinds_campaigns import SPHERE, curves, lines
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference import least_squares
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.inference.starts import Beginning, best_starts
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import PRIORS
@@ -22,6 +26,7 @@ from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 SUPPORTED = 6
+_STICKY = {"work_j_per_m2": 1.0}
 
 
 @pytest.fixture(scope="module")
@@ -97,3 +102,38 @@ def test_an_error_half_as_large_again_as_before_misleads(square: float, misled: 
     assert after.misleads(before) is misled
     assert not replace(after, noise=2.0).misleads(before)  # which noise gives as well
     assert not replace(after, unsure=2.0).misleads(before)  # as do parameters that the rest does not tell
+
+
+@pytest.mark.parametrize("added", ["contact_creep", "compressible_layer", "instrument_compliance"])
+def test_a_set_of_curves_begins_also_where_its_parent_stands_and_the_added_mechanism_does_nothing(
+    added: str, table: SigmaTable
+) -> None:
+    """There it fits as well as the parent, but for the prior of what was added."""
+    document = lines()
+    document["recordings"] = curves("indentation", {**SPHERE, "retract": True}, effects={"adhesion": _STICKY})
+    problem = FittingProblem(curve_lines(parse(document), "indentation"), table)
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    (sticks,) = problem.explain([Request(("adhesion",), begin=nothing.point)])
+    assert sticks is not None
+    hypothesis = problem.hypothesis((added, "adhesion"), placed=False)
+    fitter = Fitter([hypothesis])
+    (starts,) = best_starts(fitter, [Beginning({"adhesion": sticks.own("adhesion")}, sticks.point, {})])
+    at = fitter.evaluate(starts)
+    own = own_places(hypothesis.model.names, problem.lines)[added]
+    new = hypothesis.model.parameters[own]
+    priors = [sum(entry.log_prior(value) for entry, value in zip(new, fit[own], strict=True)) for fit in starts.fit]
+    assert min(at.cost + priors) < sticks.best.cost + 1.0
+
+
+def test_a_set_asked_for_is_explained_although_it_gains_nothing_over_its_parent(table: SigmaTable) -> None:
+    problem = FittingProblem(curve_lines(pressed(3.0, (5.0,)), "indentation"), table)
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    (alone,) = problem.explain([Request(("instrument_compliance",), begin=nothing.point)])
+    assert alone is not None
+    names = ("contact_creep", "instrument_compliance")
+    left, kept = problem.explain([Request(names, alone), Request(names, alone, kept=True)])
+    assert left is None
+    assert kept is not None
+    assert alone.best.cost - 1.0 < kept.best.cost < alone.best.cost + 10.0

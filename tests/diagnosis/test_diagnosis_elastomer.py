@@ -1,11 +1,17 @@
 """What curves of an elastomer tell beside FRFs or alone: modulus, thickness, rate of relaxation."""
 
+import numpy as np
 import pytest
 
 from rig.description import parse as experiment
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from tests.support.kinds_campaigns import BLOCK, LINES, SKIN, SPHERE, Effects, curves, lines, modulus_of, named, report
+from underskin.diagnosis.data.dataset import lines as frf_lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
+from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
+from underskin.diagnosis.selection.other_kinds import Beside
+from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -94,3 +100,45 @@ def test_a_wrong_modulus_and_a_wrong_thickness_are_both_told_beside_a_resonance(
     told = {mechanism["name"]: mechanism["parameters"][0] for mechanism in document["mechanisms"]}
     assert told["modulus_error"]["low"] < 9 / 16 < told["modulus_error"]["high"]
     assert told["thickness_error"]["low"] < 1.16 < told["thickness_error"]["high"]
+
+
+def _told_of_a_compressible_layer(effects: Effects, names: tuple[str, ...], table: SigmaTable) -> OtherKind:
+    """Indentations of an elastomer of 16 MPa with the null hypothesis alone; what it tells of `names` is fitted."""
+    document = lines()
+    document["recordings"] += curves("indentation", {**SPHERE, "retract": True}, effects=effects)
+    problem = of_curves(parse(document), "indentation", table, ())
+    (nothing,) = problem.explain([Request(())])
+    assert nothing is not None
+    kind = OtherKind("indentation", problem, [nothing])
+    kind.told(names, kind.supported)
+    return kind
+
+
+@pytest.mark.parametrize("effects", [{}, {"adhesion": {"work_j_per_m2": 1.0}}])
+def test_poissons_ratio_that_indentations_do_not_tell_leaves_the_modulus_as_open_as_its_bounds_do(
+    effects: Effects, table: SigmaTable
+) -> None:
+    """They tell E/(1 − ν²), as of a sphere on a half space: E by what ν may be, from 0.3 to 0.5."""
+    names = ("compressible_layer", *effects)
+    kind = _told_of_a_compressible_layer(effects, names, table)
+    told = kind.told(names, kind.supported)
+    log_e = np.log(16e6 * (1 - np.linspace(0.3, 0.5, 2001) ** 2) / 0.75)
+    assert told.mean[0] == pytest.approx(log_e.mean(), abs=0.03)
+    assert np.sqrt(told.covariance[0, 0]) == pytest.approx(log_e.std(), rel=0.1)
+    assert told.quantities[1] == ("compressible_layer", "poisson_ratio")
+    assert told.mean[1] == pytest.approx(0.4, abs=0.01)
+    assert np.sqrt(told.covariance[1, 1]) == pytest.approx(0.2 / np.sqrt(12), rel=0.05)
+
+
+def test_frfs_of_a_compressible_layer_learn_the_modulus_from_indentations_and_not_poissons_ratio(
+    table: SigmaTable,
+) -> None:
+    kind = _told_of_a_compressible_layer({}, ("compressible_layer",), table)
+    problem = FittingProblem(frf_lines(parse(lines())), table, Beside([kind], ()))
+    hypothesis = problem.hypothesis(("modulus_error", "compressible_layer"), placed=False)
+    knowledge = hypothesis.knowledge
+    assert knowledge is not None
+    places = {entry.name: place for place, entry in enumerate(hypothesis.model.parameters)}
+    known = places["modulus_factor"]
+    assert knowledge.precision[known, known] ** -0.5 == pytest.approx(0.06, rel=0.15)
+    assert not knowledge.precision[places["poisson_ratio"]].any()

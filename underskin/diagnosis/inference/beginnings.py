@@ -21,7 +21,7 @@ _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 class BeginningEvaluator(SettlingEvaluator):
     """Evaluates points, and begins fits."""
 
-    def _start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
+    def start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
         """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
         parent or at their centre; noise as it is usual."""
         owner = np.repeat(np.arange(len(own)), [len(entry) for entry in own])
@@ -46,7 +46,7 @@ class BeginningEvaluator(SettlingEvaluator):
         self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
     ) -> Evaluated:
         """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
-        points = self._start(own, parents or [None] * len(own))
+        points = self.start(own, parents or [None] * len(own))
         products = self.products(points, slopes=slopes, place=self.placed)
         if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)

@@ -88,7 +88,7 @@ class Request:
     alone: Explanation | None = None
     begin: FitPoint | None = None  # where nuisances begin, if not where the parent has them
     larger: Explanation | None = None  # a set with one mechanism more, from whose fit this one begins
-    kept: bool = False  # fitted to its end however far behind it begins
+    kept: bool = False  # fitted to its end however far behind it begins, and explained though it gains nothing
 
     @property
     def without_scatter(self) -> bool:
@@ -98,7 +98,7 @@ class Request:
     def target(self, placed: bool) -> float:
         """The cost below which a fit with or without positioning scatter is better than the parent's, where that can be
         compared; else ∞."""
-        if self.parent is None or (self.parent.placed > 0.5) is not placed:
+        if self.parent is None or self.kept or (self.parent.placed > 0.5) is not placed:
             return np.inf
         return self.parent.best.cost - _LEAST_GAIN
 

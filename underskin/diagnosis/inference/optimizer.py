@@ -53,6 +53,9 @@ class Fitter(BeginningEvaluator):
         if not self.lines.curves:
             return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
         begun = by_least_squares(self, start)
+        as_they_are = self.settle(self.evaluate(start), _CURVE_SETTLING)
+        if as_they_are.cost.min() < begun.cost[0]:
+            begun = as_they_are[as_they_are.best()]
         if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
             return begun
         return self.settle(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)

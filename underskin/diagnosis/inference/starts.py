@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import minimum_filter
@@ -106,12 +106,37 @@ def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[st
     guesses = any(fitter.lines.mechanisms[name].begins_at_guesses for name in new)
     kept = _KEPT_OF_PARENT if beginning.parent is not None and not guesses else _KEPT_STARTS
     chosen = several.points[np.sort(_cheapest(several)[:kept])]
+    if new and beginning.parent is not None and beginning.begin is not None:
+        chosen = together(chosen, _without_effect(fitter, new, beginning.parent, beginning.begin))
     if not (sticks and guessed):
         return chosen
     # What the null hypothesis made of modulus and contact points may lead away from where the jumps are.
     own = fitter.hypotheses[0].own_parameters
     begun = fitter.begin([lowest.points.fit[count:, :own]], [None])
     return together(chosen, begun.points[_cheapest(begun)[:1]])
+
+
+def _without_effect(
+    fitter: Fitter, new: Sequence[str], parent: Mapping[str, Sequence[float]], begin: FitPoint
+) -> Points:
+    """Where a set's fit stands, with the mechanisms that were added to it as near as may be to no effect."""
+    (hypothesis,) = fitter.hypotheses
+    own = np.zeros((1, hypothesis.own_parameters))
+    for name, place in own_places(hypothesis.model.names, hypothesis.lines).items():
+        own[0, place] = (
+            [_of_no_effect(one) for one in hypothesis.model.parameters[place]] if name in new else parent.get(name, ())
+        )
+    return replace(fitter.start([own], [begin]), covariance=begin.covariance[None])
+
+
+def _of_no_effect(entry: Parameter) -> float:
+    """The fit coordinate within the bounds that is nearest to no effect; the prior's centre where none is."""
+    if entry.limit is None:
+        return entry.start
+    low, high = entry.bounds
+    if entry.fit_limit is not None:
+        return float(np.clip(entry.fit_limit, low, high))
+    return high if entry.limit > 0 else low
 
 
 def _cheapest(at: Evaluated) -> Indices:

@@ -12,6 +12,7 @@ import numpy as np
 
 from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.inference.across_bounds import parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.selection.priors import least_evidence, log_prior
@@ -135,9 +136,12 @@ class OtherKind:
     def _explained(self, names: frozenset[str]) -> Explanation:
         if names not in self._explanations:
             ordered = tuple(name for name in self.supported if name in names)
+            smaller = [self._explanations.get(names - {name}) for name in ordered]
+            parent = max((one for one in smaller if one), key=lambda one: one.log_evidence, default=None)
             begin = self._explanations[frozenset()].point
-            (explanation,) = self.problem.explain([Request(ordered, begin=begin, kept=True)])
-            assert explanation is not None
+            requests = [Request(ordered, begin=begin, kept=True), Request(ordered, parent, kept=True)]
+            found = self.problem.explain(requests if parent else requests[:1])
+            explanation = max((one for one in found if one), key=lambda one: one.log_evidence)
             self._explanations[names] = explanation
         return self._explanations[names]
 
@@ -175,21 +179,36 @@ def _mixture(
     weights = np.array([weight for _, weight in each])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     posteriors = [_posterior(entry, both) for entry, _ in each]
-    means = np.array([mean for _, mean, _ in posteriors])
-    mean = shares @ means
-    within = np.tensordot(shares, np.array([covariance for _, _, covariance in posteriors]), 1)
-    return posteriors[0][0], mean, within + (shares[:, None] * (means - mean)).T @ (means - mean)
+    return posteriors[0][0], *_mixed(shares, [mean for _, mean, _ in posteriors], [one for _, _, one in posteriors])
+
+
+def _mixed(shares: Floats, means: Sequence[Floats], covariances: Sequence[Floats]) -> tuple[Floats, Floats]:
+    """Mean and covariance of a mixture of distributions with these."""
+    mean = np.asarray(shares @ np.array(means))
+    away = np.array(means) - mean
+    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * away).T @ away
 
 
 def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
     """Mean and covariance of what both kinds know: the modulus' logarithm, the parameters of mechanisms."""
-    hypothesis, fit = explanation.best.hypothesis, explanation.point.fit
-    parameters, lines = explanation.model.parameters, hypothesis.lines
+    modulus = [entry.name for entry in explanation.model.parameters].index("youngs_modulus")
+    each = parts(explanation.best, modulus)
+    known = [_quantities(explanation, part.fit, both, modulus) for part in each]
+    mean_places = explanation.best.hypothesis.mean_places
+    slopes = [rows[:, mean_places] for _, _, rows in known]
+    covariances = [one @ part.covariance @ one.T for one, part in zip(slopes, each, strict=True)]
+    return known[0][0], *_mixed(np.array([part.share for part in each]), [mean for _, mean, _ in known], covariances)
+
+
+def _quantities(
+    explanation: Explanation, fit: Floats, both: frozenset[str], modulus: int
+) -> tuple[tuple[Quantity, ...], Floats, Floats]:
+    """What both kinds know, its values at a point and their slopes over the fit coordinates (quantities, parameters);
+    the place of the modulus is given."""
+    parameters, lines = explanation.model.parameters, explanation.best.hypothesis.lines
     quantities: list[Quantity] = [MODULUS]
-    values, rows = [], []
-    modulus = [entry.name for entry in parameters].index("youngs_modulus")
-    values.append(fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0)))
-    rows.append(np.eye(len(fit))[modulus])
+    values = [fit[modulus] + np.log(to_si("youngs_modulus_mpa", 1.0))]
+    rows = [np.eye(len(fit))[modulus]]
     for name, place in own_places(explanation.names, lines).items():
         if name not in both:
             continue
@@ -201,9 +220,7 @@ def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Qu
             quantities.append((name, key))
             values.append(float(quantity.value[0]))
             rows.append(quantity.slopes[:, 0])
-    by_fit = np.array(rows)[:, hypothesis.mean_places]
-    covariance = by_fit @ explanation.best.covariance @ by_fit.T
-    return tuple(quantities), np.array(values), covariance
+    return tuple(quantities), np.array(values), np.array(rows)
 
 
 def _unit(entry: Parameter, fit: Floats, index: int, count: int) -> Floats:

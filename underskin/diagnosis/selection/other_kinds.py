@@ -189,7 +189,8 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence; normal."""
     centre, variance, flat, higher = (np.array(column) for column in zip(*priors, strict=True))
     flat = flat.astype(bool)
-    known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * variance)
+    widest = np.where(flat, variance * (2 * np.pi / 12), variance)  # between bounds: a uniform distribution's
+    known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * widest)
     if not known.any():
         return Knowledge(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
     after = np.linalg.inv(told.covariance[np.ix_(known, known)])
