@@ -12,9 +12,9 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 PEERS = tesseract nanite
 GENERATOR = openapi-client
 
-# A process more than two cores, since tests of servers also wait; the tests of one file stay in one of them, since they
-# share servers.
-PYTEST = $(PYTHON) -m pytest --numprocesses 3 --dist loadfile
+# Two processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of them,
+# since they share servers.
+PYTEST = $(PYTHON) -m pytest --numprocesses 4 --dist loadfile
 
 # Modules stay compiled: servers, workers and commands start some hundred times in the tests.
 unexport PYTHONDONTWRITEBYTECODE
@@ -41,7 +41,7 @@ soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full coun
 	@scripts/system-packages.sh $(TEST_PACKAGES)
 	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS)
 
-check: $(VENV)/.dev ## format, lint, strict types, import direction
+check: $(VENV)/.dev-packages ## format, lint, strict types, import direction
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m mypy
@@ -89,16 +89,22 @@ $(VENV)/.created: scripts/make-venv.sh
 	@touch $@
 
 # Without an index, a package that the lock lacks is an error and not a download.
-$(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
+$(VENV)/.packages: $(VENV)/.created requirements.lock pyproject.toml
 	@echo "Installing the locked packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements.lock
 	@$(PIP_INSTALL) --no-index --no-build-isolation -e '.[server,fem]'
+	@touch $@
+
+$(VENV)/.runtime: $(VENV)/.packages
 	@$(PYTHON) -m underskin.compiled
 	@touch $@
 
-$(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
+$(VENV)/.dev-packages: $(VENV)/.packages requirements-dev.lock
 	@echo "Installing the locked development packages into $(VENV) ..."
 	@$(PIP_INSTALL) --require-hashes -r requirements-dev.lock
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime $(VENV)/.dev-packages
 	@touch $@
 
 $(VENV)-%/.installed: requirements-%.lock

@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from anyio import to_thread
-from fastapi import APIRouter, Depends, FastAPI, Security
+from fastapi import Depends, FastAPI, Security
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp
 
@@ -98,12 +98,14 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     )
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)
-    v1 = APIRouter(dependencies=[Security(authorised, scopes=["read"]), Depends(known_query)])
+    # Each on its own: FastAPI prepares the routes of a router within a router once more.
+    guards = [Security(authorised, scopes=["read"]), Depends(known_query)]
     of_skins = (campaigns, diagnoses, exports, skins, changes, models)
     for noun in (sigma, pressed_skin, stress, field, design, tables, *of_skins, mechanisms):
-        v1.include_router(noun.router)
-    for router in (v1, umbridge.router, health.router, metrics.router, openapi.router, pages.router):
+        api.include_router(noun.router, dependencies=guards)
+    for router in (umbridge.router, health.router, metrics.router, openapi.router):
         api.include_router(router)
+    pages.add_to(api)
     return api
 
 

@@ -1,6 +1,6 @@
 """The pages: what a browser sees of the service, without JavaScript to build and with nothing from outside."""
 
-from fastapi import APIRouter
+from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
 from service.pages.array import loads, pressure_map
@@ -31,13 +31,17 @@ _PAGES = (
     *_OF_SKINS, design, design_search, field, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets
 )  # fmt: skip
 
-router = APIRouter(include_in_schema=False)
 for _page in _PAGES:
     workbooks.add_to(_page.router)
-    router.include_router(_page.router)
+
+
+def add_to(api: FastAPI) -> None:
+    """Let the service have them; they are not in the OpenAPI document."""
+    for page in _PAGES:
+        api.include_router(page.router, include_in_schema=False)
 
 
 def methods(path: str) -> list[str]:
-    """All methods of a page's path; pages are not in the OpenAPI document."""
+    """All methods of a page's path; the OpenAPI document does not tell them."""
     routes = [route for page in _PAGES for route in page.router.routes if isinstance(route, APIRoute)]
     return sorted({method for route in routes if route.path == path for method in route.methods or ()})

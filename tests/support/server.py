@@ -12,7 +12,8 @@ import httpx
 
 from tests.support import preloaded
 
-_START_LIMIT = 30.0  # s
+_START_LIMIT = 120.0  # s: a machine may be busy
+_END_LIMIT = 60.0  # s, with the diagnosis that it is at
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def running(folder: Path, settings: Mapping[str, str] | None = None, *options: s
         yield Server(url, process, log)
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(_END_LIMIT)
 
 
 def _await_ready(url: str, process: preloaded.Process, log: Path) -> None:

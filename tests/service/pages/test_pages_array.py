@@ -14,13 +14,11 @@ WIDTHS = [1180, 390]
 
 @pytest.fixture(params=WIDTHS)
 def lab(reader: Visit, request: pytest.FixtureRequest) -> Visit:
-    """Somebody on the example's page."""
+    """Somebody on the example's page, in a window of this width."""
     reader.page.set_viewport_size({"width": request.param, "height": 800})
-    reader.go("/")
-    reader.page.get_by_role("button", name="Load the example skin").click()
-    reader.page.wait_for_url("**/skins/example")
-    reader.drawn(2)
-    return reader
+    newcomer: Visit = request.getfixturevalue("newcomer")
+    newcomer.drawn(2)
+    return newcomer
 
 
 def place_of(figure: Locator, sensor: str) -> tuple[float, float]:

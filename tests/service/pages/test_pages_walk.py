@@ -5,18 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.service.pages.conftest import Visit
-
-EXAMPLE = "/skins/example"
-
-
-@pytest.fixture
-def newcomer(reader: Visit) -> Visit:
-    """Somebody who loads the example."""
-    reader.go("/")
-    reader.page.get_by_role("button", name="Load the example skin").click()
-    reader.page.wait_for_url(f"**{EXAMPLE}")
-    return reader
+from tests.service.pages.conftest import EXAMPLE, Visit
 
 
 def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:

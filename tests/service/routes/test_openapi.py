@@ -255,13 +255,16 @@ def authorization(server: Server) -> dict[str, str]:
 @pytest.mark.parametrize("with_key", [False, True])
 def test_schemathesis_finds_nothing(shared_server: Server, locked: Server, with_key: bool, tmp_path: Path) -> None:
     asked = locked if with_key else shared_server
-    examples = "2000" if os.environ.get("UNDERSKIN_SOAK") else "10"
+    soak = "UNDERSKIN_SOAK" in os.environ
+    examples = "2000" if soak else "10"
     command = [
         *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(ROOT / "schemathesis.toml")),
         *("run", f"{asked.url}/openapi.json", "--max-examples", examples, "--seed", "20180208", "--no-color"),
     ]
     if with_key:
         command += ["--header", f"Authorization: {authorization(asked)['Authorization']}"]
+        if not soak:  # the thousands of values at the limits of each field go to the server without keys alone
+            command += ["--phases", "examples,fuzzing,stateful"]
     found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]
     every_other = len(OPERATIONS) - 1  # than the one that gives the document
