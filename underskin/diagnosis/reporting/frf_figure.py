@@ -51,8 +51,8 @@ class _Trace(NamedTuple):
 
 def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Figure:
     """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
-    are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them, and
-    what each trace shows."""
+    are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them,
+    and what each trace shows."""
     models = [_Model("after", after, _AFTER, "solid", "circle")]
     if before:
         models.insert(0, _Model("before", before, _BEFORE, "dash", "square-open"))
