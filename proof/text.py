@@ -14,6 +14,7 @@ from proof.text_curves import curves, quiet_curves
 from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_slips import slips
+from proof.text_summary import summary
 from proof.text_unlisted import alarms, hidden, left_out
 from proof.text_wide import coverage, search_misses, sensitivity
 from proof.text_wrong_modulus import wrong_modulus
@@ -59,7 +60,8 @@ def document(parts: Mapping[str, Result]) -> str:
         "recordings": recordings,
         "paper": paper_array,
     }
-    written = [section(parts[name]) for name, section in sections.items() if name in parts]
+    short = summary(parts)
+    written = ([short] if short else []) + [section(parts[name]) for name, section in sections.items() if name in parts]
     state = table(
         ["part", "sources of the diagnosis"], [[name, f"`{part['sources']}`"] for name, part in parts.items()]
     )

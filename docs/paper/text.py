@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from docs.paper import block_text, stuck_cylinder
+from docs.paper import block_text, stuck_cylinder, summary
 from docs.paper.block_question import Depth
 from docs.paper.claims import checked
 from docs.paper.markdown import ceiling, percent, table
@@ -17,7 +17,9 @@ L. Seminara, *Modeling Electronic Skin Response to Normal Distributed Force*, Se
 doi:10.3390/s18020459. Everything on this page, figures and numbers, is written by `make paper` (`docs/paper/`), from
 the table `tables/sigma.h5` (SHA-256 `{table}`), fresh finite-element solves, the diagnosis, and a server that
 `make paper` starts.
+"""
 
+_DRAWN = """\
 ## What is drawn
 
 The figures follow the paper's captions. Those of its model (4, 6, 8, 10, 11) are drawn again, beside the exact layer
@@ -95,6 +97,8 @@ def document(sigma_table: SigmaTable, depths: Sequence[Depth], wide_block_error:
     """The whole page."""
     sections = (
         _INTRODUCTION.format(table=sigma_table.sha256),
+        summary.section(sigma_table),
+        _DRAWN,
         claims_section(sigma_table),
         load_section([press(sigma_table, radius, PRELOADS_N) for radius in INDENTERS_MM]),
         block_text.section(sigma_table, depths, wide_block_error),

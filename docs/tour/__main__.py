@@ -1,11 +1,13 @@
 """`python -m docs.tour`: write docs/tour.md and its screenshots."""
 
+import json
 import tempfile
 from pathlib import Path
 
-from docs.tour.photographer import browsing, photograph, serving
+from docs.tour.photographer import browsing, photograph, serving, words
 from docs.tour.steps import STEPS, TourStep
 
+SHOWN = "shown.json"  # what each page of the tour said, which a test compares with what it says now
 _HEAD = """# Five minutes with the pages
 
 Written, with its pictures, by `python -m docs.tour`, which starts a server with an empty store and walks through it
@@ -15,11 +17,13 @@ with Chromium. Do the same: `make serve`, then open <http://127.0.0.1:8000>; no 
 
 def main(docs: Path = Path(__file__).parents[1]) -> None:
     """Walk, photograph each step, and write `docs`/tour.md."""
-    folder = docs / "figures"
+    folder, shown = docs / "figures", {}
     with tempfile.TemporaryDirectory() as data, serving(Path(data)) as address, browsing(address) as page:
         for number, step in enumerate(STEPS, start=1):
             step.walk(page)
             photograph(page, folder / picture(number, step))
+            shown[step.name] = words(page)
+    (docs / "tour" / SHOWN).write_text(json.dumps(shown, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
     (docs / "tour.md").write_text(document(), encoding="utf-8")
 
 

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -18,6 +19,7 @@ from playwright.sync_api import Page, ViewportSize, sync_playwright
 _START_S = 60.0
 _SIZE = ViewportSize(width=1180, height=760)
 _COLOURS = 256
+_CHANGING = re.compile(r"\d{1,2} [A-Z][a-z]{2} \d{4}(, \d\d:\d\d)?|\b[cd]-[0-9a-f]{16}\b")
 _EXPERIMENT = Path(__file__).parents[2] / "examples" / "rig" / "time_series.yaml"
 
 
@@ -53,6 +55,7 @@ def browsing(address: str) -> Iterator[Page]:
 
 def drawn(page: Page, name: str) -> None:
     """Bring a figure into view and wait until it is drawn."""
+    page.wait_for_load_state()  # by then all figures have their height
     figure = page.locator(f"#figure-{name}")
     figure.scroll_into_view_if_needed()
     figure.locator(".main-svg").first.wait_for()
@@ -62,6 +65,15 @@ def photograph(page: Page, path: Path) -> None:
     """What the window shows, in as few colours as a drawing needs: under 100 kB."""
     shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
     shot.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def words(page: Page) -> str:
+    """What the page says outside its drawings, without dates and ids, which are others each time."""
+    drawings = "document.querySelectorAll('.plot').forEach((plot) => (plot.style.display = '{}'))"
+    page.evaluate(drawings.format("none"))
+    text = page.locator("main").inner_text()
+    page.evaluate(drawings.format(""))
+    return _CHANGING.sub("…", text)
 
 
 def raw_recordings(folder: Path) -> tuple[Path, Path]:

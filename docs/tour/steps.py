@@ -122,21 +122,22 @@ STEPS = (
     TourStep(
         "diagnosis",
         "A diagnosis",
-        "*Diagnose* asks what the model leaves out; for these 64 recordings the answer takes some seconds. First the "
-        f"answer in one sentence, here {VERDICT}; then where recordings and model disagree, the region outlined; then "
-        "how probable each explanation is, its parameters with intervals, the alternatives and why not, and what these "
-        "recordings cannot tell. [How it reasons](diagnosis.md).",
+        "*Diagnose* asks what the model leaves out; for these 64 recordings the answer takes some seconds. The page "
+        f"begins with a summary: the answer in one sentence, here {VERDICT}; what to quote, the error with it and "
+        "without, on recordings that it was not fitted to, and what to mind. Printed, or saved as PDF from the "
+        "browser's print dialog, the summary and its three figures are the first page. Folded below: where recordings "
+        "and model disagree, the parameters with intervals, the alternatives and why not, what these recordings cannot "
+        "tell, and what to measure next. [How it reasons](diagnosis.md).",
         _diagnosis,
     ),
     TourStep(
         "better",
-        "How much better",
-        "The error with the explanation and without, on recordings that it was not fitted to, beside what noise "
-        "alone gives. Recording by recording, magnitude and phase as measured, with the paper's model and the "
-        "explanation laid over them; below, what either leaves, on the band in which 95 % of the noise lies. Then "
-        "what to measure next, where something is left open, also within the limits of your own rig: the spheres "
-        "at hand, the preloads it holds. The whole is printed, saved as PDF from the browser's print dialog, or "
-        "saved as one HTML file that opens anywhere.",
+        "Measured and predicted",
+        "Recording by recording, magnitude and phase as measured, with the paper's model and the explanation laid "
+        "over them; below, what either leaves, on the band in which 95 % of the noise lies. *Sensor by sensor*, "
+        "further down, is the array: click a sensor for its recordings and its history. What to measure next, where "
+        "something is left open, is also planned within the limits of your own rig: the spheres at hand, the preloads "
+        "it holds. The whole is saved as one HTML file that opens anywhere.",
         _better,
     ),
     TourStep(

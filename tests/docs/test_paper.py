@@ -12,6 +12,7 @@ from docs.paper.__main__ import main
 from docs.paper.prototype import INDENTERS_MM, PRELOADS_N, press
 from docs.paper.service_run import D33_PC_PER_N, ArrayRun, run_array
 from docs.paper.stuck_cylinder import section as cylinder_section
+from docs.paper.summary import section as summary_section
 from docs.paper.text import array_section, claims_section, load_section
 from tests.support.repository import ROOT
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -63,7 +64,8 @@ def test_the_service_agrees_with_fresh_solves(run: ArrayRun) -> None:
 @pytest.mark.server
 def test_the_page_says_what_is_computed(table: SigmaTable, run: ArrayRun) -> None:
     presses = [press(table, radius, PRELOADS_N) for radius in INDENTERS_MM]
-    for section in (claims_section(table), load_section(presses), cylinder_section(table), array_section(run)):
+    short = summary_section(table)
+    for section in (short, claims_section(table), load_section(presses), cylinder_section(table), array_section(run)):
         assert_same_but_for_rounding(section.rstrip("\n"), committed_section(section))
     assert table.sha256 in (DOCS / "paper.md").read_text(encoding="utf-8")
 

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, Store, Table, sender
+from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import same_request, verdicts
@@ -68,8 +69,10 @@ def ask_again(
 
 
 @router.get("/diagnoses/{diagnosis_id}")
-def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response:
-    """How far it is, or what it found."""
+def diagnosis(
+    request: Request, diagnosis_id: DiagnosisId, store: Store, table: Table, sensor: str | None = None
+) -> Response:
+    """How far it is, or what it found; `sensor` picks the one whose recordings and history are shown."""
     with store.reading() as connection:
         row, report, figures = _kept(connection, diagnosis_id)
         of_skin = models.of_skin(connection, skins.require_root(connection, row.skin_id))
@@ -87,6 +90,7 @@ def diagnosis(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Resp
         alone=alone,
         members=members,
         shown=None if report is None else _shown(row, report, figures),
+        array=shown_array(store, table, row, figures, sensor) if alone else None,
         lacks_figures=alone and report is not None and report["fit"] is not None and not figures,
         outdated=diagnoses.outdated(row),
         adopted_as=adopted_as,

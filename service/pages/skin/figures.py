@@ -1,16 +1,16 @@
-"""The figures of a skin's page: its array as a map, its sensors over time."""
+"""The figure of a skin's page: its array as a map."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 from urllib.parse import quote
 
 from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensors_of
-from service.schemas.skins import History, SensorHistory, TrendAnswer
+from service.pages.shared.history import RESTS, By
+from service.schemas.skins import History, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import interval
 
 Shown = Literal["d33", "uncertainty", "trend"]
-By = Literal["paper", "adopted"]
 
 # Column of the values, column of their uncertainties, name, unit, what colours are compared against.
 _QUANTITIES: dict[Shown, tuple[str, str, str, str, Literal["others", "zero", "nothing"]]] = {
@@ -22,7 +22,6 @@ _ENDS: dict[Shown, tuple[str, str]] = {
     "d33": ("d33_low_pc_per_n", "d33_high_pc_per_n"),
     "trend": ("slope_low_pc_per_n_per_year", "slope_high_pc_per_n_per_year"),
 }  # columns of 95 % intervals
-_RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
 
 
 def map_rows(row: AnyRow, answer: Mapping[str, Any], history: History) -> list[dict[str, Any]]:
@@ -54,41 +53,7 @@ def drawn_map(
     values, uncertainties = columns_of(rows, value, uncertainty)
     figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)
     about = (
-        f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {_RESTS[by]}. "
+        f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
     about += f"{told_apart(values, uncertainties, quantity)} {CLICK}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
-
-
-def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Drawn:
-    """d33 over time: of one sensor, of all, or of many the median and the range."""
-    from underskin.figures.history import SensorPoints, d33_history, is_summarised
-
-    numbers = f"/skins/{quote(root, safe='')}/history.csv?model={by}"
-    points = [
-        SensorPoints(
-            entry.sensor,
-            [point.time for point in entry.points],
-            [point.d33_pc_per_n for point in entry.points],
-            [point.d33_uncertainty_pc_per_n for point in entry.points],
-            _trend_in_words(entry),
-        )
-        for entry in history.sensors
-    ]
-    whose = "each sensor" if sensor is None else sensor
-    about = f"d33 of {whose} in every campaign, {_RESTS[by]}, with its 95 % interval."
-    if is_summarised(len(points), sum(len(entry.times) for entry in points)):
-        about = (
-            f"Median d33 over the sensors in each campaign, {_RESTS[by]}, the range of 90 % of them, and by name those "
-            f"that stand apart{'' if sensor is None else f'; the line is {sensor}'}. Point at a sensor for its line."
-        )
-    return drawn("history", d33_history(points, sensor), about, numbers)
-
-
-def _trend_in_words(entry: SensorHistory) -> str:
-    """What the sensor's d33 does over time."""
-    line = entry.trend
-    if line is None:
-        return f"no trend: {entry.no_trend}"
-    slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
-    return slope if line.significant else f"no significant trend ({slope})"

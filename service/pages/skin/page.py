@@ -12,9 +12,10 @@ from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import csv_of_rows
 from service.pages.shared.forms import RefusedForm
+from service.pages.shared.history import By, drawn_history
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
-from service.pages.skin.figures import By, Shown, drawn_history, drawn_map, map_rows
+from service.pages.skin.figures import Shown, drawn_map, map_rows
 from service.schemas.campaign_d33 import D33Value
 from service.schemas.diagnoses import DiagnosisKind
 from service.schemas.skins import History

@@ -11,14 +11,13 @@ from service.dependencies import WRITE, Store, Table, sender
 from service.ingest.accept import IngestOptions, accept
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import OWN_FORM, see
-from service.store import campaigns
+from service.store import campaigns, skins
 from service.usecases import d33_cache
 
 router = APIRouter()
 
 SKIN = "example"
 _FOLDER = Path(__file__).parent / "example"
-_MOST = 1000  # campaigns of it that are looked at
 
 
 @router.post("/example", dependencies=[*WRITE, OWN_FORM])
@@ -39,7 +38,8 @@ async def load(request: Request, store: Store, table: Table) -> Response:
 
 def _withdrawn(connection: Connection) -> int | None:
     """How many campaigns the skin had, all of which were withdrawn; None where one is in use."""
-    rows = campaigns.listed(connection, campaigns.CampaignFilters(skin=SKIN), None, _MOST)
+    skin = skins.find(connection, SKIN)
+    rows = [] if skin is None else campaigns.of_skin(connection, skin.root_id)
     return None if any(campaigns.state(row) == "current" for row in rows) else len(rows)
 
 

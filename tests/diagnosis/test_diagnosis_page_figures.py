@@ -1,0 +1,97 @@
+"""The figures of a report's page show its numbers, and where the misfit is."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.pipeline import diagnose
+from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.recordings.campaign import Campaign
+from underskin.surrogate.sigma_table import load_table
+
+RESONANT = Made(
+    mechanisms=("contact_resonance",), parameters=(6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2
+)
+
+
+@pytest.fixture(scope="module")
+def found() -> DiagnosisResult:
+    return diagnose(campaign(RESONANT, load_table()), load_table())
+
+
+@pytest.fixture(scope="module")
+def document(found: DiagnosisResult) -> dict[str, Any]:
+    return report(found)
+
+
+@pytest.mark.slow
+def test_figures_show_the_report_s_numbers(found: DiagnosisResult, document: dict[str, Any]) -> None:
+    drawn = figures(found, document)
+    bars = drawn["explanations"].data[0]
+    assert next(iter(bars.y)) == "contact resonance"
+    assert list(bars.x) == [document["probability"], *(entry["probability"] for entry in document["alternatives"])]
+    intervals = [trace.x for trace in drawn["parameters"].data if trace.name == "95 % interval"]
+    parameters = document["mechanisms"][0]["parameters"]
+    assert [list(ends) for ends in intervals] == [[entry["low"], entry["high"]] for entry in parameters]
+    for axis, (low, high) in zip(drawn["parameters"].select_xaxes(), intervals, strict=True):
+        assert (high - low) / (axis.range[1] - axis.range[0]) == pytest.approx(1 / 3)  # it is seen, however narrow
+    notes = [note.text for note in drawn["parameters"].layout.annotations]
+    assert all("before the recordings" in note for note in notes)
+    for plot in ("", "2"):
+        x, y = (drawn["before_after"].layout[f"{axis}axis{plot}"].range for axis in "xy")
+        assert x == y
+
+
+@pytest.mark.slow
+def test_after_the_points_lie_within_the_noise_s_band(found: DiagnosisResult, document: dict[str, Any]) -> None:
+    traces = figures(found, document)["before_after"].data
+    bands = [trace for trace in traces if trace.fill == "toself"]
+    outside = []
+    for band, name in zip(bands, ("before", "after"), strict=True):
+        points = next(trace for trace in traces if trace.name == name)
+        count = len(band.x) // 2
+        high, low = band.y[:count], band.y[count:][::-1]
+        above = points.y > np.interp(points.x, band.x[:count], high)
+        below = points.y < np.interp(points.x, band.x[:count], low)
+        outside.append(float(np.mean(above | below)))
+    before, after = outside
+    assert after < 0.1 < 0.2 < before
+
+
+@pytest.mark.slow
+def test_the_map_shows_where_the_misfit_is(found: DiagnosisResult, document: dict[str, Any]) -> None:
+    drawn = figures(found, document)["where"]
+    cells, (outline,) = np.abs(np.asarray(drawn.data[0].z, dtype=float)), drawn.layout.shapes
+    inside = cells[:, int(outline.x0 + 0.5) : int(outline.x1 + 0.5)]
+    assert set(document["location"]["region"]) == {"frequency_hz"}
+    assert inside.size < cells.size / 2
+    assert np.nanmean(inside) > 5 * np.nanmean(cells[:, : int(outline.x0 + 0.5)])
+    lowest = float(drawn.layout.xaxis.ticktext[int(outline.x0 + 0.5)])
+    assert lowest == pytest.approx(document["location"]["region"]["frequency_hz"][0], rel=5e-3)
+
+
+def unevenly_recorded() -> Campaign:
+    """A resonant campaign whose recordings have lines at frequencies of their own."""
+    table = load_table()
+    recordings = []
+    for number in range(12):
+        own = campaign(replace(RESONANT, highest_hz=1000.0 * 1.01**number), table).recordings[number]
+        recordings.append(own)
+    return replace(campaign(RESONANT, table), recordings=tuple(recordings))
+
+
+@pytest.mark.slow
+def test_steps_of_frequency_are_common_and_even_in_its_logarithm() -> None:
+    found = diagnose(unevenly_recorded(), load_table())
+    drawn = figures(found, report(found))["where"]
+    steps = np.array([float(text) for text in drawn.layout.xaxis.ticktext])
+    assert len(steps) > 4
+    ratios = steps[1:] / steps[:-1]
+    assert ratios.min() > 1.2
+    assert ratios.max() < 1.6 * ratios.min()
+    assert np.isfinite(np.asarray(drawn.data[0].z, dtype=float)).all()  # no gap
+    assert "the paper's model" in drawn.layout.title.text
