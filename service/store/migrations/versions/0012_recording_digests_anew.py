@@ -1,0 +1,16 @@
+"""Digests of recordings anew: servers of the versions 0007 and 0008 made some of them otherwise at first, and what they
+kept was not recognised when it came again.
+"""
+
+from alembic import op
+
+from service.store.migrations import recording_digests
+
+revision = "0012"
+down_revision = "0011"
+
+
+def upgrade() -> None:
+    """All of them, since none tells how it was made."""
+    op.execute("DELETE FROM recording_digests")
+    recording_digests.keep(op.get_bind())
