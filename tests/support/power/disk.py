@@ -70,7 +70,10 @@ class Disk:
             with tempfile.TemporaryDirectory(dir=self.folder.parent) as new:
                 after.put_folder(root, Path(new))
                 for old in self.folder.iterdir():
-                    shutil.rmtree(old) if old.is_dir() else old.unlink()
+                    if old.is_dir():
+                        shutil.rmtree(old)
+                    else:
+                        old.unlink()
                 for entry in Path(new).iterdir():
                     entry.rename(self.folder / entry.name)
         self._own()
