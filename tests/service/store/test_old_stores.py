@@ -1,0 +1,39 @@
+"""Stores that servers of this repository's history made, taken up by today's: nothing is lost, and answers are equal.
+
+What they hold, and how they were made, is in `old_stores/`.
+"""
+
+import math
+from typing import Any
+
+import pytest
+
+from tests.service.store.old_stores.contents import MADE, SECOND, answers, asked_of, take_over
+from tests.support.store_server import Place, campaign, running
+
+
+def differences(old: Any, new: Any, at: str = "") -> list[str]:
+    """Where an answer of today lacks, or says otherwise, what an old one said; it may say more."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        gone = [f"{at}/{key} is gone" for key in old.keys() - new.keys()]
+        return gone + [
+            line for key in old.keys() & new.keys() for line in differences(old[key], new[key], f"{at}/{key}")
+        ]
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [line for number, (was, now) in pairs for line in differences(was, now, f"{at}/{number}")]
+    if isinstance(old, float) and isinstance(new, float) and math.isclose(old, new, rel_tol=1e-6, abs_tol=1e-9):
+        return []
+    return [] if old == new else [f"{at}: {old!r}, now {new!r}"]
+
+
+@pytest.mark.parametrize("version", MADE)
+def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
+    take_over(place, version)
+    before = answers(place, version)
+    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        assert sorted(asked_of(server.http)) == sorted(before)
+        found = {path: server.http.get(path).raise_for_status().json() for path in before}
+        assert differences(before, found) == []
+        again = server.http.post(f"/v1/campaigns?skin={SECOND}", json=campaign("stays")).raise_for_status().json()
+        assert again["notes"][0].startswith("these recordings are in campaign stays of skin finger already")
