@@ -59,8 +59,9 @@ class Cluster:
         _run("pg_ctl", "start", "--wait", *given, **settings)
 
     def stop(self) -> None:
-        """End its processes at once: the next start recovers from the write-ahead log."""
-        _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={self.data}")
+        """End its processes at once, where they run: the next start recovers from the write-ahead log."""
+        if (self.data / "postmaster.pid").exists():
+            _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={self.data}")
 
     def new_database(self, tablespace: Path | None = None) -> str:
         """An empty database, its tables in `tablespace`.

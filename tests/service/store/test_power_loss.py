@@ -44,6 +44,7 @@ def test_nothing_acknowledged_is_lost_on_postgresql(tmp_path: Path, part: int) -
             pass  # makes the tables
         cluster.stop()
         disk = stack.enter_context(powered(cluster.data))
+        stack.callback(cluster.stop)  # before its disk goes
         cluster.start(**disk.environment)
 
         def cut(partly: random.Random | None) -> None:
