@@ -39,6 +39,7 @@ test: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at reduced c
 
 soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full counts, the long ones included (resumes)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
+	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest -m alone $(TESTS); \
 	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS); status=$$?; $(PYTHON) -m bench soak && exit $$status
 
 check: $(VENV)/.dev ## format, lint, strict types, import direction

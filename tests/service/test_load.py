@@ -94,6 +94,7 @@ def test_no_request_fails_under_load(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
+@pytest.mark.alone
 @pytest.mark.skipif(not SOAK, reason="ten minutes of load; make soak")
 def test_ten_minutes_of_200_requests_a_second(tmp_path: Path) -> None:
     with running(tmp_path) as server:

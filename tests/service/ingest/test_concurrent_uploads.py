@@ -63,6 +63,7 @@ class Watch:
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_many_large_uploads_at_once(tmp_path: Path) -> None:
     content = table(1)
 
