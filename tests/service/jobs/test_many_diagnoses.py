@@ -10,7 +10,7 @@ from tests.support.diagnosed import asked, awaited, resonant, sent
 from tests.support.memory import family_mb
 from tests.support.store_server import Place, running
 
-DIAGNOSES = 2000 if SOAK else 12
+DIAGNOSES = 2000 if SOAK else 4
 WARM_AFTER = DIAGNOSES // 4  # caches are full by then
 MOST_GROWN_MB = 60
 

@@ -20,12 +20,12 @@ from sqlalchemy import Engine, event
 
 from service.store import backup, database, migrate
 from tests.service.conftest import BACKENDS
-from tests.service.store.old_stores.contents import MADE, take_over
+from tests.service.store.old_stores.contents import LANDED, take_over
 from tests.support.store_server import Place
 
 SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
 STEP = 1 if SOAK else 8
-OLDER = MADE if SOAK else MADE[:1]
+OLDER = list(LANDED)[: None if SOAK else 1]
 
 
 @pytest.fixture(params=BACKENDS)

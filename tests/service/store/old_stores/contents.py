@@ -27,12 +27,9 @@ LANDED = {
     "0010": "c01b6c7f",
     "0011": "7dad4974",
     "0012": "25818550",
-    "0013": "ecd950b4",
+    "0013": "286d4cef",
 }
-"""The commit with which each version of the schema landed on the main branch, that had the routes to fill it."""
-
-MADE = [version for version in LANDED if (FOLDER / f"{version}.sqlite3.xz").exists()]
-"""Those whose stores are here."""
+"""The first commit on the main branch whose server runs and fills a store of each version of the schema."""
 
 DIAGNOSES_SINCE = "0003"
 FIRST, SECOND = "palm", "finger"  # skins
