@@ -1,7 +1,7 @@
 """A migration killed half way: the store is as it was or as it is to be, and the next start ends the work.
 
 A process of its own is killed by SIGKILL before one of its statements or commits, on its way from the first schema: at
-one in eight of them, or with UNDERSKIN_SOAK=1 at each of them and from every schema.
+one in twelve of them, or with UNDERSKIN_SOAK=1 at each of them and from every schema.
 """
 
 import multiprocessing
@@ -18,13 +18,13 @@ import alembic.command  # noqa: F401  # for the processes that are forked here, 
 import pytest
 from sqlalchemy import Engine, event
 
+from bench.soak import SOAK
 from service.store import backup, database, migrate
 from tests.service.conftest import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, take_over
 from tests.support.store_server import Place
 
-SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
-STEP = 1 if SOAK else 8
+STEP = 1 if SOAK else 12
 OLDER = list(LANDED)[: None if SOAK else 1]
 
 

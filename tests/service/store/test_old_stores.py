@@ -1,6 +1,6 @@
 """Stores that servers of this repository's history made, taken up by today's: nothing is lost, and answers are equal.
 
-What they hold, and how they were made, is in `old_stores/`.
+What they hold, and how they were made, is in `old_stores/`. With UNDERSKIN_SOAK=1 all of them on PostgreSQL too.
 """
 
 import math
@@ -10,10 +10,15 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
+from bench.soak import SOAK
 from service.store import database, migrate
 from service.store.tables import metadata
+from tests.service.conftest import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, SECOND, answers, asked_of, take_over
 from tests.support.store_server import Place, campaign, running
+
+ON_ALL = set(LANDED) if SOAK else {"0001", "0007", "0013"}
+"""Those of PostgreSQL too, each of which takes a second or two."""
 
 
 def differences(old: Any, new: Any, at: str = "") -> list[str]:
@@ -31,7 +36,11 @@ def differences(old: Any, new: Any, at: str = "") -> list[str]:
     return [] if old == new else [f"{at}: {old!r}, now {new!r}"]
 
 
-@pytest.mark.parametrize("version", LANDED)
+@pytest.mark.parametrize(
+    ("place", "version"),
+    [(backend, version) for backend in BACKENDS for version in LANDED if backend == "sqlite" or version in ON_ALL],
+    indirect=["place"],
+)
 def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
     take_over(place, version)
     before = answers(place, version)

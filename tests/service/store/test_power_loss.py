@@ -19,7 +19,7 @@ from tests.support.streams import BATCH, Stream, check_kept
 
 # In parts, so that an interrupted soak goes on with the next one.
 PARTS = 10 if SOAK else 1
-CUTS = 5 if SOAK else 3
+CUTS = 5 if SOAK else 2
 NO_WORKERS = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
 
 
