@@ -1,6 +1,6 @@
 """Every reader on damaged files: cut, shuffled, overwritten, random. An error that names the file, never another one.
 
-500 files a format, and 5 in the process apart that real files are read in; 100,000 and 2,000 with UNDERSKIN_SOAK=1.
+500 files a format, and 3 in the process apart that real files are read in; 100,000 and 2,000 with UNDERSKIN_SOAK=1.
 """
 
 import io
@@ -30,10 +30,18 @@ from underskin.recordings.readers import json_file
 from underskin.recordings.readers.formats import MODULES
 from underskin.recordings.readers.sandbox import parse_apart
 
+pytestmark = [
+    pytest.mark.slow,
+    # pyuff leaves the files open that it has written
+    pytest.mark.filterwarnings(
+        "ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+]
+
 # In parts, so that an interrupted soak goes on with the next one.
 PARTS = 10 if SOAK else 1
 COUNT = 10_000 if SOAK else 500
-COUNT_APART = 200 if SOAK else 5
+COUNT_APART = 200 if SOAK else 3
 # Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
 FOREIGN = ("HDF5", "MATLAB")
 CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")
@@ -144,8 +152,6 @@ def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
     return data
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize("part", range(PARTS))
 def test_damaged_files_are_refused_with_their_name(reader: Reader, part: int) -> None:
     files = sound_files()[reader.kind]
@@ -165,7 +171,6 @@ def test_damaged_files_are_refused_with_their_name(reader: Reader, part: int) ->
     record(Figure(f"Damaged files read, {reader.kind}", COUNT, "", 100_000))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("kind", sorted(MODULES))
 def test_damaged_files_are_refused_by_the_process_apart(kind: str, part: int) -> None:

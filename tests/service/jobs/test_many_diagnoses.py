@@ -10,12 +10,13 @@ from tests.support.diagnosed import asked, awaited, resonant, sent
 from tests.support.memory import family_mb
 from tests.support.store_server import Place, running
 
-DIAGNOSES = 2000 if SOAK else 4
+DIAGNOSES = 2000
 WARM_AFTER = DIAGNOSES // 4  # caches are full by then
 MOST_GROWN_MB = 60
 
 
-@pytest.mark.slow
+@pytest.mark.soak
+@pytest.mark.skipif(not SOAK, reason="hours of diagnoses; make soak")
 def test_memory_is_flat_over_many_diagnoses(tmp_path: Path) -> None:
     place = Place(tmp_path / "data")
     place.folder.mkdir()

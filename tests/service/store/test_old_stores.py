@@ -17,7 +17,7 @@ from tests.service.conftest import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, SECOND, answers, asked_of, take_over
 from tests.support.store_server import Place, campaign, running
 
-ON_ALL = set(LANDED) if SOAK else {"0001", "0007", "0013"}
+ON_ALL = set(LANDED) if SOAK else {"0007", "0013"}
 """Those of PostgreSQL too, each of which takes a second or two."""
 
 
