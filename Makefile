@@ -37,9 +37,10 @@ test: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at reduced c
 	@scripts/system-packages.sh $(TEST_PACKAGES)
 	$(PYTEST) $(TESTS)
 
-soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full counts, the long ones included
+soak: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at full counts, the long ones included (resumes)
 	@scripts/system-packages.sh $(TEST_PACKAGES)
-	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS)
+	UNDERSKIN_SOAK=1 $(PYTHON) -m pytest -m alone $(TESTS); \
+	UNDERSKIN_SOAK=1 $(PYTEST) $(TESTS); status=$$?; $(PYTHON) -m bench soak && exit $$status
 
 check: $(VENV)/.dev-packages ## format, lint, strict types, import direction
 	$(PYTHON) -m ruff format --check .

@@ -22,12 +22,13 @@ from bench import (
     pages,
     readers,
     single_requests,
+    soak,
     start,
     store,
     waits,
 )
 from bench import against as against_revision
-from bench.page import AGAINST, keep, markdown, write
+from bench.page import AGAINST, SOAK, keep, markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -46,6 +47,7 @@ PARTS = {
     "pages": pages.measure,
     "waits": waits.measure,
     "readers": readers.measure,
+    SOAK: soak.measure,
 }
 _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scikit-fem", "dynesty")
 
@@ -53,12 +55,14 @@ _PACKAGES = ("numpy", "scipy", "uvicorn", "fastapi", "umbridge", "felupe", "scik
 def main(names: list[str], against: str | None) -> None:
     """Measure the parts named, or all, and write the page with what is new in it; a diagnosis `against` a revision."""
     parts = PARTS if against is None else {AGAINST: partial(against_revision.measure, against)}
-    for name in parts if against is not None else names or parts:
+    all_parts = [name for name in parts if name != SOAK]  # that is measured by make soak
+    for name in names if names and against is None else all_parts:
         about = machine()
         print(f"{name}: {about}", flush=True)
         figures = parts[name]()
         print(markdown(figures), flush=True)
-        keep(name, about, figures)
+        if figures:
+            keep(name, about, figures)
     write()
 
 
@@ -95,7 +99,9 @@ def _processor_times() -> tuple[int, int]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all, if none is given")
+    parser.add_argument(
+        "parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)}; all but soak, if none is given"
+    )
     parser.add_argument(
         "--against", metavar="REV", help="with diagnosis: processor time beside that of another revision"
     )

@@ -45,11 +45,14 @@ def _campaign() -> bytes:
     )
 
 
+_NUMBER = f"0.25{'0' * 28}, "  # so long that a list may have as many as there is room for
+
+
 _BODIES: dict[str, tuple[str, Callable[[], bytes], int]] = {
     "sigma, all digits": ("/v1/sigma", _columns, 200),
     "sigma, empty lists": ("/v1/sigma", lambda: _filled('{"rt_over_h": 0.6, "a_over_h": [', "[],", "1]}"), 413),
     "d33, nulls": ("/v1/d33", lambda: _filled('{"thickness_mm": [', "null,", "1]}"), 413),
-    "Evaluate": ("/umbridge/Evaluate", lambda: _filled('{"name": "sigma", "input": [[', "0.25, ", "1]]}"), 400),
+    "Evaluate": ("/umbridge/Evaluate", lambda: _filled('{"name": "sigma", "input": [[', _NUMBER, "1]]}"), 400),
     "campaign": ("/v1/campaigns", _campaign, 201),
 }  # fmt: skip
 

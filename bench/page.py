@@ -19,6 +19,7 @@ ratios: `idle_percent` is how idle it was before the start. A target is what the
 one that was not met.
 """
 
+SOAK = "soak"  # what `make soak` measures
 AGAINST = "against"  # what `python -m bench diagnosis --against REV` measures
 
 SECTIONS = {
@@ -39,6 +40,7 @@ SECTIONS = {
     "readers": "Long files",
     "curves": "Curves of spheres",
     "nested": "Evidences against nested sampling",
+    SOAK: "Kills, power cuts, load and damaged inputs",
 }
 
 EXPLANATIONS = {
@@ -77,6 +79,8 @@ diagnosis in a fresh process with one BLAS thread, the median of three.""",
     "nested": """Nothing and three single mechanisms on campaigns of 24 recordings × 20 lines of the virtual rig: the
 diagnosis' fits from many starts and Laplace's method, against dynesty with its own defaults. Both call the same code
 for a likelihood, with the same priors and noise. Differences are of all hypotheses within 10 nats of the winner.""",
+    SOAK: """By `make soak`, as far as it has come: the tests at full counts. A part that failed has no figure. In a
+power cut the disk forgets what was not synced, or keeps some sectors of it (`tests/support/power/`).""",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
 contacts' positions, under three mechanisms; processor time on one core.""",
 }

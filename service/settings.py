@@ -6,12 +6,13 @@ from pathlib import Path
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from service import durable
 from underskin.surrogate.sigma_table import tables_folder
 
 
 def make_data_folder(folder: Path) -> None:
     """Make it where it is missing, for its owner alone; one that is there keeps the mode that somebody gave it."""
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    durable.make_folder(folder, 0o700)
 
 
 class Settings(BaseSettings):

@@ -1,5 +1,6 @@
 """The server that most tests over HTTP share, and the markers that say what a test needs."""
 
+import os
 import signal
 import sys
 from collections.abc import Generator, Iterator, Sequence
@@ -8,6 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from bench import soak
 from tests.support.server import Server, running
 
 # A shell that runs the tests in the background has them ignore it, and the servers would inherit that.
@@ -64,6 +66,18 @@ def _needs(item: pytest.Item) -> set[str]:
     if any(getattr(value, "__name__", "") == "running" for value in vars(item.module).values()):
         needs.add("server")
     return needs
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip what an interrupted soak has done."""
+    if soak.SOAK and soak.passed(item.nodeid):
+        pytest.skip("passed on this code already; remove build/soak to run it again")
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """Keep what a soak has done; of tests in processes of their own, in the one that collects their reports."""
+    if soak.SOAK and report.when == "call" and report.passed and "PYTEST_XDIST_WORKER" not in os.environ:
+        soak.keep_passed(report.nodeid)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -128,8 +128,13 @@ class AccessControl:
         return None if key is None or self.sessions.has_ended(cookie) else key
 
 
+def goes_to_disk(path: str) -> bool:
+    """Whether a body is written to the disk as it comes, and not held in memory."""
+    return path in _UPLOADS
+
+
 def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
-    """Whether a body may be as large as uploads may: files do not go through memory, JSON does."""
+    """Whether a body may be as large as uploads may: files are not read in memory, JSON is."""
     return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
 
 

@@ -1,7 +1,8 @@
 """From uploaded files to campaigns, with what is wrong in each."""
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from service.ingest.uploads import Upload
 from service.middleware import long_json
 from service.middleware.unique_keys import require_unique_keys
 from service.problems import Refusal
-from service.store import skins
+from service.store import Database, skins
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
@@ -26,12 +27,22 @@ _BOM = b"\xef\xbb\xbf"
 _UNNAMED = "the upload"
 _LISTED = ("code", "field", "value", "allowed")  # of an error
 
-# Reading a campaign takes memory many times its size: few at a time, the others wait.
+# Reading a campaign takes memory many times its size: few at a time, the others wait. What is kept as soon as it was
+# read may wait for other writers, which what is only read must not.
 READING_SLOTS = asyncio.Semaphore(2)
+_KEEPING_SLOTS = asyncio.Semaphore(2)
 
 MOST_CAMPAIGNS = 1000  # a request
 MOST_RECORDINGS = 50_000  # a request, good or not
 _MOST_ERRORS = 100  # listed of each campaign
+
+
+@asynccontextmanager
+async def keeping(store: Database) -> AsyncIterator[None]:
+    """A place for reading what is kept at once; raises OperationalError where others have just waited in vain."""
+    async with _KEEPING_SLOTS:
+        store.require_hope()
+        yield
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,10 @@ from collections.abc import Callable, Iterable, Mapping
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.auth.access_control import OPEN, AccessControl
+from service.auth.access_control import OPEN, AccessControl, goes_to_disk
 from service.log import KEY
 from service.middleware.error_handlers import ProblemPage, problem_response
+from service.middleware.held_bodies import HeldBodies
 from service.middleware.http_protocol import OVERLOADED
 from service.middleware.request_log import Answered, record
 from service.problems import RETRY_LATER, Refusal, unexpected
@@ -25,6 +26,7 @@ from service.problems import RETRY_LATER, Refusal, unexpected
 logger = logging.getLogger("underskin")
 
 _NUMBERS = frozenset({int, float})
+_LONGEST_HELD = 8  # bodies as large as they may be that are held at once
 _MOST_HOT_BYTES = 10_000  # of a body that a hot route looks at, on the event loop
 _SANE_ID = re.compile(rb"[A-Za-z0-9._-]{1,64}")
 
@@ -49,6 +51,7 @@ class AsgiMiddleware:
         self._access = access
         self._problem_page = problem_page
         self._hot = hot
+        self._held = HeldBodies(_LONGEST_HELD * access.max_body_bytes)
         self._prefix = os.urandom(6).hex()
         self._numbers = itertools.count()
 
@@ -97,19 +100,27 @@ class AsgiMiddleware:
         if sum(name == b"host" for name, _ in scope["headers"]) > 1:  # a proxy may have checked the other one
             raise Refusal(400, "The request has several Host headers; it must have one.")
         scope["key"] = self._access.check(method, path, headers)
-        hot = self._hot.get((method, path))
-        limited = self._limited(receive, path, headers)
+        with self._held.one() as hold:
+            await self._answer_body(scope, headers, self._limited(receive, path, headers, hold), exchange)
+
+    async def _answer_body(
+        self, scope: Scope, headers: Mapping[bytes, bytes], receive: Receive, exchange: "_Exchange"
+    ) -> None:
+        method = scope["method"]
+        hot = self._hot.get((method, scope["path"]))
         if hot is None or not _plain(method, headers):
-            await self._api(scope, limited, exchange.send)
+            await self._api(scope, receive, exchange.send)
             return
-        body = b"" if method == "GET" else await Request(scope, limited).body()
+        body = b"" if method == "GET" else await Request(scope, receive).body()
         content = hot(body or scope["query_string"]) if len(body) <= _MOST_HOT_BYTES else None
         if content is None:
             await self._api(scope, _replay(body, receive), exchange.send)
         else:
             await exchange.answer(content)
 
-    def _limited(self, receive: Receive, path: str, headers: Mapping[bytes, bytes]) -> Receive:
+    def _limited(
+        self, receive: Receive, path: str, headers: Mapping[bytes, bytes], hold: Callable[[int], None]
+    ) -> Receive:
         """`receive`, refusing the body once it exceeds the limit, whatever its Content-Length said."""
         size = 0
 
@@ -118,6 +129,8 @@ class AsgiMiddleware:
             message = await receive()
             size += len(message.get("body", b""))
             self._access.check_size(size, path, headers)
+            if not goes_to_disk(path):
+                hold(size)
             return message
 
         return counted

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from service.dependencies import WRITE, CampaignId, Store, Table, number_of_cursor, sender
 from service.ingest.accept import RIG, IngestOptions, accept
 from service.ingest.form_fields import FILE, split
-from service.ingest.reading import READING_SLOTS
+from service.ingest.reading import keeping
 from service.ingest.uploads import received
 from service.middleware.unique_keys import JsonRoute
 from service.routes.temporary_files import made_file
@@ -121,7 +121,7 @@ async def post(
     `together`.
     """
     settings = request.app.state.settings
-    async with received(request, request.app.state.uploads) as parts, READING_SLOTS:
+    async with received(request, request.app.state.uploads) as parts, keeping(store):
         fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
         options = IngestOptions(
             **query.with_form(fields).model_dump(),

@@ -24,6 +24,7 @@ else:
     _LONG = 10_000  # bytes, beyond which columns are read as arrays
 
 _MOST_PLAIN_BYTES = 10_000_000  # of columns that are read here: that takes some hundredths of a second
+_MOST_CSV_CELLS = 500_000  # each is a Python object, which holds up other requests
 
 CSV = "text/csv"
 XLSX = "application/vnd.openxmlformats-officedocument.spreadsheetml.sheet"
@@ -152,6 +153,10 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
 
 
 def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], dict[str, list[str]]]:
+    cells = sum(map(body.count, (b",", b";", b"\t", b"\n", b"\r")))  # or fewer, where numbers have decimal commas
+    if cells > _MOST_CSV_CELLS:
+        most = f"{_MOST_CSV_CELLS:,} may be in one; send less at once, or JSON or {NPZ}."
+        raise Refusal(413, f"{what} has some {cells:,} cells; {most}", title="Body too large")
     try:
         found = from_csv(body, kind.model_fields)
     except CsvError as error:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
 
+from service import heavy_answers
 from service.dependencies import StoreToRead, Table
 from service.ingest.reading import READING_SLOTS
 from service.routes.columns_body import CSV, XLSM, XLSX, is_workbook, json_document, parse
@@ -33,7 +34,6 @@ OTHER_ANSWERS: dict[str, Any] = {CSV: {}, NPZ: _BINARY}
 
 # A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
 _INLINE_BYTES = 1024
-_threads = asyncio.Semaphore(4)
 
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
@@ -71,7 +71,7 @@ def add_columns_route(
                 return await asyncio.to_thread(work)
         if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
             return work()
-        return await _in_thread(work)
+        return await heavy_answers.in_turn(work)
 
     others: dict[str, Any] = {CSV: {"schema": {"type": "string"}, "example": _as_csv(example)}}
     others |= dict.fromkeys((NPZ, XLSX, XLSM), _BINARY)
@@ -93,13 +93,7 @@ async def answer_json(request: Request, answer: Callable[[Any], Response]) -> Re
         with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
             return answer(json_document(body, request.headers.get("content-type", "")))
 
-    return await _in_thread(work)
-
-
-async def _in_thread(work: Callable[[], Response]) -> Response:
-    """What `work` answers, which may take long: a few at a time, beside the event loop."""
-    async with _threads:
-        return await asyncio.to_thread(work)
+    return await heavy_answers.in_turn(work)
 
 
 def described_body(component: str, example: dict[str, Any], **others: dict[str, Any]) -> dict[str, Any]:

@@ -55,4 +55,5 @@ async def import_skin(request: Request, store: Store) -> Imported:
         if len(uploads) != 1:
             raise Refusal(422, f"One file is imported at a time, not {len(uploads)}.")
         async with skin_imports.one:
+            store.require_hope()
             return await run_in_threadpool(skin_imports.bring_in, store, uploads[0])

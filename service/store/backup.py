@@ -43,7 +43,7 @@ def place(database: Database, folder: Path, occasion: str) -> Path:
 
 def make(database: Database, file: Path, progress: Progress = untold) -> None:
     """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
-    file.parent.mkdir(parents=True, exist_ok=True)
+    durable.make_folder(file.parent)
     part = file.with_name(file.name + ".part")
     _remove(part)
     try:

@@ -11,7 +11,7 @@ from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 import orjson
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, select, text
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import ArgumentError, DBAPIError
+from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError
 
 from service.store.errors import StoreError
 from service.store.sqlite_files import SqliteFiles
@@ -88,10 +88,17 @@ class Database:
                 yield connection
                 self.require_in_place()
             self.require_in_place()  # what was moved during the commit is not acknowledged either
+            self._turns.note(in_vain=False)
         except (DBAPIError, OSError) as error:
             if is_full(error):
                 raise StorageFull(str(error)) from error
+            if isinstance(error, OperationalError):
+                self._turns.note(in_vain=True)
             raise
+
+    def require_hope(self) -> None:
+        """For what takes long before it writes: raises OperationalError where writers have just waited in vain."""
+        self._turns.require_hope()
 
     def read(self, query: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
         """What one function of a connection answers in a block of `reading`."""

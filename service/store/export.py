@@ -89,7 +89,9 @@ def differs(connection: Connection, row: AnyRow, campaign: ExportedCampaign) -> 
 
 
 def add_skins(store: Database, checked: CheckedOverview) -> None:
-    """Keep the skins, joined as they were, and their rigs; raises Conflict as others may have joined them meanwhile."""
+    """Keep the skins, joined as they were, and their rigs; a skin that was put away here, but not in the file, comes
+    back. Raises Conflict as others may have joined them meanwhile.
+    """
     with store.writing() as connection:
         clashes = otherwise_joined(connection, checked.skins)
         if clashes:
@@ -106,9 +108,14 @@ def add_skins(store: Database, checked: CheckedOverview) -> None:
         for change in checked.changes:
             if not holds(connection, changes, id=change.id):
                 connection.execute(insert(changes), change.model_dump())
+        for root in (row.id for row in checked.skins if row.id == row.root_id and row.discarded_at is None):
+            skins.bring_back(connection, root)
 
 
 def add(store: Database, checked: ImportedCampaign) -> None:
-    """Keep a campaign that is not there."""
+    """Keep a campaign that is not there; one that figures use has its skin be in lists."""
     exclusions = [entry.model_dump() for entry in checked.exclusions]
-    store.write(campaigns.keep, checked.row, checked.campaign.recordings, exclusions)
+    with store.writing() as connection:
+        if checked.row["withdrawn_at"] is None and checked.row["corrected_by"] is None:
+            skins.bring_back(connection, skins.require_root(connection, checked.row["skin_id"]))
+        campaigns.keep(connection, checked.row, checked.campaign.recordings, exclusions)

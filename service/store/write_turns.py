@@ -1,6 +1,7 @@
 """Who may write: one at a time to an SQLite file, and never so many waiting that readers find no thread to answer."""
 
 import fcntl
+import math
 import sqlite3
 import threading
 import time
@@ -15,6 +16,7 @@ WAIT_S = 20.0  # for others' writes, a restore included; then the client is aske
 MOST_WAITING = 64  # of the threads of a process (`THREADS`)
 THREADS = 2 * MOST_WAITING  # that answer requests
 FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
+VAIN_S = 5.0  # for so long after a wait in vain nothing begins that takes long before it writes
 _LOOK_S = 0.005  # how often another process' lock is looked at
 
 
@@ -25,6 +27,16 @@ class WriteTurns:
         """Nobody writes yet."""
         self._places = threading.BoundedSemaphore(MOST_WAITING)
         self._first = threading.Lock()
+        self._in_vain_at = -math.inf
+
+    def note(self, *, in_vain: bool) -> None:
+        """Somebody has waited in vain, or has written."""
+        self._in_vain_at = time.monotonic() if in_vain else -math.inf
+
+    def require_hope(self) -> None:
+        """Raises OperationalError where somebody has just waited in vain, and nobody has written since."""
+        if time.monotonic() - self._in_vain_at < VAIN_S:
+            raise _busy()
 
     @contextmanager
     def place(self) -> Iterator[None]:

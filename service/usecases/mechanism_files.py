@@ -34,7 +34,7 @@ def folder_of_lab() -> Path:
 
 def write(file: Path, content: bytes) -> None:
     """Whole or not at all; raises FileExistsError where there is one."""
-    file.parent.mkdir(parents=True, exist_ok=True)
+    durable.make_folder(file.parent)
     with tempfile.NamedTemporaryFile(dir=file.parent, prefix=".new-") as new:
         new.write(content)
         new.flush()

@@ -132,7 +132,7 @@ class ScheduledBackups:
                 wait = min(_RETRY_S, self._every_s / 10)
 
     def _make_if_due(self) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        durable.make_folder(self._folder, 0o700)
         with _locked(self._folder) as ours:
             last = newest(self._folder)
             if not ours:

@@ -14,6 +14,7 @@ _BIN = os.pathsep.join(map(str, sorted(Path("/usr/lib/postgresql").glob("*/bin")
 _PATH = os.pathsep.join([_BIN, os.environ["PATH"]])
 INITDB = shutil.which("initdb", path=_PATH)
 USER = "postgres"
+WAL_SEGMENT_MB = 1  # a test of power cuts copies those that are synced
 
 
 def available() -> bool:
@@ -29,9 +30,9 @@ def _has_user() -> bool:
     return True
 
 
-def _run(*command: str) -> subprocess.CompletedProcess[str]:
+def _run(*command: str, **settings: str) -> subprocess.CompletedProcess[str]:
     as_user = ["setpriv", f"--reuid={USER}", f"--regid={USER}", "--init-groups"] if os.geteuid() == 0 else []
-    environment = {"PATH": _PATH, "LC_ALL": "C.UTF-8"}
+    environment = {"PATH": _PATH, "LC_ALL": "C.UTF-8", **settings}
     done = subprocess.run([*as_user, *command], env=environment, capture_output=True, text=True, cwd="/")
     assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
     return done
@@ -40,10 +41,27 @@ def _run(*command: str) -> subprocess.CompletedProcess[str]:
 class Cluster:
     """A running server; `new_database` gives the URL of an empty database."""
 
-    def __init__(self, port: int, user: str) -> None:
+    def __init__(self, folder: Path, port: int, user: str) -> None:
+        self.folder = folder
+        self._options = f"-c listen_addresses=127.0.0.1 -c port={port} -c unix_socket_directories={folder}"
         self._base = f"postgresql://{user}@127.0.0.1:{port}"
         self._psql = ["psql", "--no-psqlrc", "--host=127.0.0.1", f"--port={port}", f"--username={user}"]
         self._count = 0
+
+    @property
+    def data(self) -> Path:
+        """The folder of all that it keeps."""
+        return self.folder / "data"
+
+    def start(self, **settings: str) -> None:
+        """Start it, with these variables in its environment."""
+        given = (f"--pgdata={self.data}", f"--log={self.folder}/log", f"--options={self._options}")
+        _run("pg_ctl", "start", "--wait", *given, **settings)
+
+    def stop(self) -> None:
+        """End its processes at once, where they run: the next start recovers from the write-ahead log."""
+        if (self.data / "postmaster.pid").exists():
+            _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={self.data}")
 
     def new_database(self, tablespace: Path | None = None) -> str:
         """An empty database, its tables in `tablespace`.
@@ -76,14 +94,14 @@ def running() -> Iterator[Cluster]:
         shutil.chown(folder, USER, USER)
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    data = str(folder / "data")
+    cluster = Cluster(folder, port, USER)
     try:
-        _run("initdb", "--auth=trust", f"--username={USER}", "--encoding=UTF8", "--no-sync", f"--pgdata={data}")
-        options = f"-c listen_addresses=127.0.0.1 -c port={port} -c unix_socket_directories={folder}"
-        _run("pg_ctl", "start", "--wait", f"--pgdata={data}", f"--log={folder}/log", f"--options={options}")
+        given = (f"--username={USER}", "--encoding=UTF8", f"--pgdata={cluster.data}", f"--wal-segsize={WAL_SEGMENT_MB}")
+        _run("initdb", "--auth=trust", "--no-sync", *given)
+        cluster.start()
         try:
-            yield Cluster(port, USER)
+            yield cluster
         finally:
-            _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={data}")
+            cluster.stop()
     finally:
         shutil.rmtree(folder)

@@ -33,7 +33,7 @@ _MODULES = (  # of the server, and of commands that ask it or invert files
 _LONGEST = 1 << 17  # bytes of a request
 _LIMIT = 300.0  # s, for a command to end by itself
 _STATUS = struct.Struct("i")
-# Read when the interpreter starts: a process that has them otherwise must be started anew.
+# Read when a process starts: what has them otherwise is forked from another one.
 _AT_THE_START = ("PYTHON", "LD_", "MALLOC_")
 
 
@@ -78,8 +78,6 @@ def start(
     arguments: Sequence[str], environment: Mapping[str, str], files: tuple[int, int, int], folder: Path | None = None
 ) -> Process:
     """`underskin` with these arguments, and files as standard input, output and error, in a folder (here)."""
-    for name in {*environment, *os.environ}:
-        assert not name.startswith(_AT_THE_START) or environment.get(name) == os.environ.get(name), name
     order = json.dumps(
         {"arguments": arguments, "environment": dict(environment), "folder": str(folder or Path.cwd())}
     ).encode()
@@ -87,7 +85,9 @@ def start(
     sys.audit("tests.underskin", *arguments)
     reading, writing = os.pipe()
     try:
-        forking = _forking_process()
+        forking = _forking_process(
+            tuple((name, environment[name]) for name in sorted(filter(_at_the_start, environment)))
+        )
         socket.send_fds(forking, [order], [*files, writing])
         pid = _STATUS.unpack(forking.recv(_STATUS.size))[0]
     finally:
@@ -116,11 +116,16 @@ def run(
         return subprocess.CompletedProcess(words, status, out.read(), err.read())
 
 
+def _at_the_start(name: str) -> bool:
+    return name.startswith(_AT_THE_START)
+
+
 @functools.cache
-def _forking_process() -> socket.socket:
-    """The connection to the process that forks, which ends when this one does."""
+def _forking_process(at_the_start: tuple[tuple[str, str], ...]) -> socket.socket:
+    """The connection to the process that forks, with these variables, which ends when this one does."""
     ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    ordinary = {name: value for name, value in os.environ.items() if not _at_the_start(name)}
+    environment = ordinary | dict(at_the_start) | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with its:
         command = [sys.executable, "-P", __file__, str(its.fileno())]
         process = subprocess.Popen(command, pass_fds=[its.fileno()], env=environment)

@@ -3,13 +3,14 @@
 import functools
 import io
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from fastapi import APIRouter, Response
 from fastapi.routing import APIRoute
 
+from service import heavy_answers
 from service.pages.shared.figures import CsvAnswer, attachment
 from service.problems import Refusal
 
@@ -27,12 +28,15 @@ def add_to(router: APIRouter) -> None:
             router.add_api_route(own + XLSX, endpoint)
 
 
-def _as_workbook(endpoint: Callable[..., Response]) -> Callable[..., Response]:
-    @functools.wraps(endpoint)
-    def answer(*arguments: Any, **values: Any) -> Response:
+def _as_workbook(endpoint: Callable[..., Response]) -> Callable[..., Awaitable[Response]]:
+    def made(*arguments: Any, **values: Any) -> Response:
         table = endpoint(*arguments, **values)
         assert isinstance(table, CsvAnswer)
         return attachment(f"{table.name}{XLSX}", workbook(table.columns), _TYPE)
+
+    @functools.wraps(endpoint)
+    async def answer(*arguments: Any, **values: Any) -> Response:
+        return await heavy_answers.in_turn(functools.partial(made, *arguments, **values))
 
     return answer
 

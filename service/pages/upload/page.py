@@ -11,7 +11,7 @@ from service.auth import session
 from service.dependencies import WRITE, Store, Table
 from service.ingest import skin_imports
 from service.ingest.accept import RIG
-from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS
+from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
 from service.ingest.uploads import received
 from service.pages.shared import same_request
 from service.pages.shared.figures import attachment, csv_answer
@@ -212,7 +212,7 @@ async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response
 @router.post("/{upload_id}/keep", dependencies=WRITE)
 async def keep(request: Request, sent: Form, pending: Pending, store: Store, table: Table) -> Response:
     """Keeps what is good of it."""
-    async with READING_SLOTS:
+    async with keeping(store):
         campaign_ids = await run_in_threadpool(keep_good, request, pending, sent, store)
         await run_in_threadpool(d33_cache.derive, store, table, campaign_ids)
     return see(pending.kept_at or f"/upload/{pending.id}")
@@ -224,6 +224,7 @@ async def bring_in(request: Request, pending: Pending, store: Store) -> Response
     if pending.skin_summary is None:
         raise Missing("There is no exported skin in this upload.")
     async with skin_imports.one:
+        store.require_hope()
         await run_in_threadpool(exported_skin.bring_in, request, store, pending)
     return see(pending.kept_at or f"/upload/{pending.id}")
 

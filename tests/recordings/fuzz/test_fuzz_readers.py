@@ -1,6 +1,6 @@
 """Every reader on damaged files: cut, shuffled, overwritten, random. An error that names the file, never another one.
 
-500 files a format, 100,000 with UNDERSKIN_SOAK=1.
+500 files a format, and 3 in the process apart that real files are read in; 100,000 and 2,000 with UNDERSKIN_SOAK=1.
 """
 
 import io
@@ -9,22 +9,39 @@ import signal
 import struct
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
+from functools import partial
 
 import h5py
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 
+from bench.figures import Figure
+from bench.soak import SOAK, record
 from tests.recordings.test_recordings_workbooks import with_values, workbook
 from tests.support import instrument_files as examples
 from tests.support.campaign_documents import EVERYTHING
 from tests.support.repository import ROOT
+from underskin.errors import FileError
 from underskin.recordings.campaign import parse
 from underskin.recordings.readers import json_file
 from underskin.recordings.readers.formats import MODULES
+from underskin.recordings.readers.sandbox import parse_apart
 
-COUNT = 100_000 if os.environ.get("UNDERSKIN_SOAK") == "1" else 500
+pytestmark = [
+    pytest.mark.slow,
+    # pyuff leaves the files open that it has written
+    pytest.mark.filterwarnings(
+        "ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
+    ),
+]
+
+# In parts, so that an interrupted soak goes on with the next one.
+PARTS = 10 if SOAK else 1
+COUNT = 10_000 if SOAK else 500
+COUNT_APART = 200 if SOAK else 3
 # Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
 FOREIGN = ("HDF5", "MATLAB")
 CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")
@@ -62,6 +79,9 @@ def without_checksums(data: bytes) -> bytes:
         for name in source:
             source.copy(name, target)
     return buffer.getvalue()
+
+
+LIKE_ALL = partial(settings, deadline=None, database=None, suppress_health_check=list(HealthCheck))
 
 
 class Reader:
@@ -132,25 +152,46 @@ def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
     return data
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
-def test_damaged_files_are_refused_with_their_name(reader: Reader) -> None:
+@pytest.mark.parametrize("part", range(PARTS))
+def test_damaged_files_are_refused_with_their_name(reader: Reader, part: int) -> None:
     files = sound_files()[reader.kind]
     for sound in files:
         assert reader.said(sound) == "read"
 
     allowed = ["read", "refused", *(CONTAINED if reader.kind in FOREIGN else ())]
 
-    @settings(
-        max_examples=COUNT,
-        deadline=None,
-        database=None,
-        derandomize=COUNT < 100_000,
-        suppress_health_check=list(HealthCheck),
-    )
+    @seed(part)
+    @LIKE_ALL(max_examples=COUNT)
     @given(data=damaged(files))
     def try_it(data: bytes) -> None:
         said = reader.said(data)
         assert said in allowed, said
 
     try_it()
+    record(Figure(f"Damaged files read, {reader.kind}", COUNT, "", 100_000))
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+@pytest.mark.parametrize("kind", sorted(MODULES))
+def test_damaged_files_are_refused_by_the_process_apart(kind: str, part: int) -> None:
+    @seed(part)
+    @LIKE_ALL(max_examples=COUNT_APART)
+    @given(data=damaged(sound_files()[kind]))
+    def try_it(data: bytes) -> None:
+        said = said_apart(kind, data)
+        assert said == "read" or said.startswith("fuzz.dat"), said
+
+    try_it()
+    record(Figure(f"Damaged files read apart, {kind}", COUNT_APART, "", 2000))
+
+
+def said_apart(kind: str, data: bytes) -> str:
+    """What reading a file in the process apart ends with."""
+    with tempfile.TemporaryFile() as stream:
+        stream.write(data)
+        stream.flush()
+        try:
+            parse_apart(kind, stream, "fuzz.dat")
+        except FileError as error:
+            return str(error)
+    return "read"

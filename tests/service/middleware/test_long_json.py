@@ -1,4 +1,4 @@
-"""Bodies of JSON as large as they may be: the others are answered meanwhile, and they take little memory."""
+"""Bodies of JSON and CSV as large as they may be: the others are answered meanwhile, and they take little memory."""
 
 import json
 import os
@@ -24,6 +24,8 @@ MOST_HELD_S = 0.5  # of the server's processor time within another request; a pa
 MOST_MEMORY = 6  # times the body, of the server's process and the one that parses, beside what their programs take
 PROGRAMS = 100_000_000  # bytes: the interpreter and NumPy of the one, what the first batch loads of the other
 JSON = {"Content-Type": "application/json"}
+CSV = {"Content-Type": "text/csv"}
+POINTS = "a_over_h,rt_over_h\n"
 
 
 @pytest.fixture(scope="module")
@@ -175,3 +177,22 @@ def test_fields_beside_a_long_column_mean_the_same(server: Server) -> None:
     odd = f'{{"a_over_h": [{column}], "rt_over_h": 0.6, "model": "\\"[{column}]"}}'
     errors = problem_of(httpx.post(server.url + "/v1/sigma", content=odd, headers=JSON, timeout=60), 422)["errors"]
     assert [error["field"] for error in errors] == ["model"]
+
+
+@pytest.mark.parametrize("cells", ["0.3,0.6\n", "0.3,", ";", "\n"])
+def test_csv_of_very_many_cells_is_refused(server: Server, cells: str) -> None:
+    with Beside(server) as beside:
+        answer = httpx.post(f"{server.url}/v1/sigma", content=filled(POINTS, cells, "0.3,0.6\n"), headers=CSV)
+    assert "500,000 may be in one" in problem_of(answer, 413)["detail"]
+    assert beside.memory < MOST_MEMORY * LARGE
+
+
+def test_csv_of_many_cells_is_answered(server: Server) -> None:
+    rows = 249_000
+    with Beside(server) as beside:
+        body = POINTS.encode() + b"0.3,0.6\n" * rows
+        answer = httpx.post(f"{server.url}/v1/sigma", content=body, headers=CSV, timeout=300)
+    assert len(answer.raise_for_status().json()["sigma"]) == rows
+    assert beside.asked > 5
+    assert beside.held_s < MOST_HELD_S
+    assert beside.memory < 2 * PROGRAMS

@@ -1,7 +1,6 @@
 """The OpenAPI document: complete, true, and nothing for schemathesis to find."""
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -12,6 +11,8 @@ import httpx
 import jsonschema_rs
 import pytest
 
+from bench.figures import Figure
+from bench.soak import SOAK, record
 from service.app import create_api
 from service.auth.access_control import AccessControl
 from service.auth.key_requirement import KeyRequirement
@@ -255,18 +256,18 @@ def authorization(server: Server) -> dict[str, str]:
 @pytest.mark.parametrize("with_key", [False, True])
 def test_schemathesis_finds_nothing(shared_server: Server, locked: Server, with_key: bool, tmp_path: Path) -> None:
     asked = locked if with_key else shared_server
-    soak = "UNDERSKIN_SOAK" in os.environ
-    examples = "2000" if soak else "10"
+    examples = "5000" if SOAK else "10"
     command = [
         *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(ROOT / "schemathesis.toml")),
         *("run", f"{asked.url}/openapi.json", "--max-examples", examples, "--seed", "20180208", "--no-color"),
     ]
     if with_key:
         command += ["--header", f"Authorization: {authorization(asked)['Authorization']}"]
-        if not soak:  # the thousands of values at the limits of each field go to the server without keys alone
+        if not SOAK:  # the thousands of values at the limits of each field go to the server without keys alone
             command += ["--phases", "examples,fuzzing,stateful"]
     found = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]
     every_other = len(OPERATIONS) - 1  # than the one that gives the document
     assert f"{every_other} selected / {every_other} total" in found.stdout, found.stdout
     assert asked.process.poll() is None
+    record(Figure(f"Inputs made for each route, {'with' if with_key else 'without'} keys", float(examples), "", 5000))

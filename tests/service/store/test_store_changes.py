@@ -164,3 +164,29 @@ def test_a_withdrawal_says_who(tmp_path: Path) -> None:
         told = detail(server, campaign_id)
         assert (told["withdrawn_from"], told["withdraw_reason"]) == ("Maria", "wrong sphere")
         assert told["entries"][0]["excluded_from"] == "Maria"
+
+
+def test_an_import_into_a_skin_put_away_brings_it_back(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
+    def listed() -> list[str]:
+        return [entry["id"] for entry in elsewhere.http.get("/v1/skins").json()["skins"]]
+
+    def imported() -> None:
+        file = server.http.get("/v1/skins/palm/export").content
+        elsewhere.http.post("/v1/skins/import", content=file, headers={"Content-Type": "application/x-hdf5"})
+
+    first = sent(server, "first")
+    assert change(lab, f"/campaigns/{first}", "withdraw", reason="a trial") == 303
+    imported()
+    assert listed() == ["palm"]
+    with httpx.Client(base_url=elsewhere.http.base_url, headers=BROWSING, timeout=60) as there:
+        assert change(there, "/skins/palm", "discard", reason="a trial") == 303
+        assert listed() == []
+        imported()  # with nothing new
+        assert listed() == ["palm"]
+        assert change(there, "/skins/palm", "discard", reason="a trial") == 303
+    assert change(lab, "/skins/palm", "discard", reason="a trial") == 303
+    imported()
+    assert listed() == []  # as the file has it
+    sent(server, "second")
+    imported()
+    assert listed() == ["palm"]

@@ -1,21 +1,26 @@
 """kill -9 of the server under a stream of batches: what was acknowledged is there, once and whole."""
 
-import os
 import random
 import threading
 import time
 
+import pytest
+
+from bench.figures import Figure
+from bench.soak import SOAK, record
 from tests.support.store_server import Place, running
 from tests.support.streams import BATCH, Stream, check_kept
 
-SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
-KILLS = {"sqlite": 200 if SOAK else 10, "postgresql": 50 if SOAK else 3}
+# In parts, so that an interrupted soak goes on with the next one.
+PARTS = 10 if SOAK else 1
+KILLS = {"sqlite": 20 if SOAK else 10, "postgresql": 5 if SOAK else 3}
 SENDERS = 2
 
 
-def test_what_was_acknowledged_survives_any_kill(place: Place) -> None:
+@pytest.mark.parametrize("part", range(PARTS))
+def test_what_was_acknowledged_survives_any_kill(place: Place, part: int) -> None:
     backend = "postgresql" if place.database_url else "sqlite"
-    moments = random.Random(7)
+    moments = random.Random(7 + part)
     streams = [Stream(sender) for sender in range(SENDERS)]
     for kill in range(KILLS[backend]):
         with running(place) as server:
@@ -32,3 +37,4 @@ def test_what_was_acknowledged_survives_any_kill(place: Place) -> None:
                 stream.flowing.clear()
     with running(place) as server:
         check_kept(server, streams, BATCH * KILLS[backend])
+    record(Figure("Kills of a server with nothing acknowledged lost", KILLS[backend], "", 250))

@@ -1,6 +1,7 @@
 """Writers that wait for another's lock: readers are answered meanwhile, and nobody waits for ever."""
 
 import fcntl
+import io
 import threading
 import time
 from collections.abc import Iterator
@@ -10,9 +11,11 @@ from pathlib import Path
 
 import httpx
 import pytest
+from openpyxl import Workbook
 from sqlalchemy import text
 from sqlalchemy.exc import OperationalError
 
+from service.routes.columns_body import XLSX
 from service.store import Database, open_store, write_turns
 from tests.support.store_server import Place, Server, campaign
 
@@ -50,6 +53,52 @@ def test_readers_are_answered_while_writers_wait(server: Server) -> None:
         answers = [one.result() for one in waiting]
     assert {200, 201} & set(answers)
     assert max(answers) < 500
+
+
+def test_files_are_read_while_uploads_wait_for_other_writers(server: Server) -> None:
+    book = io.BytesIO()
+    save_workbook(book)
+    url = str(server.http.base_url)
+
+    def send(number: int) -> int:
+        return httpx.post(f"{url}/v1/campaigns", json=campaign(f"waiting {number}"), timeout=60).status_code
+
+    with ThreadPoolExecutor(WRITERS) as pool:
+        with locked(server.place):
+            waiting = [pool.submit(send, number) for number in range(4)]
+            time.sleep(1.0)
+            assert not any(one.done() for one in waiting)
+            answer = server.http.post("/v1/sigma", content=book.getvalue(), headers={"Content-Type": XLSX}, timeout=10)
+            assert answer.status_code == 200, answer.text
+        assert [one.result() for one in waiting] == [201] * 4
+
+
+def test_nothing_long_begins_while_others_wait_to_write_in_vain(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(write_turns, "WAIT_S", 0.3)
+    monkeypatch.setattr("service.store.engine.WAIT_S", 0.3)
+    with closing(store_of(place)) as store:
+        store.require_hope()
+        with locked(place), pytest.raises(OperationalError), store.writing():
+            raise AssertionError("nobody else may write")
+        with pytest.raises(OperationalError):
+            store.require_hope()
+        with store.writing() as connection:
+            connection.execute(text("SELECT 1"))
+        store.require_hope()
+        with locked(place), pytest.raises(OperationalError), store.writing():
+            raise AssertionError("nobody else may write")
+        monkeypatch.setattr(write_turns, "VAIN_S", 0.0)
+        store.require_hope()
+
+
+def save_workbook(file: io.BytesIO) -> None:
+    """Points of sigma."""
+    book = Workbook()
+    sheet = book.active
+    assert sheet is not None
+    for row in (("a_over_h", "rt_over_h"), (0.3, 0.6), (0.5, 0.6)):
+        sheet.append(row)
+    book.save(file)
 
 
 def test_a_write_that_waits_too_long_is_refused_and_keeps_nothing(

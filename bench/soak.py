@@ -1,0 +1,80 @@
+"""The soak: what `make soak` has done already, and what it measured; an interrupted run goes on where it was.
+
+Under `build/soak/`, in a folder for each state of the code: `passed`, a test a line, which is not run again; and
+`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md.
+"""
+
+import functools
+import hashlib
+import json
+import os
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from bench.figures import Figure
+
+ROOT = Path(__file__).parent.parent
+SOAK = os.environ.get("UNDERSKIN_SOAK") == "1"
+FOLDER = ROOT / "build" / "soak"
+_CODE = ("underskin", "service", "rig", "proof", "tablegen", "tables", "bench", "tests")
+_FIGURES = "figures.jsonl"
+_KINDS = {".py", ".c", ".html", ".js", ".css", ".h5"}
+
+
+def measure() -> list[Figure]:
+    """What the soak of the code as it is has measured so far."""
+    kept = _folder() / _FIGURES
+    if not kept.exists():
+        return []
+    by_test: dict[tuple[str, str], Figure] = {}  # of a test that was run again the last
+    for entry in map(json.loads, kept.read_text().splitlines()):
+        figure = Figure(**entry["figure"])
+        by_test[entry["test"], figure.name] = figure
+    found: dict[str, Figure] = {}
+    for figure in by_test.values():
+        other = found.get(figure.name, figure)
+        if other is not figure:
+            both = other.value, figure.value
+            figure = replace(figure, value=sum(both) if figure.better == "higher" else max(both))
+        found[figure.name] = figure
+    return sorted(found.values(), key=lambda figure: figure.name)
+
+
+def passed(test: str) -> bool:
+    """Whether a test, by its id, has passed on the code as it is."""
+    kept = _folder() / "passed"
+    return kept.exists() and test in kept.read_text().splitlines()
+
+
+def keep_passed(test: str) -> None:
+    """Keep that it has."""
+    _append("passed", test)
+
+
+def record(figure: Figure) -> None:
+    """Keep a figure of a soak, for the test under way; runs at reduced counts keep none.
+
+    Figures of one name are of parts of one test: those to be `higher` are added up, of the others the largest counts.
+    """
+    if SOAK:
+        test = os.environ["PYTEST_CURRENT_TEST"].rpartition(" ")[0]
+        _append(_FIGURES, json.dumps({"test": test, "figure": asdict(figure)}))
+
+
+def _append(file: str, line: str) -> None:
+    folder = _folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / file).open("a") as kept:
+        kept.write(f"{line}\n")
+
+
+@functools.cache
+def _folder() -> Path:
+    """Of the code as it is."""
+    digest = hashlib.sha256()
+    for package in _CODE:
+        for file in sorted((ROOT / package).rglob("*")):
+            if file.suffix in _KINDS:
+                digest.update(f"{file.relative_to(ROOT)}\n".encode())
+                digest.update(file.read_bytes())
+    return FOLDER / digest.hexdigest()[:16]

@@ -1,0 +1,30 @@
+"""Workbooks that many ask for at once are made a few at a time, and other pages are answered meanwhile."""
+
+import socket
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from service.store.write_turns import THREADS
+from tests.support.store_server import Place, campaign, running
+
+
+@pytest.mark.slow
+def test_many_workbooks_leave_threads_for_other_pages(tmp_path: Path) -> None:
+    with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
+        sent = server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).raise_for_status().json()
+        path = f"/campaigns/{sent['id']}/frf.xlsx"
+        for _ in range(2):  # the first one loads what writes them
+            begun = time.monotonic()
+            assert server.http.get(path).raise_for_status().content.startswith(b"PK")
+            of_one_s = time.monotonic() - begun
+        place = (server.http.base_url.host, server.http.base_url.port)
+        for _ in range(THREADS + 10):
+            connection = stack.enter_context(socket.create_connection(place))
+            connection.sendall(f"GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n".encode())
+        for _ in range(5):
+            begun = time.monotonic()
+            assert server.http.get("/v1/skins").status_code == 200
+            assert time.monotonic() - begun < 3 * of_one_s

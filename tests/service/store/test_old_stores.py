@@ -1,0 +1,62 @@
+"""Stores that servers of this repository's history made, taken up by today's: nothing is lost, and answers are equal.
+
+What they hold, and how they were made, is in `old_stores/`. With UNDERSKIN_SOAK=1 all of them on PostgreSQL too.
+"""
+
+import math
+from typing import Any
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+
+from bench.soak import SOAK
+from service.store import database, migrate
+from service.store.tables import metadata
+from tests.service.conftest import BACKENDS
+from tests.service.store.old_stores.contents import LANDED, SECOND, answers, asked_of, take_over
+from tests.support.store_server import Place, campaign, running
+
+ON_ALL = set(LANDED) if SOAK else {"0007", "0013"}
+"""Those of PostgreSQL too, each of which takes a second or two."""
+
+
+def differences(old: Any, new: Any, at: str = "") -> list[str]:
+    """Where an answer of today lacks, or says otherwise, what an old one said; it may say more."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        gone = [f"{at}/{key} is gone" for key in old.keys() - new.keys()]
+        return gone + [
+            line for key in old.keys() & new.keys() for line in differences(old[key], new[key], f"{at}/{key}")
+        ]
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [line for number, (was, now) in pairs for line in differences(was, now, f"{at}/{number}")]
+    if isinstance(old, float) and isinstance(new, float) and math.isclose(old, new, rel_tol=1e-6, abs_tol=1e-9):
+        return []
+    return [] if old == new else [f"{at}: {old!r}, now {new!r}"]
+
+
+@pytest.mark.parametrize(
+    ("place", "version"),
+    [(backend, version) for backend in BACKENDS for version in LANDED if backend == "sqlite" or version in ON_ALL],
+    indirect=["place"],
+)
+def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
+    take_over(place, version)
+    before = answers(place, version)
+    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        assert sorted(asked_of(server.http)) == sorted(before)
+        found = {path: server.http.get(path).raise_for_status().json() for path in before}
+        assert differences(before, found) == []
+        again = server.http.post(f"/v1/campaigns?skin={SECOND}", json=campaign("stays")).raise_for_status().json()
+        assert again["notes"][0].startswith("these recordings are in campaign stays of skin finger already")
+    store = database(place.database_url, place.folder)
+    with store.reading() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        assert compare_metadata(context, metadata) == []
+    store.close()
+
+
+def test_every_earlier_schema_has_a_store_here() -> None:
+    wanted = "add the commit with which it landed to LANDED, and make its store (old_stores/remake.py)"
+    assert list(LANDED) == migrate.VERSIONS[:-1], wanted
