@@ -134,7 +134,7 @@ class Modulus(Document):
     """Young's modulus of the elastomer [MPa]."""
 
     youngs_modulus_uncertainty_mpa: float
-    """Its standard uncertainty [MPa] by noise and curvature alone, without friction, size and calibration."""
+    """Its standard uncertainty [MPa] by noise and curvature alone, not friction, size or calibration."""
 
     statement: str
     """Where the curve is straight, or how well Hertz' law fits it."""
