@@ -14,7 +14,7 @@ from bench.soak import SOAK
 from service.store import database, migrate
 from service.store.tables import metadata
 from tests.service.conftest import BACKENDS
-from tests.service.store.old_stores.contents import LANDED, SECOND, answers, asked_of, take_over
+from tests.service.store.old_stores.contents import LANDED, SECOND, WITH_THE_NEXT, answers, asked_of, take_over
 from tests.support.store_server import Place, campaign, running
 
 ON_ALL = set(LANDED) if SOAK else {"0007", "0013"}
@@ -59,4 +59,4 @@ def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
 
 def test_every_earlier_schema_has_a_store_here() -> None:
     wanted = "add the commit with which it landed to LANDED, and make its store (old_stores/remake.py)"
-    assert list(LANDED) == migrate.VERSIONS[:-1], wanted
+    assert list(LANDED) == [version for version in migrate.VERSIONS[:-1] if version not in WITH_THE_NEXT], wanted

@@ -31,6 +31,8 @@ LANDED = {
 }
 """The first commit on the main branch whose server runs and fills a store of each version of the schema."""
 
+WITH_THE_NEXT = ("0014", "0015")  # versions that came together with the one after them: no server had them alone
+
 DIAGNOSES_SINCE = "0003"
 FIRST, SECOND = "palm", "finger"  # skins
 
