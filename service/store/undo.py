@@ -23,7 +23,9 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
     """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
     change = kept.find(connection, change_id)
     if change.campaign_id is not None:  # before the skin, as all that change a campaign
-        kept_campaigns.find(connection, change.campaign_id, lock=True)
+        row = kept_campaigns.find(connection, change.campaign_id, lock=True)
+        if change.action == "correct":
+            kept_campaigns.find(connection, row.corrects, lock=True)
     members = skins.members(skins.require_root(connection, change.skin_id))
     skins.lock(connection, connection.execute(members).scalars().all())
     why_not = standing(connection, change, of_same(connection, change))
@@ -61,7 +63,9 @@ def standing(connection: Connection, change: AnyRow, of_same: Sequence[AnyRow]) 
         return "a later change builds on it"
     if change.action == "join" and not _joined_still(connection, change):
         return "the skins were joined otherwise since"
-    return _built_since(connection, change) if _of_figures(change) else None
+    if not _of_figures(change):
+        return None
+    return _corrected_since(connection, change) or _built_since(connection, change)
 
 
 def of_same(connection: Connection, change: AnyRow) -> Sequence[AnyRow]:
@@ -86,6 +90,13 @@ def _joined_still(connection: Connection, change: AnyRow) -> bool:
     """Whether the skin counts as itself, and the one that was joined to it as this skin."""
     own, other = change.skin_id, skins.find(connection, change.before["skin_id"])
     return skins.require_root(connection, own) == own and other is not None and other.joined_to == other.root_id == own
+
+
+def _corrected_since(connection: Connection, change: AnyRow) -> str | None:
+    """The correction itself is a change of the campaign that took the place of this one."""
+    newer = select(campaigns.c.corrected_by).where(campaigns.c.id == change.campaign_id)
+    corrected_by = connection.execute(newer).scalar()
+    return None if corrected_by is None else f"its campaign was corrected since, by {corrected_by!r}"
 
 
 def _built_since(connection: Connection, change: AnyRow) -> str | None:
@@ -121,7 +132,7 @@ def _include(connection: Connection, change: AnyRow) -> None:
 def _uncorrect(connection: Connection, change: AnyRow, made_from: str | None) -> None:
     """Use the campaign again that was corrected, and withdraw the one that took its place."""
     newer = kept_campaigns.find(connection, change.campaign_id)
-    older = kept_campaigns.find(connection, newer.corrects, lock=True)
+    older = kept_campaigns.find(connection, newer.corrects)
     raised = campaigns.c.revision + 1
     withdrawn = {"withdrawn_at": now(), "withdrawn_from": made_from, "withdraw_reason": "the correction was undone"}
     _campaign(connection, change, **withdrawn, revision=raised)

@@ -79,7 +79,7 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
     contact = float(to_lab("contact_radius_mm", transmission(table, any_skin, indenter, force).contact_radius))
-    thinnest = max(THICKNESS_MM[0], _INSIDE * contact / table.domain["a_over_h"][1])
+    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * contact / table.domain["a_over_h"][1]))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
     h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
@@ -101,6 +101,14 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
 def _steps(low: float, high: float, most: float, count: int) -> Floats:
     """Even in the logarithm, as numbers that one would write."""
     return np.array([float(f"{value:.3g}") for value in np.geomspace(low, min(high, most), count)])
+
+
+def _rounded_up(value: float) -> float:
+    """To three digits, as `_steps` writes it: what is thinner is outside the table."""
+    if not np.isfinite(value) or value <= 0:
+        return value
+    unit = 10.0 ** (np.floor(np.log10(value)) - 2)
+    return float(f"{np.ceil(value / unit) * unit:.3g}")
 
 
 @dataclass(frozen=True)

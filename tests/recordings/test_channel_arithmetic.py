@@ -172,6 +172,13 @@ def test_what_is_no_arithmetic_is_refused_by_its_term(formula: str, term: str) -
     assert refused.value.allowed.startswith(f"{term}: ")
 
 
+@pytest.mark.parametrize("formula", ["Cell #2 - b", "(a) # b", "a#b", "'Cell #1' - Cell #2"])
+def test_a_sign_that_begins_a_comment_in_python_cuts_nothing_off(formula: str) -> None:
+    with pytest.raises(InvalidInput, match="a name with # in quotes"):
+        parse("derived.d", formula)
+    assert parse("derived.d", "'Cell #1' - \"Cell #2\"").names == ("Cell #1", "Cell #2")
+
+
 @pytest.mark.parametrize("formula", ["", "a -", "0.05 N/m * a", "(" * 150 + "a", "-" * 201, "a\\", "import os"])
 def test_what_cannot_be_parsed_is_refused_with_an_example(formula: str) -> None:
     with pytest.raises(InvalidInput, match="must"):

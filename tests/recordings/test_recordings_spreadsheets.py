@@ -230,6 +230,8 @@ def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str)
     assert only(same_as_plain(table(",Uhrzeit,Datum", f"9:30:07,{day}"))).recorded_at == "2025-12-24T09:30:07+00:00"
     if "T" not in day:
         assert only(read(table(",Date", day))).recorded_at == "2025-12-24T00:00:00+00:00"
+    for time in ("2025-12-24T09:30:00+01:00", "2025-12-24T09:30:00"):  # a time in the column of a date stays
+        assert only(read(table(",Date", time))).recorded_at == time
     refused = refusal(table(",Date,Time", ",09:30"))
     assert (refused.place, refused.reason) == ("line 10, column 9", "has a time of day, '09:30', and no Date")
     assert "is no date and time" in refusal(table(",Date,Time", "31.2.2025,09:30")).reason

@@ -71,7 +71,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         figures=_figures(tried.field, query) if ok and tried.field is not None else [],
         frames=f"/field/frames?{query}",
         count=FRAMES,
-        same=_same(request, tried.given),
+        same=_same(request, tried.given, units_checked=UNITS in request.query_params),
     )
 
 
@@ -164,6 +164,7 @@ def _figures(field: StressField, query: str) -> Sequence[Drawn]:
     ]
 
 
-def _same(request: Request, given: Mapping[str, float]) -> same_request.SameRequest:
-    call = f"client.field({', '.join(f'{name}={value:.6g}' for name, value in given.items())})"
-    return same_request.get(request, f"/v1/field?{urlencode(given)}", call)
+def _same(request: Request, given: Mapping[str, float], *, units_checked: bool) -> same_request.SameRequest:
+    arguments = [f"{name}={value:.6g}" for name, value in given.items()] + ["units_checked=True"] * units_checked
+    query = urlencode({**given, **({"units_checked": "true"} if units_checked else {})})
+    return same_request.get(request, f"/v1/field?{query}", f"client.field({', '.join(arguments)})")

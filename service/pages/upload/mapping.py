@@ -194,7 +194,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    return document, [*strange, *twice, *unsaid]
+    return document, [*strange, *twice, *unsaid, *workbench.named_twice(form, CHANNELS)]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:

@@ -194,10 +194,16 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
 @router.post("/{upload_id}/template", dependencies=[*WRITE, OWN_FORM])
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
     """Reads the files as those of the same instrument were read before."""
-    await run_in_threadpool(templates.use, store, pending, _latest(store, pending.skin or pending.seen[0].skin))
+    await run_in_threadpool(use_template_of, store, pending)
     async with READING_SLOTS:
         await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
+
+
+def use_template_of(store: Database, pending: PendingUpload) -> None:
+    """The same with the skin that the form or the first file names; raises Missing where there is no template."""
+    found = next((one.skin for one in pending.seen), None)  # of an exported skin, no file was seen
+    templates.use(store, pending, _latest(store, pending.skin or found))
 
 
 @router.post("/{upload_id}/signs", dependencies=WRITE)

@@ -49,6 +49,7 @@ def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> Non
     document = with_skin(row.document, {"poisson_ratio": 0.5, **known})
     pending.rig, pending.draft, pending.refused = rig_description.from_dict(document), None, []
     pending.rig_label = "rig.json"  # as the page saves it
+    pending.turned &= not pending.is_depth_composed
 
 
 def _latest(store: Database, file: FileSummary) -> AnyRow | None:

@@ -5,6 +5,7 @@ from typing import Any
 
 from service.pages.shared.forms import number_or_text
 from service.pages.upload.file_summary import FileSummary
+from underskin.errors import InvalidInput, not_unique
 from underskin.recordings.channel_mapping import AUTOMATIC
 from underskin.recordings.readers.derived_channels import FIELD
 
@@ -44,6 +45,8 @@ def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[st
     for number in _rows_in(form):
         text, name = form[f"{FIELD}-formula-{number}"].strip(), _name(form, number, words)
         if text or form.get(f"{FIELD}-name-{number}", "").strip():
+            while name in found:  # refused by `named_twice`, and there to be put right
+                name += " again"
             found[name] = text
     return found or None
 
@@ -64,6 +67,26 @@ def with_derived(
             known = before.get(field, {})
             result[field] = {**known, "channel": name} if known.get("channel") == name else {"channel": name}
     return result
+
+
+def named_twice(form: Mapping[str, str], words: Mapping[str, str]) -> list[InvalidInput]:
+    """The derived channels of a form whose name, or the field that they are for, another one has already."""
+    wrong = []
+    names: set[str] = set()
+    fields: dict[str, str] = {}
+    for number in _rows_in(form):
+        if not form[f"{FIELD}-formula-{number}"].strip():
+            continue
+        name, field = _name(form, number, words), form.get(f"{FIELD}-is-{number}", "")
+        if name in names:
+            wrong.append(not_unique(f"{FIELD}.{name}", name, "another formula has this name: choose another one"))
+        elif field in fields:
+            allowed = f"{fields[field][:80]} is {words.get(field, field)} already: one of the two is for other formulas"
+            wrong.append(not_unique(f"{FIELD}.{name}", name, allowed))
+        names.add(name)
+        if field:
+            fields.setdefault(field, name)
+    return wrong
 
 
 def derived_fields(form: Mapping[str, str]) -> set[str]:

@@ -1,6 +1,8 @@
 """The stress under a sphere as a page: what it shows, the load as a slider and an animation, and the ways there."""
 
 import csv
+import html
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,6 +10,7 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.forms import BROWSING
 from tests.support.store_server import Server
 
 QUERY = "thickness_mm=2.5&youngs_modulus_mpa=16&sensor_radius_mm=1.5&indenter_radius_mm=4&preload_n=3"
@@ -142,6 +145,21 @@ def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
     calm.page.get_by_label(LOAD).press("ArrowLeft")
     calm.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.85 N'")
     calm.require_accessible()
+
+
+def test_the_request_that_does_the_same_accepts_what_the_page_accepts(idle: Server) -> None:
+    small = QUERY.replace("indenter_radius_mm=4", "indenter_radius_mm=0.007").replace(
+        "preload_n=3", "preload_n=0.00001"
+    )
+    for query, units_checked in ((QUERY, False), (f"{small}&units_checked=yes", True)):
+        text = html.unescape(idle.http.get(f"/field?{query}", headers=BROWSING).raise_for_status().text)
+        path, call = re.search(r"/v1/field\?[^'\s<]+", text), re.search(r"client\.field\(([^)]*)\)", text)
+        assert path is not None
+        assert call is not None
+        assert ("units_checked=True" in call[1]) == units_checked
+        assert idle.http.get(path[0]).raise_for_status().json()["status"] == "ok"
+        fields = dict(part.split("=") for part in call[1].split(", "))
+        assert idle.http.get("/v1/field", params=fields).raise_for_status().json()["status"] == "ok"
 
 
 def test_what_is_exact_and_what_is_not_is_said(reader: Visit) -> None:

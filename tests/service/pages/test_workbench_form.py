@@ -1,13 +1,21 @@
 """Derived channels, zero and trim as a form has them, and what of a rig description is an instrument's."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import create_autospec
 
 import numpy as np
+import pytest
 
 from service.ingest.instruments import recognised, template_of, with_skin
+from service.pages.upload import page, templates
+from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import document_of
+from service.pages.upload.pending_uploads import PendingUpload
 from service.pages.upload.workbench import rows
+from service.store import Database, Missing
 from tests.support.raw_curves import rig_of_raw_curve
 from underskin.recordings import rig_description
 from underskin.recordings.channels import Block, Channel, Contents
@@ -57,6 +65,32 @@ def test_an_emptied_row_is_taken_out() -> None:
     found, _ = document_of(form_of(document, **emptied), document)
     assert list(found["derived"]) == ["depth", "load"]
     assert found["channels"]["force_n"] == {"channel": "load"}
+
+
+def test_two_derived_channels_of_one_name_or_for_one_field_are_refused_and_kept() -> None:
+    document = rig_of_raw_curve()
+    found, wrong = document_of(form_of(document, **{"derived-name-1": "load"}), document)
+    assert [error.field for error in wrong] == ["derived.load"]
+    assert [*found["derived"].values()] == [*document["derived"].values()]  # what was typed is there to be put right
+    _, wrong = document_of(form_of(document, **{"derived-is-2": "displacement_mm"}), document)
+    assert [error.field for error in wrong] == ["derived.load"]
+    assert wrong[0].allowed == "depth is displacement already: one of the two is for other formulas"
+    unnamed = {f"derived-name-{number}": "" for number in (1, 2)} | {"derived-is-2": "displacement_mm"}
+    assert len(document_of(form_of(document, **unnamed), document)[1]) == 1
+
+
+def test_a_template_turns_no_depth_that_is_composed() -> None:
+    rig = rig_description.from_dict(rig_of_raw_curve())
+    store = create_autospec(Database)
+    store.read.return_value = SimpleNamespace(document=template_of(rig))
+    file = FileSummary("a.txt", "CSV", 0, (), (), (), (), (), None, instrument="of a microscope")
+    pending = PendingUpload("id", "session", Path(), (), 0, 0.0, seen=[file], turned=True)
+    templates.use(store, pending, {})
+    assert pending.is_depth_composed
+    assert not pending.turned
+    exported = PendingUpload("id", "session", Path(), (), 0, 0.0)
+    with pytest.raises(Missing, match="There is no template"):
+        page.use_template_of(store, exported)
 
 
 def test_a_template_holds_what_is_the_instrument_s_alone() -> None:

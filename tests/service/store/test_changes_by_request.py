@@ -137,6 +137,22 @@ def test_a_correction_is_undone_until_something_builds_on_it(server: Server) -> 
     assert undo(server, changes(server, again)[0]).status_code == 409
 
 
+def test_a_correction_that_was_corrected_is_undone_after_the_later_one(server: Server) -> None:
+    first = sent(server, "first")
+    second = sent(server, "second", corrects=first, reason="E was mistyped")
+    third = sent(server, "third", corrects=second, reason="and the sphere")
+    (earlier,), (later,) = changes(server, second), changes(server, third)
+    assert (earlier["may_be_undone"], later["may_be_undone"]) == (False, True)
+    refused = undo(server, earlier)
+    assert refused.status_code == 409
+    assert f"was corrected since, by '{third}'" in refused.json()["detail"]
+    assert history(server) == {third}  # and not the first one beside it
+    assert undo(server, later).status_code == 200
+    assert history(server) == {second}
+    assert undo(server, earlier).status_code == 200
+    assert history(server) == {first}
+
+
 def test_an_export_brings_trials_and_corrections(server: Server, elsewhere: Server) -> None:
     older = sent(server, "older")
     newer = sent(server, "newer", corrects=older, reason="E was mistyped")

@@ -122,6 +122,13 @@ def test_a_force_beyond_the_table_is_told_with_the_highest_one() -> None:
     assert not np.isfinite(found(preload_n=1.01 * highest, resolution_mm=10.0).region.frf_pc_per_n).any()
 
 
+@pytest.mark.parametrize("preload_n", [2.7, 2.8, 2.9, 3.0])
+def test_the_thinnest_layer_of_the_search_is_inside_the_table(preload_n: float) -> None:
+    region = found(preload_n=preload_n, indenter_radius_mm=10.0, youngs_modulus_mpa=1.0, resolution_mm=1.0).region
+    assert region.contact_radius_mm / region.thickness_mm[0] == pytest.approx(3.0, rel=5e-3)
+    assert np.isfinite(region.frf_pc_per_n[0]).all()
+
+
 def test_where_even_the_finest_skin_spreads_too_far_its_own_resolution_is_told() -> None:
     answer = found(preload_n=0.05, resolution_mm=0.4, least_frf_pc_per_n=0.0, dip_percent=50.0)
     assert answer.binding[0].startswith("The spread of the stress: even the finest skin")

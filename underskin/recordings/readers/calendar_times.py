@@ -34,6 +34,10 @@ def iso_time(cell: str, zone: tzinfo) -> str:
 
 
 def of_two_cells(day: str, clock: str) -> str:
-    """A date, also one that begins an ISO time, and a time of day in cells of their own, as `iso_time` reads them."""
-    iso = _ISO_DATE.match(day.strip())
-    return f"{'.'.join(reversed(iso.groups())) if iso else day.strip()} {clock.strip()}".strip()
+    """A date, also one that begins an ISO time, and a time of day in cells of their own, as `iso_time` reads them; an
+    ISO time beside which there is no other time of day as it is."""
+    day, clock = day.strip(), clock.strip()
+    iso = _ISO_DATE.match(day)
+    if iso is None or not (clock or iso.end() == len(day)):
+        return f"{day} {clock}".strip()
+    return f"{'.'.join(reversed(iso.groups()))} {clock}".strip()

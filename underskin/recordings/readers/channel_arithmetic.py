@@ -59,6 +59,8 @@ def parse(field: str, text: str) -> Formula:
         place = f"; look at character {column}" if column else ""
         allowed = f"{_FORM}; a name of several words in quotes, a number with {_UNIT}{place}"
         raise InvalidInput(field, text, allowed) from None
+    if b"#" in text.encode()[tree.end_col_offset or 0 :]:  # to `ast` the rest is a comment
+        raise InvalidInput(field, text, f"{_FORM}; a name with # in quotes")
     parser = _Parser(field, text)
     parser.check(tree)
     return Formula(text, tuple(dict.fromkeys(parser.names(tree))), parser.adds_names(tree), tree)
