@@ -23,7 +23,7 @@ _KINDS = {".py", ".c", ".html", ".js", ".css", ".h5"}
 
 def measure() -> list[Figure]:
     """What the soak of the code as it is has measured so far."""
-    kept = _folder() / _FIGURES
+    kept = folder_of_the_code() / _FIGURES
     if not kept.exists():
         return []
     by_test: dict[tuple[str, str], Figure] = {}  # of a test that was run again the last
@@ -42,7 +42,7 @@ def measure() -> list[Figure]:
 
 def passed(test: str) -> bool:
     """Whether a test, by its id, has passed on the code as it is."""
-    kept = _folder() / "passed"
+    kept = folder_of_the_code() / "passed"
     return kept.exists() and test in kept.read_text().splitlines()
 
 
@@ -62,14 +62,14 @@ def record(figure: Figure) -> None:
 
 
 def _append(file: str, line: str) -> None:
-    folder = _folder()
+    folder = folder_of_the_code()
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / file).open("a") as kept:
         kept.write(f"{line}\n")
 
 
 @functools.cache
-def _folder() -> Path:
+def folder_of_the_code() -> Path:
     """Of the code as it is."""
     digest = hashlib.sha256()
     for package in _CODE:

@@ -15,7 +15,7 @@ from tests.support.repository import ROOT
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Where the soak keeps what it has done, in place of `build/soak`."""
-    monkeypatch.setattr(soak, "_folder", lambda: tmp_path / "code")
+    monkeypatch.setattr(soak, "folder_of_the_code", lambda: tmp_path / "code")
     monkeypatch.setattr(soak, "SOAK", True)
     return tmp_path / "code"
 

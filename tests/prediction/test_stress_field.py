@@ -133,7 +133,7 @@ def test_the_finite_elements_inside_the_layer_differ_by_no_more_than_is_said(a: 
         state = layer.equilibrium(state, part * peak * hertz_load(layer.discretisation, a))
     r, height = np.asarray(layer.discretisation.basis.global_coordinates())
     near = r < a + 2
-    elements = (-stress(*layer._fields(state))[..., 3] / (a**2 * peak))[near]
+    elements = (-stress(*layer.fields(state))[..., 3] / (a**2 * peak))[near]
     r, depth = r[near], 1 - height[near]
     thickness, modulus = 1e-3, 1e6
     radius = thickness * a / float(hertz.contact_radius_over_indenter_radius(load))
