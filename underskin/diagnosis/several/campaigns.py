@@ -2,8 +2,8 @@
 
 Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs that
 says something. Each of those is diagnosed as it would be alone, which gives its noise, its findings and the sets of
-mechanisms that it asks for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did between them is told with
-the mechanisms taken into account (sensors.py).
+mechanisms that it asks for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did
+between them is told with the mechanisms taken into account (sensors.py).
 """
 
 import math
