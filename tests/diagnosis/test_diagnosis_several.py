@@ -195,6 +195,16 @@ def test_a_block_measured_apart_counts_where_the_first_campaign_cannot_be_used(t
     assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
 
 
+def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_with(table: SigmaTable) -> None:
+    dates = [made("may"), made("september", SEPTEMBER, seed=8)]
+    report = diagnose_together([*dates, of_block(48.0)], table, "all")
+    (entry,) = report["contradictions"]
+    assert entry["statement"].startswith("may: The FRFs and the block contradict each other")
+    assert report["verdict"] == "no_mismatch"
+    said, _ = report["statement"].split("; apart from that, all 2 campaigns")
+    assert said.startswith("In may: The FRFs and the block contradict each other")
+
+
 def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Path) -> None:
     """As if all were in one file."""
     frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"
