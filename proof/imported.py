@@ -1,7 +1,7 @@
-"""Which modules of the library a diagnosis of one campaign imports, directly or through others."""
+"""Which modules of the library a diagnosis imports, directly or through others."""
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 _BEGUN = (
     "underskin.diagnosis.pipeline", "underskin.diagnosis.reporting.report", "underskin.recordings.campaign",
@@ -12,10 +12,11 @@ _BY_NAME = "underskin.mechanisms."  # laws are found by the folder that they are
 _UNUSED = ("underskin.cli.", "underskin.client.", "underskin.figures.", "underskin.recordings.readers.")
 
 
-def of_a_diagnosis(texts: Mapping[str, str]) -> dict[str, str]:
-    """Those of the texts of modules by their dotted names, packages as `package.__init__`."""
+def of_a_diagnosis(texts: Mapping[str, str], further: Collection[str] = ()) -> dict[str, str]:
+    """Those of the texts of modules by their dotted names, packages as `package.__init__`: of a diagnosis of one
+    campaign, and of what begins in `further` modules."""
     known = {name.removesuffix(".__init__"): name for name in texts}
-    left = [name for name in known if name in _BEGUN or name.startswith(_BY_NAME)]
+    left = [name for name in known if name in _BEGUN or name in further or name.startswith(_BY_NAME)]
     found: set[str] = set()
     while left:
         name = left.pop()

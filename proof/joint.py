@@ -17,6 +17,7 @@ SEED, COUNT = 17876, 150
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _STATED = 0.5  # probability of a departure that is stated
+SEVERAL = ("underskin.diagnosis.several.campaigns", "underskin.diagnosis.several.fleet")
 _ERRORS = ("modulus_error", "thickness_error", "strain_stiffening")
 
 Report = Mapping[str, Any]
@@ -25,7 +26,7 @@ Report = Mapping[str, Any]
 def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Of each joint campaign what was hidden, and what is told together and apart."""
     cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
-    version = f"{diagnosing()} {sources('rig', 'underskin/diagnosis/several/*.py')}"
+    version = f"{diagnosing(*SEVERAL)} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
 
 

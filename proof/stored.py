@@ -93,16 +93,18 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
     return of_each(work, cases, partial(_report, work.folder / "reports", diagnosing()), progress)
 
 
-def of_diagnosis() -> str:
-    """Digest of the library's sources on which a report of one campaign can depend."""
-    return _digest(of_a_diagnosis(_texts("underskin")))
+def of_diagnosis(*further: str) -> str:
+    """Digest of the library's sources on which a report of one campaign can depend, or what begins in `further`
+    modules."""
+    return _digest(of_a_diagnosis(_texts("underskin"), further))
 
 
-def diagnosing() -> str:
-    """Digests of all that a report depends on but its campaign: the library's sources and its table."""
+def diagnosing(*further: str) -> str:
+    """Digests of all that a report depends on but its campaign: the library's sources, as in `of_diagnosis`, and its
+    table."""
     from underskin.surrogate.sigma_table import load_table
 
-    return f"{of_diagnosis()} {load_table().sha256}"
+    return f"{of_diagnosis(*further)} {load_table().sha256}"
 
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:

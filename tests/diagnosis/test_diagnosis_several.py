@@ -184,6 +184,27 @@ def test_a_block_measured_apart_tells_the_modulus_of_both_dates(table: SigmaTabl
         diagnose_together([*dates, other], table, "all")
 
 
+def test_a_block_measured_apart_counts_where_the_first_campaign_cannot_be_used(table: SigmaTable) -> None:
+    """One recording tells nothing: the block counts with the campaign after it."""
+    short = replace(made("april", "2017-04-03T09:00:00Z"), recordings=made("april").recordings[:1])
+    dates = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
+    report = diagnose_together([short, *dates, of_block(9.0)], table, "all")
+    assert report["campaigns"] == ["april", "may", "september", "block"]
+    assert [entry["verdict"] for entry in report["provenance"]["each"]][:2] == ["insufficient_data", "explained"]
+    assert scopes(report) == {"modulus_error": {"campaigns": ["may", "september"]}}
+    assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
+
+
+def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_with(table: SigmaTable) -> None:
+    dates = [made("may"), made("september", SEPTEMBER, seed=8)]
+    report = diagnose_together([*dates, of_block(48.0)], table, "all")
+    (entry,) = report["contradictions"]
+    assert entry["statement"].startswith("may: The FRFs and the block contradict each other")
+    assert report["verdict"] == "no_mismatch"
+    said, _ = report["statement"].split("; apart from that, all 2 campaigns")
+    assert said.startswith("In may: The FRFs and the block contradict each other")
+
+
 def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Path) -> None:
     """As if all were in one file."""
     frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"

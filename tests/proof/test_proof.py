@@ -11,7 +11,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proof import figures, own_rig, paper_array
+from proof import figures, joint, own_rig, paper_array
 from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
@@ -29,6 +29,7 @@ from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import FrfRecording, parse
 from underskin.surrogate.sigma_table import load_table
 
+ROOT = Path(__file__).parents[2]
 RECORDINGS = os.environ.get("UNDERSKIN_RECORDINGS")
 
 
@@ -123,6 +124,17 @@ def test_a_diagnosis_depends_on_what_it_imports_and_on_every_law_alone() -> None
     }
     left_out = {"underskin.__init__", "underskin.physics.field", "underskin.cli.app"}
     assert set(of_a_diagnosis(texts)) == set(texts) - left_out
+    further = of_a_diagnosis(texts, ["underskin.physics.field"])
+    assert set(further) == set(texts) - left_out | {"underskin.physics.field"}
+
+
+def test_joint_results_depend_on_how_sensors_of_several_campaigns_are_inverted() -> None:
+    texts = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for path in (ROOT / "underskin").rglob("*.py")
+    }
+    inverted = {"underskin.inversion.invert", "underskin.prediction.adopted_model"}
+    assert inverted <= set(of_a_diagnosis(texts, joint.SEVERAL)) - set(of_a_diagnosis(texts))
 
 
 def test_drawn_cases_tell_nothing_of_the_truth() -> None:

@@ -1,9 +1,9 @@
 """Campaigns of one skin diagnosed together: what acts in all of them, and what is there from a campaign on.
 
-Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs. Each of
-those is diagnosed as it would be alone, which gives its noise, its findings and the sets of mechanisms that it asks
-for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did between them is told with
-the mechanisms taken into account (sensors.py).
+Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs that
+says something. Each of those is diagnosed as it would be alone, which gives its noise, its findings and the sets of
+mechanisms that it asks for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did
+between them is told with the mechanisms taken into account (sensors.py).
 """
 
 import math
@@ -62,23 +62,25 @@ def diagnose_together(
     _check(with_frf, of_curves)
     refuse_copies(campaigns)
     ordered = in_order(with_frf)
-    ordered[0] = with_curves(ordered[0], of_curves)
-    document = _report(ordered, table, name, without, progress)
+    document = _report(ordered, of_curves, table, name, without, progress)
     return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
 
 
 def _report(
-    ordered: Sequence[Campaign],
+    with_frf: Sequence[Campaign],
+    of_curves: Sequence[Campaign],
     table: SigmaTable,
     name: str,
     without: Collection[str],
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Of campaigns with FRFs in their order; of one alone its own."""
-    results = []
-    for number, campaign in enumerate(ordered):
-        results.append(diagnose(campaign, table, without=without))
-        progress((number + 1) / (len(ordered) + 1))
+    """Of campaigns with FRFs in their order, and what curves of others tell; of one alone its own."""
+    ordered, results = list[Campaign](), list[DiagnosisResult]()
+    for number, campaign in enumerate(with_frf):
+        counted = any(result.search is not None for result in results)
+        ordered.append(campaign if counted else with_curves(campaign, of_curves))
+        results.append(diagnose(ordered[-1], table, without=without))
+        progress((number + 1) / (len(with_frf) + 1))
     alone = [_standing_alone(result) for result in results]
     results = _with_changed_sensors(ordered, results, alone, table, without)
     reports = [reported(result) for result in results]

@@ -74,6 +74,9 @@ def together_report(
         for finding in own.document["findings"]
     ]
     findings = [*(finding.in_report() for finding in exchanges(changed, dated)), *findings]
+    of_kinds = _of_kinds(campaigns, reports)
+    contradictory = [f"in {entry['statement']}" for entry in of_kinds.get("contradictions", ())]
+    of_d33 = quoted.of_campaigns(last_name, last)
     return {
         "schema": SCHEMA,
         "campaign": name,
@@ -81,7 +84,7 @@ def together_report(
         "verdict": verdict,
         "probability": round(probability, 3),
         "statement": _statement(
-            verdict, probability, leader, undescribed, mechanisms, changed, dated, quoted.of_campaigns(last_name, last)
+            verdict, probability, leader, undescribed, mechanisms, changed, dated, contradictory, of_d33
         ),
         "location": {
             "axes": [],
@@ -95,7 +98,7 @@ def together_report(
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
         "not_identifiable": quoted.not_identifiable({last_name: last}),
         "findings": findings,
-        **_of_kinds(reports),
+        **of_kinds,
         "fit": None,
         "power": [],
         "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
@@ -107,11 +110,24 @@ def together_report(
     }
 
 
-def _of_kinds(reports: Sequence[Reported]) -> dict[str, Any]:
+def _of_kinds(campaigns: Sequence[Campaign], reports: Sequence[Reported]) -> dict[str, Any]:
     """What recordings of each kind tell, and how they contradict each other, of the campaigns that have several."""
-    keys = ("by_kind", "contradictions")
-    told = [own.document for own in reports if "by_kind" in own.document]
-    return {key: [entry for document in told for entry in document[key]] for key in keys} if told else {}
+    told = [
+        (campaign.name, own.document)
+        for campaign, own in zip(campaigns, reports, strict=True)
+        if "by_kind" in own.document
+    ]
+    if not told:
+        return {}
+    contradictions = [
+        {**entry, "statement": f"{name}: {entry['statement']}"}
+        for name, document in told
+        for entry in document["contradictions"]
+    ]
+    return {
+        "by_kind": [entry for _, document in told for entry in document["by_kind"]],
+        "contradictions": contradictions,
+    }
 
 
 def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:
@@ -258,6 +274,7 @@ def _statement(
     mechanisms: Sequence[dict[str, Any]],
     changed: Sequence[Change],
     dated: Dated,
+    contradictory: Sequence[str],
     of_d33: str,
 ) -> str:
     percent = in_percent(probability)
@@ -280,7 +297,8 @@ def _statement(
     else:
         begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
         stated = f"{begin}: {', '.join(parts)} ({percent})"
-    return of_clauses([stated], said, [dated.order_clause(), of_d33], names=names)
+    first = [*contradictory, f"apart from that, {stated}"] if contradictory else [stated]
+    return of_clauses(first, said, [dated.order_clause(), of_d33], names=names)
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:
