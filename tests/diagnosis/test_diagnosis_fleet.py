@@ -149,6 +149,16 @@ def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(ta
     assert all(skin["low"] < 9.0 < skin["high"] for skin in moduli["skins"])
 
 
+def test_a_block_that_contradicts_its_skin_is_told_of_the_fleet(table: SigmaTable) -> None:
+    skins = sisters(3)
+    first = next(iter(skins))
+    skins[first] = [*skins[first], of_block(48.0)]
+    report = diagnose_fleet(skins, table, "palms")
+    (contradiction,) = report["contradictions"]
+    assert contradiction["statement"].startswith(f"{first}: The FRFs and the block contradict each other")
+    assert f"n {first}: The FRFs and the block contradict each other" in report["statement"]
+
+
 def test_which_campaign_counts_as_the_latest_is_told_where_one_has_no_date(table: SigmaTable) -> None:
     skins = sisters(3)
     undated = made("undated", seed=30)

@@ -205,6 +205,15 @@ def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_wi
     assert said.startswith("In may: The FRFs and the block contradict each other")
 
 
+def test_a_block_that_was_joined_to_both_dates_counts_once(table: SigmaTable) -> None:
+    apart = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
+    both = [replace(one, recordings=(*one.recordings, *of_block(9.0).recordings)) for one in apart]
+    report = diagnose_together(both, table, "both")
+    once = diagnose_together([*apart, of_block(9.0)], table, "apart")
+    assert report["by_kind"] == once["by_kind"]
+    assert report["mechanisms"] == once["mechanisms"]
+
+
 def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Path) -> None:
     """As if all were in one file."""
     frfs, block = tmp_path / "frfs.json", tmp_path / "block.json"

@@ -20,7 +20,7 @@ from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, chang
 from underskin.diagnosis.several.together_report import together_report
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
-from underskin.recordings.campaign import Campaign, FrfRecording, Recording
+from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 
@@ -55,12 +55,11 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, none with FRFs, skins that are declared otherwise, or recordings that are in two
-        campaigns.
+        Fewer than two campaigns, none with FRFs, skins that are declared otherwise, or FRFs that are in two campaigns.
     """
-    with_frf, of_curves = by_frfs(campaigns)
+    with_frf, of_curves = by_frfs(curves_once(campaigns, set()))
     _check(with_frf, of_curves)
-    refuse_copies(campaigns)
+    refuse_copies(with_frf)
     ordered = in_order(with_frf)
     document = _report(ordered, of_curves, table, name, without, progress)
     return {**document, "campaign": name, "campaigns": [campaign.name for campaign in (*ordered, *of_curves)]}
@@ -140,22 +139,38 @@ def with_curves(campaign: Campaign, of_curves: Sequence[Campaign]) -> Campaign:
     return replace(campaign, recordings=(*campaign.recordings, *curves)) if curves else campaign
 
 
+def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaign]:
+    """The campaigns without curves that an earlier one, or one `seen` before, has number for number: a block that was
+    joined to the FRFs of two dates is one measurement."""
+    found = []
+    for campaign in campaigns:
+        curves = {one.id: _curve(one) for one in campaign.recordings if not isinstance(one, FrfRecording)}
+        kept = tuple(one for one in campaign.recordings if curves.get(one.id) not in seen)
+        found.append(replace(campaign, recordings=kept) if len(kept) < len(campaign.recordings) else campaign)
+        seen |= set(curves.values())
+    return found
+
+
+def _curve(recording: CurveRecording) -> bytes:
+    return recording.displacement_mm.tobytes() + recording.force_n.tobytes()
+
+
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:
-    """Raise InvalidInput where a recording is in two campaigns, number for number: it would count twice."""
+    """Raise InvalidInput where an FRF is in two campaigns, number for number: it would count twice."""
     owners: dict[bytes, str] = {}
     for campaign in campaigns:
         for place, recording in enumerate(campaign.recordings):
+            if not isinstance(recording, FrfRecording):
+                continue
             owner = owners.setdefault(_measured(recording), campaign.name)
             if owner != campaign.name:
                 allowed = f"must not hold the same numbers as a recording of {owner}: it would count twice"
-                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.id, allowed)
+                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.sensor, allowed)
 
 
-def _measured(recording: Recording) -> bytes:
-    if isinstance(recording, FrfRecording):
-        series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
-        return b"".join(b"-" if one is None else one.tobytes() for one in series)
-    return recording.displacement_mm.tobytes() + recording.force_n.tobytes()
+def _measured(recording: FrfRecording) -> bytes:
+    series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
+    return b"".join(b"-" if one is None else one.tobytes() for one in series)
 
 
 def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:

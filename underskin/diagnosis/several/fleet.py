@@ -15,7 +15,7 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.diagnosis.several.bench import benches
-from underskin.diagnosis.several.campaigns import by_frfs, refuse_copies, with_curves
+from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
 from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.dates import Dated, date_of, in_order
@@ -43,15 +43,16 @@ def diagnose_fleet(
 ) -> dict[str, Any]:
     """The report (`report/1`) of a fleet, named `name`; `skins` by their ids, each with its campaigns.
 
-    Raises InvalidInput for fewer than three skins, for one without campaigns, and for recordings in two campaigns.
+    Raises InvalidInput for fewer than three skins, for one without campaigns, and for FRFs in two campaigns.
     """
     if len(skins) < _LEAST_SKINS:
         raise InvalidInput("skins", len(skins), f"must be {_LEAST_SKINS} at least, to be a population")
     refuse_copies([campaign for own in skins.values() for campaign in own])
     results: dict[str, DiagnosisResult] = {}
+    seen: set[bytes] = set()
     orders: dict[str, str] = {}
     for number, (skin, campaigns) in enumerate(skins.items()):
-        with_frf, of_curves = by_frfs(campaigns)
+        with_frf, of_curves = by_frfs(curves_once(campaigns, seen))
         if not with_frf:
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
         results[skin] = _latest([with_curves(one, of_curves) for one in with_frf], table, without)

@@ -14,6 +14,7 @@ from underskin.diagnosis.selection.answers import UNTHOUGHT
 from underskin.diagnosis.several import quoted
 from underskin.diagnosis.several.common_set import CommonSet
 from underskin.diagnosis.several.course import Candidate
+from underskin.diagnosis.several.kinds import of_kinds
 from underskin.diagnosis.several.population import REGULAR, STATED, Populations
 from underskin.diagnosis.several.skin import D33, ERRORS, QUANTITIES
 from underskin.diagnosis.several.strengths import DEPARTS, Strength
@@ -66,6 +67,8 @@ def fleet_report(
     d33 = next(entry for entry in populations if entry["parameter"] == D33)
     stated = {skin: {one["name"] for one in own.document["mechanisms"]} for skin, own in reports.items()}
     of_d33 = quoted.of_skins(d33["mean"], d33["unit"], own_d33, _lacking(mechanisms, stated))
+    by_kind = of_kinds(reports.items())
+    contradictory = [f"in {entry['statement']}" for entry in by_kind.get("contradictions", ())]
     return {
         "schema": SCHEMA,
         "campaign": name,
@@ -76,7 +79,7 @@ def fleet_report(
             probability,
             mechanisms,
             unexplained,
-            [*_asides(lacking, orders), of_d33],
+            [*contradictory, *_asides(lacking, orders), of_d33],
             populations,
             _expected(fleet),
             [*results, *campaigns],
@@ -92,6 +95,7 @@ def fleet_report(
             for skin, own in reports.items()
             for finding in own.document["findings"]
         ],
+        **by_kind,
         "fit": None,
         "power": [],
         "population": populations,

@@ -16,6 +16,7 @@ from underskin.diagnosis.several.course import Candidate, Course, Courses, cours
 from underskin.diagnosis.several.dates import Dated
 from underskin.diagnosis.several.exchanged import changed_once, with_exchanges
 from underskin.diagnosis.several.exchanged import findings as exchanges
+from underskin.diagnosis.several.kinds import of_kinds
 from underskin.diagnosis.several.level import AGEING, causes, unsure_of_changes
 from underskin.diagnosis.several.posteriors import Shared, combined, values
 from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
@@ -74,8 +75,8 @@ def together_report(
         for finding in own.document["findings"]
     ]
     findings = [*(finding.in_report() for finding in exchanges(changed, dated)), *findings]
-    of_kinds = _of_kinds(campaigns, reports)
-    contradictory = [f"in {entry['statement']}" for entry in of_kinds.get("contradictions", ())]
+    by_kind = of_kinds(zip((campaign.name for campaign in campaigns), reports, strict=True))
+    contradictory = [f"in {entry['statement']}" for entry in by_kind.get("contradictions", ())]
     of_d33 = quoted.of_campaigns(last_name, last)
     return {
         "schema": SCHEMA,
@@ -98,7 +99,7 @@ def together_report(
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
         "not_identifiable": quoted.not_identifiable({last_name: last}),
         "findings": findings,
-        **of_kinds,
+        **by_kind,
         "fit": None,
         "power": [],
         "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
@@ -107,26 +108,6 @@ def together_report(
             **results[usable[-1]].provenance,
             "each": [{key: own.document[key] for key in ("campaign", "verdict", "probability")} for own in reports],
         },
-    }
-
-
-def _of_kinds(campaigns: Sequence[Campaign], reports: Sequence[Reported]) -> dict[str, Any]:
-    """What recordings of each kind tell, and how they contradict each other, of the campaigns that have several."""
-    told = [
-        (campaign.name, own.document)
-        for campaign, own in zip(campaigns, reports, strict=True)
-        if "by_kind" in own.document
-    ]
-    if not told:
-        return {}
-    contradictions = [
-        {**entry, "statement": f"{name}: {entry['statement']}"}
-        for name, document in told
-        for entry in document["contradictions"]
-    ]
-    return {
-        "by_kind": [entry for _, document in told for entry in document["by_kind"]],
-        "contradictions": contradictions,
     }
 
 
