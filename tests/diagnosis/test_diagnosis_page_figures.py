@@ -101,4 +101,7 @@ def test_a_long_explanation_is_broken_into_lines_that_an_axis_has_room_for() -> 
     names = ["preload_dependent_d33", "sensor_spread", "contact_resonance"]
     one = {"verdict": "ambiguous", "probability": 0.7, "mechanisms": [{"name": name} for name in names]}
     figure = explanations({**one, "alternatives": [{"mechanisms": ["none_of_these"], "probability": 0.3}]})
-    assert list(figure.data[0].y) == ["preload dependent d33 +<br>sensor spread +<br>contact resonance", "none of these"]
+    assert list(figure.data[0].y) == [
+        "preload dependent d33 +<br>sensor spread +<br>contact resonance",
+        "none of these",
+    ]
