@@ -8,7 +8,7 @@ import pytest
 
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.figures import figures
+from underskin.diagnosis.reporting.figures import explanations, figures
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import load_table
@@ -95,3 +95,13 @@ def test_steps_of_frequency_are_common_and_even_in_its_logarithm() -> None:
     assert ratios.max() < 1.6 * ratios.min()
     assert np.isfinite(np.asarray(drawn.data[0].z, dtype=float)).all()  # no gap
     assert "the paper's model" in drawn.layout.title.text
+
+
+def test_a_long_explanation_is_broken_into_lines_that_an_axis_has_room_for() -> None:
+    names = ["preload_dependent_d33", "sensor_spread", "contact_resonance"]
+    one = {"verdict": "ambiguous", "probability": 0.7, "mechanisms": [{"name": name} for name in names]}
+    figure = explanations({**one, "alternatives": [{"mechanisms": ["none_of_these"], "probability": 0.3}]})
+    assert list(figure.data[0].y) == [
+        "preload dependent d33 +<br>sensor spread +<br>contact resonance",
+        "none of these",
+    ]

@@ -102,3 +102,10 @@ def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_r
     assert "change -0.08 -0.1 to -0.06" in shown
     assert "modulus temperature_c linear 4 %" in shown
     assert "the time of day 8 to 17.5 h; operator: jd, mb; the preload 0.5 to 2 N, over its own range." in shown
+
+
+def test_what_each_kind_tells_is_a_table() -> None:
+    modulus = {"parameter": "youngs_modulus", "unit": "MPa", "value": 13.21, "low": 11.88, "high": 14.04}
+    told = texts(body_of({**EMPTY, "verdict": "ambiguous", "by_kind": [{"kind": "compression", **modulus}]}, {}))
+    assert "block, compressed youngs modulus 13.21 11.88 to 14.04 MPa" in told
+    assert "What each kind" not in texts(body_of({**EMPTY, "by_kind": None}, {}))

@@ -116,3 +116,11 @@ def test_frfs_of_many_recordings_have_no_legend() -> None:
     entries = [FrfLines(f"r{number}", frequency, 7 * one, 0 * one, one) for number in range(40)]
     assert frf_recordings(entries, None).layout.showlegend is False
     assert frf_recordings(entries[:5], None).layout.showlegend is True
+
+
+@pytest.mark.parametrize(("coherence", "lowest"), [(0.99, "xaxis3"), (np.nan, "xaxis2")])
+def test_the_lowest_panel_that_is_drawn_has_the_frequency(coherence: float, lowest: str) -> None:
+    entry = FrfLines("a", np.array([1.0, 10.0]), np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.full(2, coherence))
+    layout = frf_recordings([entry], None).layout
+    assert layout[lowest].title.text == "frequency [Hz]"
+    assert layout[lowest].showticklabels

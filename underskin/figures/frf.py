@@ -91,7 +91,9 @@ def _finished(traces: Sequence[PlotlyTrace], zone_hz: tuple[float, float] | None
             showarrow=False, font={"size": 12, "color": "#00664b"},
         )  # fmt: skip
     figure.update_xaxes(type="log", dtick=1)
-    figure.update_xaxes(title="frequency [Hz]", row=3, col=1)
+    # An axis without a line is not drawn: where no coherence was recorded, phase is the lowest panel.
+    lowest = 3 if len(_values(traces, "y3")) else 2
+    figure.update_xaxes(title="frequency [Hz]", showticklabels=True, row=lowest, col=1)
     for row, words in enumerate(("|FRF| [pC/N]", "phase [°]", "coherence"), start=1):
         figure.update_yaxes(title=words, row=row, col=1)
     figure.update_yaxes(**_magnitude_axis(traces), row=1, col=1)

@@ -51,7 +51,8 @@ class Contents:
 
     def described(self) -> str:
         """The channels and their units, for an error message."""
-        names = [f"{channel.name} [{channel.unit or '?'}]" for block in self.blocks for channel in block.channels]
+        units = [(one.name, f"[{one.unit or '?'}]") for block in self.blocks for one in block.channels]
+        names = [name if name.endswith(unit) else f"{name} {unit}" for name, unit in units]
         different = list(dict.fromkeys(names))
         return ", ".join(different[:20]) + (", …" if len(different) > 20 else "") if different else "no channels"
 

@@ -1,5 +1,6 @@
 """The fields of one recording, out of the channels of one block, as a rig description has them."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,11 +12,12 @@ from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import unit
-from underskin.recordings.rig_description import COMPLEX_FRF, RigDescription
+from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
 from underskin.recordings.shown_values import shown
 from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats
 
+_DEGREES = {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": math.degrees(1), "radians": math.degrees(1)}
 _PERCENT = 100.0
 _SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
 
@@ -38,6 +40,7 @@ class MappedBlock:
         if COMPLEX_FRF in values:
             frf = values.pop(COMPLEX_FRF)
             values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+        values = self._with_parts(values)
         if any(np.iscomplexobj(column) for column in values.values()):
             only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
             raise self._error("", only)
@@ -52,6 +55,17 @@ class MappedBlock:
         if rate is not None and "time_s" not in columns:
             columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
         return columns
+
+    def _with_parts(self, values: Mapping[str, Values]) -> dict[str, Values]:
+        """The columns, real and imaginary part in the place of magnitude and phase."""
+        rest = {field: column for field, column in values.items() if field not in (MAGNITUDE, PHASE)}
+        if MAGNITUDE not in values:
+            return rest
+        magnitude, phase = values[MAGNITUDE], values[PHASE]
+        if len(magnitude) != len(phase):
+            raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
+        frf = magnitude * np.exp(1j * np.radians(phase))
+        return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
 
     def spring(self) -> dict[str, float]:
         """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
@@ -88,9 +102,9 @@ class MappedBlock:
             raise self._error(place, "holds no values")
         if field == "coherence":
             return channel.values, repr(channel.name)
-        target = "frf_re_pc_per_n" if field == COMPLEX_FRF else field
+        target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
         label = self._true_unit(channel, mapping, place)
-        scale = self._scale(target, label, mapping, place)
+        scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
         sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
         turned = ", turned round" if sign == -1 else ""
@@ -144,6 +158,12 @@ class MappedBlock:
                 place, "has no unit in the file: say it, as `unit` of the rig description or as its true unit"
             )
         return label
+
+    def _degrees(self, label: str, place: str) -> float:
+        """From the unit of a phase to degrees."""
+        if label.lower() not in _DEGREES:
+            raise self._error(place, f"its unit {label!r} is none of an angle: a phase is in deg or rad")
+        return _DEGREES[label.lower()]
 
     def _scale(self, field: str, label: str, mapping: SignalMapping, place: str) -> float:
         """From the channel's unit to the field's, through the sensitivity where there is one."""

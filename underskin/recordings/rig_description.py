@@ -45,6 +45,7 @@ _FIELDS = (
     "units_checked",
 )
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
+MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that stand for both parts, together
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,7 @@ def from_dict(document: Any) -> RigDescription:
 def channel_fields(kind: str) -> set[str]:
     """The fields of a kind that channels may hold; `time_s` of an frf stands for its sample rate."""
     columns = {entry.name for entry in fields(KINDS[kind])} & set(COLUMNS)
-    return columns | {COMPLEX_FRF, "time_s"} if kind == "frf" else columns
+    return columns | {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"} if kind == "frf" else columns
 
 
 def _curves(document: Any) -> str | CurveChannel | None:
@@ -209,6 +210,9 @@ def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
         if entry.deflection is not None:
             _require_whole(f"channels.{name}.deflection", entry.deflection)
         _require_of_its_field(name, entry, channels)
+    for one, other in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
+        if one in channels and other not in channels:
+            raise required(f"channels.{other}", Requirement("required beside ", Mention(one)))
     if not channels:
         raise too_few("channels", "none", "must name at least one channel")
     return channels

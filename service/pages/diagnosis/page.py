@@ -43,7 +43,8 @@ _ABOUT = {
     "the noise.",
     "explanations": "What the recordings say of each explanation, the stated one on top.",
     "sensors": "d33 of the sensors in each campaign, the mechanisms taken into account: each with its 95 % interval, "
-    "of many sensors the median, the range of 90 % and those that stand apart.",
+    "of many sensors the median, the range of 90 % and those that stand apart. They compare sensors and campaigns, "
+    "with the mechanisms held as they were found; to quote, take a campaign's own diagnosis.",
     "population": "Each skin's value with its 95 % interval on the grey band in which 95 % of such skins lie.",
     "parameters": "Each parameter's most probable value and 95 % interval; beside it, what was known before.",
 }

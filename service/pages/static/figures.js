@@ -100,11 +100,13 @@ const seen = new IntersectionObserver(
 // with its text, and what is folded below it is unfolded.
 const SHEET = 680;
 let unfolded = [];
-function on_sheet(place) {
+function on_sheet(plot, place) {
   const long = document.querySelector(".report .summary.long") !== null;
   const height = place ? (long ? 170 : 210) : (long ? 260 : 340);
   const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
-  return { width: place ? SHEET / 2 - 5 : SHEET, height, margin, "font.size": 8 };
+  const axes = Object.keys(plot.layout).filter((name) => /^[xy]axis/.test(name));
+  const titles = Object.fromEntries(axes.map((name) => [`${name}.title.font.size`, 7]));
+  return { width: place ? SHEET / 2 - 5 : SHEET, height, margin, "font.size": 8, ...titles };
 }
 addEventListener("beforeprint", () => {
   unfolded = [...document.querySelectorAll(".report details:not([open])")];
@@ -113,7 +115,7 @@ addEventListener("beforeprint", () => {
   for (const plot of document.querySelectorAll(".plot")) {
     draw(plot);
     const place = summary.indexOf(plot);
-    const size = place < 0 ? { width: Math.min(SHEET, plot.clientWidth) } : on_sheet(place);
+    const size = place < 0 ? { width: Math.min(SHEET, plot.clientWidth) } : on_sheet(plot, place);
     Plotly.relayout(plot, { autosize: false, ...size });
   }
 });

@@ -11,7 +11,7 @@ from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
 from underskin.recordings.readers.unit_labels import lab_field, unit
-from underskin.recordings.rig_description import SCHEMA, RigDescription, channel_fields
+from underskin.recordings.rig_description import MAGNITUDE, PHASE, SCHEMA, RigDescription, channel_fields
 from underskin.recordings.rig_mapping import MappedFile
 
 KINDS = {
@@ -45,6 +45,8 @@ CHANNELS = {
     "frf_re_pc_per_n": "FRF, real part",
     "frf_im_pc_per_n": "FRF, imaginary part",
     "frf_pc_per_n": "FRF, complex numbers",
+    "frf_magnitude_pc_per_n": "FRF, magnitude",
+    "frf_phase_deg": "FRF, phase",
     "coherence": "coherence γ²",
 }  # what a channel can be, of one kind or another
 CHOICES = {**CHANNELS, spring_mapping.DEFLECTION: "deflection of the spring"}  # of the form
@@ -72,6 +74,7 @@ _BY_DIMENSION = {
     "indentation": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
     "compression": {"force": "force_n", "length": "displacement_mm", "time": "time_s"},
 }
+_MAGNITUDES = ("magnitude", "modulus", "|")  # as analysers call the absolute value of an FRF
 _OF_COMPRESSION = ("compress", "engineering strain", "true strain")  # as testing machines call their columns
 _BY_WORD = {
     "force": "force_n",
@@ -80,7 +83,9 @@ _BY_WORD = {
     "amplifier": "charge_pc",
     "coherence": "coherence",
     "frequency": "frequency_hz",
+    "phase": PHASE,
 }
+_OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 
 
 def field_words(field: str) -> str:
@@ -145,12 +150,17 @@ def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
     if "length" in dimensions and "charge" not in dimensions:
         named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
         kind = "compression" if named else "indentation"
+    elif "charge" not in dimensions and any(word in one.name.lower() for one in channels for word in _OF_SPRINGS):
+        kind = "indentation"
+    phases = any("phase" in one.name.lower() for one in channels)
     fields = []
     for one, dimension in zip(channels, dimensions, strict=True):
         word = next((field for word, field in _BY_WORD.items() if word in one.name.lower()), "")
         field = "frf_pc_per_n" if one.is_complex else _BY_DIMENSION[kind].get(dimension) or word
         if field == "frf_re_pc_per_n" and "imag" in one.name.lower():
             field = "frf_im_pc_per_n"
+        if field == "frf_re_pc_per_n" and (phases or any(part in one.name.lower() for part in _MAGNITUDES)):
+            field = MAGNITUDE
         fields.append(field if field in channel_fields(kind) else "")
     return kind, fields
 

@@ -99,7 +99,8 @@ def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mappin
     result = {}
     for field, how in channels.items():
         others = {name: value for name, value in how.items() if name != _TARE}
-        said = number_or_text(form[f"tare-{field}"]) if f"tare-{field}" in form else base.get(field, {}).get(_TARE)
+        typed = form.get(f"tare-{field}", "").strip().removesuffix("%")
+        said = number_or_text(typed) if f"tare-{field}" in form else base.get(field, {}).get(_TARE)
         result[field] = others if said is None else {**others, _TARE: said}
     return result
 

@@ -2,6 +2,7 @@
 
 import re
 from copy import deepcopy
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -96,3 +97,14 @@ def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server
     figure.wait_for()
     assert page.evaluate(_WIDE)
     reader.require_accessible()
+
+
+def test_titles_of_axes_do_not_overlap_on_paper(reader: Visit, idle: Server, made: Made) -> None:
+    page = reader.page
+    reader.go(f"/diagnoses/{keep(idle, resonant('titles', lines=LINES), made, 'titles')}")
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    titles = page.locator(".three .plot").first.locator(".infolayer text[class^=y]")
+    boxes = sorted((box["y"], box["y"] + box["height"]) for one in titles.all() if (box := one.bounding_box()))
+    assert len(boxes) == 4
+    assert all(above[1] <= below[0] for above, below in pairwise(boxes))

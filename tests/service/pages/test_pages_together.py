@@ -30,6 +30,7 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     finished(idle)
     page.get_by_role("heading", name="What", exact=True).wait_for(timeout=60_000)  # without reloading by hand
     reader.require_accessible()
+    assert "to quote, take a campaign's own diagnosis" in page.get_by_role("main").inner_text()
     for name, campaign_id in (("one", first), ("two", second)):
         link = page.locator("details").get_by_role("link", name=name, exact=True)
         assert link.get_attribute("href") == f"/campaigns/{campaign_id}"

@@ -57,6 +57,30 @@ def test_every_channel_of_every_kind_can_be_chosen() -> None:
     assert {name for kind in KINDS for name in rig_description.channel_fields(kind)} == set(CHANNELS)
 
 
+def test_magnitude_and_phase_are_not_taken_for_a_real_part() -> None:
+    channels = [channel("Frequency", "Hz"), channel("FRF magnitude", "pC/N"), channel("FRF phase", "deg")]
+    found = guessed(channels, {}, {})
+    assert found["channels"] == {
+        "frequency_hz": {"channel": "Frequency"},
+        "frf_magnitude_pc_per_n": {"channel": "FRF magnitude"},
+        "frf_phase_deg": {"channel": "FRF phase"},
+    }
+    assert [guessed([channel(f"FRF {name}", "pC/N")], {}, {})["channels"] for name in ("real", "imag")] == [
+        {"frf_re_pc_per_n": {"channel": "FRF real"}},
+        {"frf_im_pc_per_n": {"channel": "FRF imag"}},
+    ]
+
+
+def test_a_piezo_and_a_deflection_in_volts_are_an_indentation() -> None:
+    channels = [channel("Time", "s"), channel("Piezo", "V"), channel("Deflection", "V")]
+    assert guessed(channels, {}, {})["kind"] == "indentation"
+
+
+def test_a_percent_sign_behind_a_percentage_is_no_mistake() -> None:
+    form = {"kind": "indentation", "channel-0": "F", "is-0": "force_n", "tare-force_n": "15 %"}
+    assert document_of(form, {})[0]["channels"]["force_n"]["tare_percent"] == 15
+
+
 def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
     found = guessed(channels, {"preload [mN]": 500.0, "sensor": "s01", "operator": "me"}, {"thickness_mm": 2.5})

@@ -3,7 +3,7 @@ each explanation is, and what is known of its parameters. Colours of Okabe and I
 that colour-blind people tell apart; lab units.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -34,6 +34,7 @@ _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#BBBBBB"
 _SIGMAS = 1.96  # of a 95 % interval
 _MOST_LABELLED = 80  # cells of a map that show their number
 _BAND = 60  # points along a band
+_LABEL = 24  # characters on a line of a label
 _EDGE, _BESIDE = 0.04, 1.0  # of what is shown: room at an axis' ends, and beside an interval
 _ROW, _BETWEEN = 120, 0.68  # height of a parameter's row [pixels], and the share of it that labels need
 
@@ -78,7 +79,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
     leader = stated.get(document["verdict"]) or [entry["name"] for entry in document["mechanisms"]]
     rows = [(leader, document["probability"])]
     rows += [(entry["mechanisms"], entry["probability"]) for entry in document["alternatives"]]
-    names = [escape(" + ".join(name.replace("_", " ") for name in entry)) for entry, _ in rows]
+    names = [_in_lines([escape(name.replace("_", " ")) for name in entry]) for entry, _ in rows]
     values = [value for _, value in rows]
     figure = go.Figure()
     figure.add_bar(
@@ -92,11 +93,24 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
         hovertemplate="%{y}: %{text}<extra></extra>",
     )
     figure.update_layout(
-        title="How probable each explanation is", height=130 + 34 * len(rows), margin={"r": 110, "t": 60}
+        title="How probable each explanation is",
+        height=130 + sum(16 + 18 * (1 + name.count("<br>")) for name in names),
+        margin={"r": 110, "t": 60},
     )
     figure.update_xaxes(title="probability", range=[0, 1.0], tickformat=".0%")
     figure.update_yaxes(autorange="reversed")
     return _styled(figure)
+
+
+def _in_lines(names: Sequence[str]) -> str:
+    """Mechanisms as an axis has room for them: as many on a line as are short."""
+    lines: list[str] = []
+    for name in names:
+        if lines and len(lines[-1]) + len(name) <= _LABEL:
+            lines[-1] += f" + {name}"
+        else:
+            lines.append(name)
+    return " +<br>".join(lines)
 
 
 def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -> go.Figure:

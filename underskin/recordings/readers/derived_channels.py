@@ -10,7 +10,7 @@ from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers import channel_arithmetic, text
 from underskin.recordings.readers.channel_arithmetic import Formula, Quantity, in_unit
 from underskin.recordings.readers.dimensions import described, exponents, label_of
-from underskin.recordings.readers.unit_labels import labelled_unit, unit
+from underskin.recordings.readers.unit_labels import in_brackets, labelled_unit, unit
 from underskin.recordings.shown_values import LONGEST_NAME
 
 Stated = Mapping[str, str | float]
@@ -58,8 +58,8 @@ class _Derivation:
 
     def missing(self, formula: Formula) -> list[str]:
         """Names of a formula that are nothing here."""
-        known = {*(channel.name for channel in self.block.channels), *self.stated, *self._constants}
-        return [name for name in formula.names if name not in known]
+        known = {*self.stated, *self._constants}
+        return [name for name in formula.names if name not in known and self._channel(name) is None]
 
     def add(self, name: str, formula: Formula, place: str) -> None:
         """Add the channel of a formula; a constant serves later formulas alone."""
@@ -80,7 +80,7 @@ class _Derivation:
     def _known(self, name: str, stated_unit: str | None) -> Quantity:
         if name in self._constants:
             return self._constants[name]
-        channel = self.block.channel(name)
+        channel = self._channel(name)
         if channel is not None:
             label = self._unit(name, channel.unit, stated_unit)
             self._labels.append(label)
@@ -90,6 +90,14 @@ class _Derivation:
         if number is None:
             raise self._error(f"{name}: the file states {given!r:.{LONGEST_NAME}}, which is no number")
         return in_unit(number, self._unit(name, labelled_unit(name), stated_unit))
+
+    def _channel(self, name: str) -> Channel | None:
+        """The channel of that name, or the only one whose heading is it with a unit in brackets: `Piezo [V]`."""
+        channel = self.block.channel(name)
+        if channel is not None or name in self.stated or name in self._constants:
+            return channel
+        headed = [one for one in self.block.channels if (in_brackets(one.name) or ("",))[0] == name]
+        return headed[0] if len(headed) == 1 else None
 
     def _unit(self, name: str, label: str, stated: str | None) -> str:
         """The unit in brackets, else the label; where they differ that in brackets counts, of the same dimension."""
