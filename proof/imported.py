@@ -22,7 +22,7 @@ def of_a_diagnosis(texts: Mapping[str, str], further: Collection[str] = ()) -> d
         name = left.pop()
         if name not in found:
             found.add(name)
-            left += [one for one in _imports(texts[known[name]]) if one in known and _may_matter(one)]
+            left += [one for one in _imports(texts[known[name]], known) if one in known and _may_matter(one)]
     return {known[name]: texts[known[name]] for name in found}
 
 
@@ -30,12 +30,14 @@ def _may_matter(name: str) -> bool:
     return name != "underskin" and not name.startswith(_UNUSED)
 
 
-def _imports(text: str) -> set[str]:
-    """Full names of what a module imports, anywhere in it, and of the modules that it is in."""
+def _imports(text: str, known: Collection[str]) -> set[str]:
+    """Full names of what a module imports, anywhere in it: of a module that is `known`, not the package that it is
+    in, whose own list of names would lead everywhere."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Import):
             names |= {one.name for one in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
-            names |= {node.module} | {f"{node.module}.{one.name}" for one in node.names}
+            each = [f"{node.module}.{one.name}" for one in node.names]
+            names |= {one if one in known else node.module for one in each}
     return names
