@@ -1,15 +1,27 @@
 """Answers that take long to compute: a few at a time, the others wait in turn without a thread."""
 
 import asyncio
-from collections.abc import Callable
-from typing import TypeVar
+import functools
+from collections.abc import Awaitable, Callable
+from typing import ParamSpec, TypeVar
 
 _AT_ONCE = asyncio.Semaphore(4)
 
 _Answer = TypeVar("_Answer")
+_Asked = ParamSpec("_Asked")
 
 
 async def in_turn(work: Callable[[], _Answer]) -> _Answer:
     """What `work` answers, in a thread beside the event loop."""
     async with _AT_ONCE:
         return await asyncio.to_thread(work)
+
+
+def each_in_turn(endpoint: Callable[_Asked, _Answer]) -> Callable[_Asked, Awaitable[_Answer]]:
+    """An endpoint that answers the same `in_turn`; `inspect.unwrap` gives the endpoint back."""
+
+    @functools.wraps(endpoint)
+    async def answer(*arguments: _Asked.args, **values: _Asked.kwargs) -> _Answer:
+        return await in_turn(functools.partial(endpoint, *arguments, **values))
+
+    return answer

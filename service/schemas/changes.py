@@ -14,7 +14,7 @@ class _Request(BaseModel):
 
 
 class _Annotation(_Request):
-    """What a field that is not sent keeps its value in."""
+    """What is to be changed; a field that is not sent stays as it is."""
 
     remark: str | None = Field(default=None, description="Notes, in up to 10,000 characters; null for none.")
     tags: list[str] | None = Field(default=None, description="Words to find it by; null or empty for none.")

@@ -26,8 +26,8 @@ def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRo
         row = kept_campaigns.find(connection, change.campaign_id, lock=True)
         if change.action == "correct":
             kept_campaigns.find(connection, row.corrects, lock=True)
-    members = skins.members(skins.require_root(connection, change.skin_id))
-    skins.lock(connection, connection.execute(members).scalars().all())
+    members = [skins.members(root) for root in _roots(connection, change)]
+    skins.lock(connection, [skin_id for ids in members for skin_id in connection.execute(ids).scalars()])
     why_not = standing(connection, change, of_same(connection, change))
     if why_not is not None:
         raise Conflict(f"This cannot be undone: {why_not}.")
@@ -99,8 +99,22 @@ def _corrected_since(connection: Connection, change: AnyRow) -> str | None:
     return None if corrected_by is None else f"its campaign was corrected since, by {corrected_by!r}"
 
 
+def _roots(connection: Connection, change: AnyRow) -> set[str]:
+    """The skin that the change is of; of a correction, also the skin of the campaign whose place it took."""
+    of = {change.skin_id}
+    if change.action == "correct":
+        older = select(campaigns.c.skin_id).where(campaigns.c.corrected_by == change.campaign_id)
+        of.update(connection.execute(older).scalars())
+    return {skins.require_root(connection, skin_id) for skin_id in of}
+
+
 def _built_since(connection: Connection, change: AnyRow) -> str | None:
-    root = skins.require_root(connection, change.skin_id)
+    built = (_built_on(connection, change, root) for root in sorted(_roots(connection, change)))
+    return next((why for why in built if why is not None), None)
+
+
+def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
+    """What was built since on a skin and on all that count as it, or on the campaign that was changed."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:

@@ -112,8 +112,11 @@ def _axis(name: str) -> str:
     return _OTHER_AXES[name] if name in _OTHER_AXES else followed(name)
 
 
-def _file(entry: MechanismEntry) -> str:
-    """The document that a lab's own mechanism was read from."""
+def _file(entry: MechanismEntry) -> str | None:
+    """The document that a lab's own mechanism was read from; None where it is gone since."""
     assert entry.package is not None
     path: Path = mechanism_files.folder_of_lab() / entry.package.rsplit(" ", 1)[0]
-    return path.read_text(encoding="utf-8")
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return None

@@ -9,6 +9,7 @@ import numpy as np
 from fastapi import APIRouter, Depends, Request, Response
 
 from service.dependencies import Store, Table
+from service.heavy_answers import each_in_turn
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import in_form_words, number
 from service.pages.shared.html import page
@@ -61,6 +62,7 @@ TypedInQuery = Annotated[Typed, Depends(_typed)]
 
 
 @router.get("")
+@each_in_turn
 def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
     """The page."""
     found, error = None, None
@@ -86,6 +88,7 @@ def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
 
 
 @router.get("/region.csv")
+@each_in_turn
 def region_csv(table: Table, typed: TypedInQuery) -> Response:
     """Every pair of thickness and sensor radius that was looked at."""
     with np.errstate(all="ignore"):

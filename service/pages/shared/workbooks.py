@@ -1,6 +1,7 @@
 """The numbers of pages as workbooks (XLSX), beside every CSV: the same table, its numbers as numbers."""
 
 import functools
+import inspect
 import io
 import math
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -23,22 +24,19 @@ def add_to(router: APIRouter) -> None:
     """Answer `NAME.xlsx` wherever `NAME.csv` is answered."""
     for route in list(router.routes):
         if isinstance(route, APIRoute) and route.path.endswith(CSV):
-            endpoint = _as_workbook(route.endpoint)
+            endpoint = _as_workbook(inspect.unwrap(route.endpoint))
             own = route.path.removeprefix(router.prefix).removesuffix(CSV)
             router.add_api_route(own + XLSX, endpoint)
 
 
 def _as_workbook(endpoint: Callable[..., Response]) -> Callable[..., Awaitable[Response]]:
+    @functools.wraps(endpoint)
     def made(*arguments: Any, **values: Any) -> Response:
         table = endpoint(*arguments, **values)
         assert isinstance(table, CsvAnswer)
         return attachment(f"{table.name}{XLSX}", workbook(table.columns), _TYPE)
 
-    @functools.wraps(endpoint)
-    async def answer(*arguments: Any, **values: Any) -> Response:
-        return await heavy_answers.in_turn(functools.partial(made, *arguments, **values))
-
-    return answer
+    return heavy_answers.each_in_turn(made)
 
 
 def workbook(columns: Mapping[str, Sequence[Any]]) -> bytes:

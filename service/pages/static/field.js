@@ -11,8 +11,15 @@ let wanted = 0; // the frame that was asked for last
 let run_number = 0;
 
 async function all_frames() {
-  frames ??= fetch(growing.dataset.frames).then((response) => response.json());
-  return frames;
+  frames ??= fetch(growing.dataset.frames).then((response) => {
+    if (!response.ok) throw new Error(`The frames did not come: ${response.status}`);
+    return response.json();
+  });
+  return frames.catch((error) => {
+    frames = null; // to be asked for again
+    set_playing(false);
+    throw error;
+  });
 }
 
 // The figures hold what they show, so that what is saved or printed is the frame in sight.

@@ -16,13 +16,16 @@ from underskin.recordings import rig_description
 
 @dataclass(frozen=True)
 class OfferedTemplate:
-    """A template as the page offers it: what the instrument is called, by whom and when it was said, what it says."""
+    """A template as the page offers it: what the instrument is called, by whom and when it was said, what it says: also
+    which samples are used, and whether unusual values were said to be right."""
 
     name: str
     kept_at: str
     kept_from: str | None
     channels: Mapping[str, Any]
     derived: Mapping[str, str]
+    trim: Mapping[str, int]
+    units_checked: bool
 
 
 def offered(store: Database, pending: PendingUpload, file: FileSummary) -> OfferedTemplate | None:
@@ -33,8 +36,15 @@ def offered(store: Database, pending: PendingUpload, file: FileSummary) -> Offer
     if pending.rig is not None and file.recordings:
         return None
     document = orjson.loads(row.document)
-    about = (row.kept_at, row.kept_from, document["channels"], document.get("derived") or {})
-    return OfferedTemplate(document.get("name") or "", *about)
+    return OfferedTemplate(
+        document.get("name") or "",
+        row.kept_at,
+        row.kept_from,
+        document["channels"],
+        document.get("derived") or {},
+        document.get("trim") or {},
+        document.get("units_checked", False),
+    )
 
 
 def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> None:

@@ -1,5 +1,6 @@
 """The part of a mapping form that makes curves of raw channels: derived channels, the zero of a field, the trim."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,6 +18,7 @@ TARES = {
 }  # each in words, and the kinds that have it
 TRIM = {"first_sample": "first sample used", "last_sample": "last sample used"}
 _ROWS_FREE = 2  # of derived channels
+_ROW = re.compile(rf"{FIELD}-formula-(0|[1-9][0-9]{{0,5}})")
 _TARE = "tare_percent"
 WORDS = {
     **{f"trim.{name}": words for name, words in TRIM.items()},
@@ -129,8 +131,8 @@ def errors_of(refused: Sequence[Mapping[str, Any]], file: FileSummary) -> dict[s
 
 
 def _rows_in(form: Mapping[str, str]) -> list[int]:
-    prefix = f"{FIELD}-formula-"
-    return sorted(int(name.removeprefix(prefix)) for name in form if name.removeprefix(prefix).isdecimal())
+    """The numbers of the rows of derived channels, as the page writes them; other names are none of its rows."""
+    return sorted(int(row[1]) for row in map(_ROW.fullmatch, form) if row)
 
 
 def _name(form: Mapping[str, str], number: int, words: Mapping[str, str]) -> str:

@@ -137,6 +137,22 @@ def test_the_load_plays_to_its_end_and_pauses_by_key(reader: Visit) -> None:
     assert told(reader)[0] == "3 N"
 
 
+def test_frames_that_did_not_come_are_asked_for_again(reader: Visit) -> None:
+    reader.go(f"/field?{QUERY}")
+    reader.drawn(2)
+    reader.page.route("**/field/frames?*", lambda route: route.fulfill(status=503, body="busy"), times=2)
+    with reader.page.expect_response("**/field/frames?*"):
+        reader.page.get_by_label(LOAD).press("ArrowLeft")
+    with reader.page.expect_response("**/field/frames?*"):
+        reader.page.get_by_role("button", name="Play").click()
+    reader.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
+    assert told(reader)[0] == "3 N"
+    reader.page.get_by_label(LOAD).press("ArrowLeft")
+    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.7 N'")
+    assert all("503" in said for said in reader.wrong)
+    reader.wrong.clear()
+
+
 def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
     calm.go(f"/field?{QUERY}")
     calm.drawn(2)

@@ -67,6 +67,15 @@ def test_an_emptied_row_is_taken_out() -> None:
     assert found["channels"]["force_n"] == {"channel": "load"}
 
 
+@pytest.mark.parametrize("number", ["007", "9" * 4301, "\u0663", "-1"], ids=["zeros", "long", "digits", "sign"])
+def test_a_name_that_the_page_does_not_write_is_no_row(number: str) -> None:
+    document = rig_of_raw_curve()
+    forged = {f"derived-formula-{number}": "5 * 'Piezo'", f"derived-is-{number}": "force_n"}
+    found, wrong = document_of(form_of(document, **forged), document)
+    assert (found, wrong) == document_of(form_of(document), document)
+    assert wrong == []
+
+
 def test_two_derived_channels_of_one_name_or_for_one_field_are_refused_and_kept() -> None:
     document = rig_of_raw_curve()
     found, wrong = document_of(form_of(document, **{"derived-name-1": "load"}), document)

@@ -9,6 +9,7 @@ import pytest
 
 import underskin
 from tests.service.pages.forms import BROWSING
+from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
 
 
@@ -135,6 +136,33 @@ def test_a_correction_is_undone_until_something_builds_on_it(server: Server) -> 
     assert history(server) == {again}
     server.http.post(f"/v1/campaigns/{again}/diagnosis").raise_for_status()
     assert undo(server, changes(server, again)[0]).status_code == 409
+
+
+def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_was_diagnosed(server: Server) -> None:
+    older = sent(server, "older")
+    for day in ("tuesday", "wednesday"):
+        sent(server, day)
+    newer = sent(server, "newer", "hand", corrects=older, reason="it was the hand")
+    (correction,) = changes(server, newer)
+    assert correction["may_be_undone"]
+    server.http.post("/v1/skins/palm/diagnosis").raise_for_status()
+    assert not changes(server, newer)[0]["may_be_undone"]
+    refused = undo(server, correction)
+    assert (refused.status_code, "it was diagnosed since" in refused.text) == (409, True)
+
+
+def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_adopted_a_model(
+    server: Server, client: underskin.Client
+) -> None:
+    older = sent(server, "older")
+    newer = sent(server, "newer", "hand", corrects=older, reason="it was the hand")
+    _, diagnosis_id = diagnosed(server, resonant("array"), report())
+    (correction,) = changes(server, newer)
+    assert correction["may_be_undone"]
+    client.skins.adopt("palm", diagnosis_id)
+    refused = undo(server, correction)
+    assert (refused.status_code, "a model was adopted since" in refused.text) == (409, True)
+    assert history(server, "hand") == {newer}
 
 
 def test_a_correction_that_was_corrected_is_undone_after_the_later_one(server: Server) -> None:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,10 @@ from service.store import (
     annotations,
     campaigns,
     changes,
+    diagnoses,
     export,
     import_checks,
+    models,
     open_store,
     skins,
     undo,
@@ -176,3 +179,20 @@ def test_an_undo_and_a_change_of_one_campaign_wait_for_each_other(on_postgresql:
         campaigns.withdraw(connection, campaign_id, "wrong sphere", None)
     other.join()
     assert on_postgresql.read(campaigns.find, campaign_id).remark is None
+
+
+def test_the_undo_of_a_correction_waits_for_a_model_of_the_skin_that_it_left(on_postgresql: Database) -> None:
+    older, another = on_postgresql.write(keep, "palm"), on_postgresql.write(keep, "palm")
+    asked = on_postgresql.write(diagnoses.ask, another, diagnoses.Basis("0" * 64, "1.0"), None)
+    diagnosis = on_postgresql.read(diagnoses.find, asked.id)
+    arrival = campaigns.NewCampaign(parse(campaign("of hand", sensors=1)), "hand")
+    on_postgresql.write(campaigns.add, arrival, corrects=older, reason="it was the hand")
+    correction = last(on_postgresql)
+    with ThreadPoolExecutor() as threads, on_postgresql.writing() as connection:
+        models.adopt(connection, "palm", diagnosis, None)
+        undone = threads.submit(on_postgresql.write, undo.undo, correction, None)
+        wait([undone], 1)  # time to take its locks
+        assert not undone.done()
+        connection.commit()
+        with pytest.raises(Conflict, match="a model was adopted since"):
+            undone.result(10)

@@ -1,0 +1,35 @@
+"""The catalogue while files of the lab's own mechanisms come and go."""
+
+from pathlib import Path
+
+import pytest
+
+from service.store import Database, open_store
+from service.usecases import mechanism_catalogue, mechanism_findings, mechanisms
+from tests.service.routes.test_mechanisms import WARM
+from underskin.surrogate.sigma_table import load_table
+
+
+def test_a_file_that_is_removed_while_the_catalogue_is_read_is_not_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "warm_amplifier.yaml"
+    monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
+    file.write_text(WARM)
+
+    def removed(store: Database) -> mechanism_findings.Findings:
+        file.unlink()
+        return mechanism_findings.findings(store)
+
+    store = open_store("", tmp_path)
+    try:
+        whole = mechanism_catalogue.catalogue(store, load_table())
+        assert [one.file for one in whole.entries if one.entry.own] == [WARM]
+        with monkeypatch.context() as patched:
+            patched.setattr(mechanism_catalogue, "findings", removed)
+            found = mechanism_catalogue.catalogue(store, load_table())
+        assert [(one.entry.name, one.file) for one in found.entries if one.entry.own] == [("warm_amplifier", None)]
+    finally:
+        store.close()
+        file.unlink(missing_ok=True)
+        mechanisms.catalogue()  # as it was for other tests
