@@ -28,9 +28,7 @@ def together(table: SigmaTable) -> dict[str, Any]:
 def test_that_of_several_campaigns_is_of_the_last_alone(together: dict[str, Any]) -> None:
     assert not together["d33"]["quotable"]
     *_, last = together["statement"].split(". ")
-    assert last.startswith(
-        "d33 is not to be quoted of all campaigns, because it is of the recordings of september alone"
-    )
+    assert last.startswith("d33 here is by the recordings of september alone, and not to be quoted for all campaigns")
     assert f"{together['d33']['low']:.3g} to {together['d33']['high']:.3g}" in last
     shown = page(together)
     assert "of the last campaign alone" in shown
@@ -43,9 +41,9 @@ def test_a_report_of_several_campaigns_without_a_d33_has_a_page(together: dict[s
 
 
 def test_why_the_last_campaigns_own_is_not_to_be_quoted_is_said() -> None:
-    assert quoted.of_campaigns("june", QUOTABLE).endswith("of june alone: 14 pC/N (95 %: 13.5 to 14.5)")
+    assert quoted.of_campaigns("june", QUOTABLE).endswith("for all campaigns: 14 pC/N (95 %: 13.5 to 14.5)")
     assert quoted.of_campaigns("june", OPEN).endswith(
-        "; nor of these: it lies from 13.5 to 14.5 pC/N over the answers that remain, and noise alone is 25 % of it"
+        ", nor for june itself: it lies from 13.5 to 14.5 pC/N over the answers that remain, and noise alone is 25 % of it"
     )
     assert quoted.of_campaigns("june", HIDDEN).endswith(
         "it lies from 13.5 to 14.5 pC/N, but what would not show here would change it, thickness error by 9.5 %"

@@ -13,10 +13,10 @@ def of_campaigns(last: str, own: StatedD33) -> str:
     """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
     if own.document is None:
         return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
-    alone = f"d33 is not to be quoted of all campaigns, because it is of the recordings of {last} alone"
+    alone = f"d33 here is by the recordings of {last} alone, and not to be quoted for all campaigns"
     if own.document["quotable"]:
         return f"{alone}: {own.quoted()}"
-    return f"{alone}; nor of these: {own.interval()}"
+    return f"{alone}, nor for {last} itself: {own.interval()}"
 
 
 def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Mapping[str, Sequence[str]]) -> str:
