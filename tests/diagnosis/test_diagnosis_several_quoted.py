@@ -43,7 +43,8 @@ def test_a_report_of_several_campaigns_without_a_d33_has_a_page(together: dict[s
 def test_why_the_last_campaigns_own_is_not_to_be_quoted_is_said() -> None:
     assert quoted.of_campaigns("june", QUOTABLE).endswith("for all campaigns: 14 pC/N (95 %: 13.5 to 14.5)")
     assert quoted.of_campaigns("june", OPEN).endswith(
-        ", nor for june itself: it lies from 13.5 to 14.5 pC/N over the answers that remain, and noise alone is 25 % of it"
+        ", nor for june itself: "
+        "it lies from 13.5 to 14.5 pC/N over the answers that remain, and noise alone is 25 % of it"
     )
     assert quoted.of_campaigns("june", HIDDEN).endswith(
         "it lies from 13.5 to 14.5 pC/N, but what would not show here would change it, thickness error by 9.5 %"
