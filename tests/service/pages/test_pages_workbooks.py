@@ -8,6 +8,7 @@ from statistics import median
 
 import pytest
 
+from bench.soak import SOAK
 from service.store.write_turns import THREADS
 from tests.support.store_server import Place, campaign, running
 
@@ -41,7 +42,7 @@ HEAVY = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", HEAVY)
+@pytest.mark.parametrize("path", HEAVY if SOAK else HEAVY[::3])
 def test_many_long_answers_leave_threads_for_other_pages(tmp_path: Path, path: str) -> None:
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
         times = []
