@@ -124,7 +124,7 @@ class ContactLayer(NonlinearLayer):
     def _step(self, now: PressedState, radius: float, residual: Floats, gap: Floats) -> PressedState:
         """One Newton increment: that at fixed δ, and as much of the one per unit of δ as frees the edge of pressure."""
         tangent = self._tangent(now, radius)
-        volume = self._constraint(self.fields(now.state)[0])
+        volume = self._constraint(self._fields(now.state)[0])
         fixed, per_depth = self._solve(tangent, residual, volume, gap), self._per_depth(now, radius, tangent)
         rest = float(np.sum(self._edge_pressure * (now.multiplier + fixed[2])))
         depth = -rest / float(np.sum(self._edge_pressure * per_depth[2]))

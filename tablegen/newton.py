@@ -50,13 +50,13 @@ class NonlinearLayer:
 
     def internal_force(self, state: State) -> Floats:
         """∫ P : ∇v for every displacement; on the held ones this is the reaction."""
-        f, p = self.fields(state)
+        f, p = self._fields(state)
         weighted = stress(f, p) * self.discretisation.weight[..., None]
         return self.discretisation.assemble_vector(self._times_gradient(weighted))
 
     def element_matrices(self, state: State) -> tuple[Floats, Floats]:
         """K (elements, 2 n, 2 n) and C (elements, m, 2 n) of one Newton step, before anything is eliminated."""
-        f, p = self.fields(state)
+        f, p = self._fields(state)
         return self._stiffness(f, p), self._constraint_gradient(f)
 
     def condensed_matrix(self, state: State) -> csc_matrix:
@@ -66,15 +66,15 @@ class NonlinearLayer:
 
     def volume_change(self, state: State) -> float:
         """The largest coefficient of J − 1, projected on the pressures of each element."""
-        constraint = self._constraint(self.fields(state)[0])
+        constraint = self._constraint(self._fields(state)[0])
         return float(np.abs(np.einsum("elm,em->el", self._inverse_mass, constraint)).max())
 
     def linear_force(self, load: Floats) -> Floats:
         """The internal force of the linear solution under `load`: one Newton increment from rest."""
         rest = self.rest()
         du, dp = self._increment(rest, load)
-        f, p = self.fields(rest)
-        gradient = self.fields(State(du, dp))[0] - IDENTITY
+        f, p = self._fields(rest)
+        gradient = self._fields(State(du, dp))[0] - IDENTITY
         change = (tangent(f, p) @ gradient[..., None])[..., 0] - (dp @ self.discretisation.pressure.T)[
             ..., None
         ] * IDENTITY
@@ -108,7 +108,7 @@ class NonlinearLayer:
         residual = load - self.internal_force(state)
         du = np.zeros(d.size)
         dp = np.zeros_like(state.pressure)
-        defect = self._constraint(self.fields(state)[0])
+        defect = self._constraint(self._fields(state)[0])
         for _ in range(_SOLVES_PER_FACTORISATION):
             push = d.assemble_vector(np.einsum("eln,el->en", scaled, defect))
             step = np.zeros(d.size)
@@ -124,7 +124,7 @@ class NonlinearLayer:
         """κ M⁻¹ C."""
         return _AUGMENTATION * self._inverse_mass @ c
 
-    def fields(self, state: State) -> tuple[Floats, Floats]:
+    def _fields(self, state: State) -> tuple[Floats, Floats]:
         """F (elements, points, 5) and p (elements, points)."""
         d = self.discretisation
         local = state.displacement[d.numbers]

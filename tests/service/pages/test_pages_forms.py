@@ -66,10 +66,10 @@ def test_a_change_that_is_refused_says_so_in_its_form(reader: Visit, kept: str) 
     reader.go(kept)
     page.get_by_text("Exclude a recording, or correct").click()
     page.get_by_label("Recording", exact=True).fill("nobody")
-    page.get_by_label("Reason").first.fill("loose cable")
+    page.locator("#why").fill("loose cable")
     page.get_by_role("button", name="Exclude").click()
     page.get_by_text("has no recording 'nobody'").wait_for()
-    assert page.get_by_label("Reason").first.input_value() == "loose cable"
+    assert page.locator("#why").input_value() == "loose cable"
     assert page.get_by_role("heading", name="typed").is_visible()
     refused(reader)
     reader.require_accessible()

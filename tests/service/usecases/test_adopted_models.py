@@ -159,9 +159,9 @@ def test_histories_say_which_model_each_value_used(server: Server, client: Clien
     ("verdict", "what_to_do"),
     [
         ("no_mismatch", "nothing to adopt; the paper's model serves"),
-        ("ambiguous", r"several explanations remain.*next_experiment"),
+        ("ambiguous", r"several explanations remain.*measure next"),
         ("unexplained", "Look at the rig"),
-        ("insufficient_data", r"too little was recorded.*next_experiment"),
+        ("insufficient_data", r"too little was recorded.*measure next"),
     ],
 )
 def test_only_what_is_explained_is_adopted(server: Server, client: Client, verdict: str, what_to_do: str) -> None:
