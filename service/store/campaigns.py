@@ -163,14 +163,14 @@ def current_by_time(
     """Rows of current campaigns, of one skin or of all, the one recorded last first, or else the oldest first."""
     query = select(campaigns).where(CURRENT)
     if skin_id is not None:
-        query = query.where(campaigns.c.skin_id.in_(skins.members(skins.root_of(skin_id))))
+        query = query.where(_counting_as(skin_id))
     by = (TIME, campaigns.c.number) if oldest_first else (TIME.desc(), campaigns.c.number.desc())
     return connection.execute(query.order_by(*by).limit(limit)).all()
 
 
 def latest(connection: Connection, skin_id: str) -> AnyRow | None:
     """The row of a skin's current campaign that was recorded last; None where none is current."""
-    return _first_current(connection, _counting_as(skin_id))
+    return next(iter(current_by_time(connection, skin_id, 1)), None)
 
 
 def describing(connection: Connection, skin_id: str, *, alone: bool = False) -> AnyRow | None:
@@ -178,7 +178,9 @@ def describing(connection: Connection, skin_id: str, *, alone: bool = False) -> 
     else the latest with indentations, of which the thickness may be known; else the latest. None where none is
     current. `alone`: of campaigns sent for this very id, none of those joined with it."""
     of_skin = campaigns.c.skin_id == skin_id if alone else _counting_as(skin_id)
-    return _first_current(connection, of_skin, case((_has("frf"), 0), (_has("indentation"), 1), else_=2))
+    rank = case((_has("frf"), 0), (_has("indentation"), 1), else_=2)
+    query = select(campaigns).where(of_skin, CURRENT).order_by(rank, TIME.desc(), campaigns.c.number.desc())
+    return connection.execute(query.limit(1)).first()
 
 
 def _counting_as(skin_id: str) -> ColumnElement[bool]:
@@ -188,11 +190,6 @@ def _counting_as(skin_id: str) -> ColumnElement[bool]:
 def _has(kind: str) -> ColumnElement[bool]:
     own = (recordings.c.campaign == campaigns.c.number) & (recordings.c.kind == kind)
     return exists(select(recordings.c.kind).where(own).correlate(campaigns))
-
-
-def _first_current(connection: Connection, of_skin: ColumnElement[bool], *rank: ColumnElement[int]) -> AnyRow | None:
-    query = select(campaigns).where(of_skin, CURRENT).order_by(*rank, TIME.desc(), campaigns.c.number.desc())
-    return connection.execute(query.limit(1)).first()
 
 
 def state(row: AnyRow) -> State:

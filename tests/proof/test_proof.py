@@ -11,12 +11,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from proof import figures, joint, own_rig, paper_array
+from proof import figures, own_rig, paper_array
 from proof.cases import DrawnCase, FileCase, MadeCase
 from proof.commands import prove
 from proof.ideal import diagnosed
 from proof.ideal_laws import suppositions
-from proof.imported import of_a_diagnosis
 from proof.judge import QUIET, Judged, judge
 from proof.real import recorded
 from proof.results import PARTS
@@ -109,33 +108,6 @@ def test_the_digest_follows_the_sources() -> None:
     assert sources("underskin") != sources("rig")
     assert sources("proof/ideal*.py") != sources("proof")
     assert sources("rig") == sources("rig")
-
-
-def test_a_diagnosis_depends_on_what_it_imports_and_on_every_law_alone() -> None:
-    texts = {
-        "underskin.__init__": "from underskin.cli.app import main",
-        "underskin.diagnosis.pipeline": "def begin():\n    from underskin.physics import hertz",
-        "underskin.physics.__init__": "",
-        "underskin.physics.hertz": "import underskin.units",
-        "underskin.physics.field": "import underskin.units",
-        "underskin.units": "from underskin import cli",
-        "underskin.mechanisms.laws.creep": "",
-        "underskin.cli.app": "",
-    }
-    packages = {"underskin.__init__", "underskin.physics.__init__"}
-    left_out = {*packages, "underskin.physics.field", "underskin.cli.app"}
-    assert set(of_a_diagnosis(texts)) == set(texts) - left_out
-    further = of_a_diagnosis(texts, ["underskin.physics.field"])
-    assert set(further) == set(texts) - left_out | {"underskin.physics.field"}
-
-
-def test_joint_results_depend_on_how_sensors_of_several_campaigns_are_inverted() -> None:
-    texts = {
-        ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
-        for path in (ROOT / "underskin").rglob("*.py")
-    }
-    inverted = {"underskin.inversion.invert", "underskin.prediction.adopted_model"}
-    assert inverted <= set(of_a_diagnosis(texts, joint.SEVERAL)) - set(of_a_diagnosis(texts))
 
 
 def test_drawn_cases_tell_nothing_of_the_truth() -> None:

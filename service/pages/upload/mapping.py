@@ -109,8 +109,7 @@ def what_to_do(error: Mapping[str, Any]) -> str:
 def guessed(
     channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """A first rig description by units and names of channels and properties, to be looked over; `skin`: what is known
-    of it."""
+    """A first rig description by units and names of channels and properties; `skin`: what is known of it."""
     kind, fields = _likely(channels)
     channels_by_field: dict[str, Any] = {}
     for one, field in zip(channels, fields, strict=True):
@@ -129,8 +128,7 @@ def guessed(
 
 
 def passed_over(channels: Sequence[ChannelSummary], document: Mapping[str, Any]) -> list[str]:
-    """In words, which channels a guessed rig description leaves unused although they may be what another one was
-    taken for."""
+    """In words, which channels a guessed rig description leaves unused, and what they may be instead of those used."""
     by_field: dict[str, list[str]] = {}
     for one, field in zip(channels, _likely(channels)[1], strict=True):
         if spring_mapping.shown_as(document, one.name)[0] in ("", field):

@@ -1,7 +1,6 @@
 """One set of mechanisms as an explanation of the recordings: fitted from several starts, and its evidence.
 
-Every set is fitted without positioning scatter and, where that could show, with it; its evidence is the mean of the
-two under their prior.
+Sets are fitted without positioning scatter and, where it could show, with it; the evidence is the mean of both.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -15,12 +15,12 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.curve_data import CurvePrediction, Mark, ShownCurve
+from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.units import Floats, readable_unit
 
 _MOST_CURVES = 12
-_MEASURED, _BEFORE, _AFTER, _BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 _TITLES = {"indentation": "Force against depth", "compression": "Force against displacement"}
 _LOADED = 0.02  # of the largest force, from which on a curve is in view from the start
 _ROOM = 0.4, 0.05  # of what is in view: the air beside it, if there is any, and the edge
@@ -49,9 +49,9 @@ class _Drawing:
 
 def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: str) -> go.Figure:
     """Of the first curves; `before` and `after` are what the models are called, `before` empty where they are one."""
-    models = [_Model("after", after, _AFTER, "solid", {"symbol": "circle", "size": 8})]
+    models = [_Model("after", after, AFTER, "solid", {"symbol": "circle", "size": 8})]
     if before:
-        models.insert(0, _Model("before", before, _BEFORE, "dash", {"symbol": "square-open", "size": 13}))
+        models.insert(0, _Model("before", before, BEFORE, "dash", {"symbol": "square-open", "size": 13}))
     drawings = [_Curve(curve, kind, models).drawing() for curve in curves[:_MOST_CURVES]]
     panels = len(models)
     height = _HEIGHT + _PANEL * panels
@@ -92,7 +92,7 @@ class _Curve:
         every = len(curve.sample_n) == curve.count
         samples = f"{curve.count} samples" if every else f"{len(curve.sample_n)} of {curve.count} samples"
         largest = float(np.abs(curve.sample_n).max())
-        dots = {"color": _MEASURED, "symbol": "circle-open", "size": 4, "opacity": 0.45}
+        dots = {"color": MEASURED, "symbol": "circle-open", "size": 4, "opacity": 0.45}
         measured = {"mode": "markers", "marker": dots, "name": f"measured ({samples})"}
         traces = [self._trace("measured", curve.sample_mm, curve.sample_n, largest, measured)]
         layout: dict[str, Any] = {"yaxis.title.text": f"force [{readable_unit('force_n', largest)[0]}]"}
@@ -130,7 +130,7 @@ class _Curve:
             order = np.argsort(curve.displacement_mm[way])  # an area is filled in one direction
             order = order[np.unique(np.linspace(0, len(order) - 1, _ALONG).astype(int))]
             place, high = curve.displacement_mm[way][order], half[way][order]
-            filled = {**edge, "fill": "tonexty", "fillcolor": _BAND}
+            filled = {**edge, "fill": "tonexty", "fillcolor": BAND}
             filled["showlegend"] = row == 2 and name == "in"
             traces.append(self._trace(f"noise {name} {model.shows} low", place, -high, most, edge))
             traces.append(self._trace(f"noise {name} {model.shows} high", place, high, most, filled))
@@ -147,7 +147,7 @@ class _Curve:
         jumps = (("snap-in", self._curve.snap_in, "down"), ("pull-off", self._curve.pull_off, "up"))
         for name, mark, way in jumps:
             if mark is not None:
-                marks.append((name, mark, {"color": _MEASURED, "symbol": f"triangle-{way}", "size": 11}))
+                marks.append((name, mark, {"color": MEASURED, "symbol": f"triangle-{way}", "size": 11}))
         return marks
 
     def _mark(self, name: str, mark: Mark, largest: float, marker: dict[str, Any]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Figures of a diagnosis: where recordings and model differ, measured against predicted before and after, how probable
-each explanation is, and what is known of its parameters. Colours of Okabe and Ito, and a scale from purple to orange,
-that colour-blind people tell apart; lab units.
+each explanation is; those of single recordings and of parameters have files of their own. Maps have a scale from purple
+to orange, which colour-blind people tell apart; lab units.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,29 +14,27 @@ from plotly.subplots import make_subplots
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
 from underskin.diagnosis.reporting.curve_data import shown_curves
 from underskin.diagnosis.reporting.curve_figure import curve_figure
 from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
+from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, styled
 from underskin.diagnosis.reporting.frf_data import shown_frfs
 from underskin.diagnosis.reporting.frf_figure import frf_figure
-from underskin.diagnosis.reporting.numbers import multiple_of
+from underskin.diagnosis.reporting.numbers import SDS_OF_95
+from underskin.diagnosis.reporting.parameter_figure import parameter_intervals
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
-from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unnamed.laws import in_plain_words
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
-_BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#BBBBBB"
-_SIGMAS = 1.96  # of a 95 % interval
+_GREY = "#BBBBBB"
 _MOST_LABELLED = 80  # cells of a map that show their number
 _BAND = 60  # points along a band
 _LABEL = 24  # characters on a line of a label
-_EDGE, _BESIDE = 0.04, 1.0  # of what is shown: room at an axis' ends, and beside an interval
-_ROW, _BETWEEN = 120, 0.68  # height of a parameter's row [pixels], and the share of it that labels need
+_EDGE = 0.04  # of what is shown: room at an axis' ends
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
@@ -86,7 +84,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
         x=values,
         y=names,
         orientation="h",
-        marker={"color": [_BLUE, *[_GREY] * (len(rows) - 1)]},
+        marker={"color": [AFTER, *[_GREY] * (len(rows) - 1)]},
         text=[in_percent(value) for value in values],
         textposition="outside",
         cliponaxis=False,
@@ -99,7 +97,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
     )
     figure.update_xaxes(title="probability", range=[0, 1.0], tickformat=".0%")
     figure.update_yaxes(autorange="reversed")
-    return _styled(figure)
+    return styled(figure)
 
 
 def _in_lines(names: Sequence[str]) -> str:
@@ -148,12 +146,12 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         update(title=AXES.get(axis or "", ""), tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     if diagnosis.region:
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
-        figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": "#000000", "width": 3})
+        figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": MEASURED, "width": 3})
     figure.update_layout(
         title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}, in percent of it",
         height=170 + 40 * max(4, min(len(y.names), 12)),
     )
-    return _styled(figure)
+    return styled(figure)
 
 
 def before_and_after(
@@ -173,18 +171,18 @@ def before_and_after(
     whole = [float(shown_part.min()) - room, float(shown_part.max()) + room]
     ids = [escape(entry.id) for entry in thinned.lines.campaign.recordings]
     for place, (points, colour, marker) in enumerate(
-        ((before, _ORANGE, "square-open"), (after, _BLUE, "circle")), start=1
+        ((before, BEFORE, "square-open"), (after, AFTER, "circle")), start=1
     ):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # Where all predictions are alike the band would have no width along the abscissa.
         along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
-        half = _SIGMAS * np.hypot(points.gain * along, float(np.median(points.deviation)))
+        half = SDS_OF_95 * np.hypot(points.gain * along, float(np.median(points.deviation)))
         figure.add_scatter(
             x=[*along, *along[::-1]],
             y=[*(along + half), *(along - half)[::-1]],
             fill="toself",
-            fillcolor="rgba(0,0,0,0.15)",
+            fillcolor=BAND,
             line={"width": 0},
             hoverinfo="skip",
             name="95 % of the noise",
@@ -193,7 +191,7 @@ def before_and_after(
             col=place,
         )
         figure.add_scatter(
-            x=along, y=along, mode="lines", line={"color": "#000000", "width": 1}, name="measured = predicted",
+            x=along, y=along, mode="lines", line={"color": MEASURED, "width": 1}, name="measured = predicted",
             hoverinfo="skip", showlegend=place == 1, row=1, col=place,
         )  # fmt: skip
         figure.add_scatter(
@@ -219,60 +217,13 @@ def before_and_after(
         margin={"t": 90, "b": 100},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
     )
-    return _styled(figure)
-
-
-def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
-    """Each parameter's 95 % interval in its own unit, and in words that of its prior, which would hide it."""
-    places = own_places(shown.names, problem.lines)
-    rows = [
-        (entry["name"], parameter, prior, multiple_of(shown, prior))
-        for entry in document["mechanisms"]
-        for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
-    ]
-    titles = [
-        f"{name.replace('_', ' ')}: {_labelled(entry)}<br><sup>{_before(prior, scale, entry['unit'])}</sup>"
-        for name, entry, prior, scale in rows
-    ]
-    figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
-    for place, (_, entry, *_) in enumerate(rows, start=1):
-        low, high = entry["low"], entry["high"]
-        figure.add_scatter(
-            x=[low, high], y=[0, 0], mode="lines", line={"color": _BLUE, "width": 8}, name="95 % interval",
-            showlegend=place == 1, row=place, col=1,
-        )  # fmt: skip
-        figure.add_scatter(
-            x=[entry["value"]], y=[0], mode="markers", name="most probable", showlegend=place == 1,
-            marker={"color": "#000000", "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=place, col=1,
-        )  # fmt: skip
-        beside = _BESIDE * (high - low) or 0.1 * abs(low) or 1.0
-        figure.update_xaxes(range=[low - beside, high + beside], row=place, col=1)
-    figure.update_yaxes(visible=False, range=[-1, 1])
-    figure.update_layout(
-        title="What the recordings say of the parameters",
-        height=190 + _ROW * len(rows),
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
-        margin={"t": 100, "b": 90},
-    )
-    return _styled(figure)
+    return styled(figure)
 
 
 def _named(shown: Explanation) -> str:
     known = shown.best.hypothesis.lines.mechanisms
     said = " + ".join(in_plain_words(known[name]) for name in shown.names)
     return said.replace("_", " ") or "nothing added"
-
-
-def _labelled(entry: Mapping[str, Any]) -> str:
-    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
-    interval = f"{entry['value']:.3g} ({entry['low']:.3g} to {entry['high']:.3g}){unit}"
-    return f"{entry['name'].replace('_', ' ')} {interval}"
-
-
-def _before(prior: Parameter, scale: float, unit: str) -> str:
-    """What was known before the recordings, in words."""
-    low, high = (scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975))
-    return f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"
 
 
 def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
@@ -304,8 +255,3 @@ def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tu
     low, high = (ends[0], ends[-1]) if isinstance(ends[0], str) else (float(ends[0]) - slack, float(ends[-1]) + slack)
     inside = np.flatnonzero((levels.high >= low) & (levels.low <= high))
     return (float(inside.min()) - 0.5, float(inside.max()) + 0.5) if len(inside) else (-0.5, len(levels.names) - 0.5)
-
-
-def _styled(figure: go.Figure) -> go.Figure:
-    figure.update_layout(template="plotly_white", font={"size": 14, "color": "#222222"})
-    return figure

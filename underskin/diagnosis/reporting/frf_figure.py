@@ -13,11 +13,11 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED
 from underskin.diagnosis.reporting.frf_data import ShownFrf
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
 
-_MEASURED, _BEFORE, _AFTER, _BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.15)"
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
 _WIDE = 3.0  # largest magnitude over the median, from which on its axis is logarithmic
@@ -53,9 +53,9 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
     are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them,
     and what each trace shows."""
-    models = [_Model("after", after, _AFTER, "solid", "circle")]
+    models = [_Model("after", after, AFTER, "solid", "circle")]
     if before:
-        models.insert(0, _Model("before", before, _BEFORE, "dash", "square-open"))
+        models.insert(0, _Model("before", before, BEFORE, "dash", "square-open"))
     few = min(len(one.frequency_hz) for one in recordings) <= _FEW
     traces = _traces(models, few)
     figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=_ROWS)
@@ -105,12 +105,12 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
 
 def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
     """In the order in which they are drawn."""
-    dots = {"mode": "markers", "marker": {"color": _MEASURED, "symbol": "circle-open", "size": 5}}
+    dots = {"mode": "markers", "marker": {"color": MEASURED, "symbol": "circle-open", "size": 5}}
     traces = [_Trace("measured", 1, "pC/N", {**dots, "name": "measured", "legendgroup": "measured"})]
     traces.append(_Trace("measured phase", 2, "°", {**dots, "legendgroup": "measured", "showlegend": False}))
     for panel, part in ((3, "real"), (4, "imaginary")):
         edge = {"mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "legendgroup": "band"}
-        named = {"name": "95 % of the noise", "fill": "tonexty", "fillcolor": _BAND, "showlegend": panel == 3}
+        named = {"name": "95 % of the noise", "fill": "tonexty", "fillcolor": BAND, "showlegend": panel == 3}
         traces.append(_Trace(f"noise {part} low", panel, "%", {**edge, "showlegend": False}))
         traces.append(_Trace(f"noise {part} high", panel, "%", {**edge, **named}))
     for model in models:

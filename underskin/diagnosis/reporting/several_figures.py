@@ -11,11 +11,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.names import quantity_in_words
+from underskin.diagnosis.reporting.figure_style import AFTER, BEFORE, styled
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.sentences import capital
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
-_BLUE, _ORANGE = "#0072B2", "#D55E00"
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
 _BESIDE = 0.5  # of a campaign's place on the axis, over which its sensors lie side by side
@@ -49,7 +49,7 @@ def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]]) -> go.Figure:
             f"d33 of {len(sensors)} sensors over the campaigns: median, the range of 90 %, and those that stand apart"
         )
     figure.update_layout(title=title, height=470, showlegend=few and len(sensors) > 1)
-    return _styled(figure)
+    return styled(figure)
 
 
 def _each(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: Sequence[str]) -> Iterator[go.Scatter]:
@@ -86,7 +86,7 @@ def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterat
         error_y=_reaching(ends),
         mode="lines+markers",
         name="median",
-        line={"color": _BLUE, "width": 1},
+        line={"color": AFTER, "width": 1},
         marker={"symbol": "circle", "size": 9},
         hovertemplate="median %{y:.4g} pC/N<extra></extra>",
     )
@@ -97,7 +97,7 @@ def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterat
         error_y=_reaching([row for _, row in apart]),
         mode="markers+text",
         name="stands apart",
-        marker={"color": _ORANGE, "symbol": "square", "size": 8},
+        marker={"color": BEFORE, "symbol": "square", "size": 8},
         text=[escape(row["sensor"]) for _, row in apart],
         textposition="middle right",
         hovertemplate="%{text}: %{y:.4g} pC/N<extra></extra>",
@@ -115,7 +115,7 @@ def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
     figure = make_subplots(len(populations), 1, subplot_titles=titles)
     for place, entry in enumerate(populations, start=1):
         departing = {one["skin"] for one in entry["departures"]}
-        for departs, colour, name in ((False, _BLUE, "as the others"), (True, _ORANGE, "departs")):
+        for departs, colour, name in ((False, AFTER, "as the others"), (True, BEFORE, "departs")):
             own = [one for one in entry["skins"] if (one["skin"] in departing) is departs]
             figure.add_scatter(
                 x=[one["value"] for one in own],
@@ -138,7 +138,7 @@ def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
         title="Each skin, and the band in which 95 % of such skins lie",
         height=150 + len(populations) * (_ROW + _OF_SKIN * skins),
     )
-    return _styled(figure)
+    return styled(figure)
 
 
 def _reaching(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -150,8 +150,3 @@ def _reaching(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "arrayminus": [row["value"] - row["low"] for row in rows],
         "width": 4,
     }
-
-
-def _styled(figure: go.Figure) -> go.Figure:
-    figure.update_layout(template="plotly_white", font={"size": 14, "color": "#222222"})
-    return figure

@@ -92,6 +92,16 @@ def _name(text: str, node: ast.expr) -> str | None:
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else None
 
 
+def _number(node: ast.expr) -> float | None:
+    """The number that a node is, infinite where it is too large; None for others."""
+    if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float) or isinstance(node.value, bool):
+        return None
+    try:
+        return float(node.value)
+    except OverflowError:
+        return math.inf
+
+
 class _Parser:
     """Refuses what is no arithmetic."""
 
@@ -130,10 +140,10 @@ class _Parser:
         return any(all(any(self.names(side)) for side in (one.left, one.right)) for one in sums)
 
     def _require_number(self, node: ast.expr) -> None:
-        is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
-        if not is_number:
+        number = _number(node)
+        if number is None:
             raise self._error(node, f"is not allowed; a formula {_FORM}")
-        if not math.isfinite(float(node.value)):  # type: ignore[attr-defined]
+        if not math.isfinite(number):
             raise self._error(node, "is too large a number")
 
     def _error(self, node: ast.expr, reason: str) -> InvalidInput:
@@ -161,8 +171,9 @@ class _Evaluation:
             return Quantity(-operand.values, operand.dimension)
         if isinstance(node, ast.BinOp):
             return self._combined(node)
-        assert isinstance(node, ast.Constant)
-        return in_unit(float(node.value), label or "1")  # type: ignore[arg-type]
+        number = _number(node)
+        assert number is not None
+        return in_unit(number, label or "1")
 
     def _combined(self, node: ast.BinOp) -> Quantity:
         left, right = self.of(node.left), self.of(node.right)
