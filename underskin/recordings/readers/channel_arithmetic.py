@@ -93,13 +93,9 @@ def _name(text: str, node: ast.expr) -> str | None:
 
 
 def _number(node: ast.expr) -> float | None:
-    """The number that a node is, infinite where it is too large; None for others."""
-    if not isinstance(node, ast.Constant) or not isinstance(node.value, int | float) or isinstance(node.value, bool):
-        return None
-    try:
-        return float(node.value)
-    except OverflowError:
-        return math.inf
+    """The number that a node is, infinite where a float cannot hold it; None for others."""
+    is_number = isinstance(node, ast.Constant) and type(node.value) in (int, float)
+    return float(ast.literal_eval(node)) if is_number else None
 
 
 class _Parser:
