@@ -92,4 +92,6 @@ def _tell(good: bool, words: str) -> None:
 
 def _end(*_: object) -> None:
     """Whatever is under way is not in the journal, and is sent again at the next start."""
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, signal.SIG_IGN)  # `timeout` and systemd send it more than once
     sys.exit(0)
