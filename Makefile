@@ -97,6 +97,7 @@ $(VENV)/.packages: $(VENV)/.created requirements.lock pyproject.toml
 	@touch $@
 
 $(VENV)/.runtime: $(VENV)/.packages
+	@echo "Compiling functions (half a minute) ..."
 	@$(PYTHON) -m underskin.compiled
 	@touch $@
 

@@ -58,7 +58,8 @@ def serve(
     except (TableError, ExtensionError, *STORE_ERRORS, OSError, ValueError) as error:
         fail(str(error))
     configure_logging()
-    typer.echo(f"underskin serves on http://{_host_name(host)}:{listener.getsockname()[1]} (Ctrl+C ends it)")
+    address = f"http://{_host_name(host)}:{listener.getsockname()[1]}"
+    typer.echo(f"underskin serves on {address}, with its data in {settings.data} (Ctrl+C ends it)")
     access = AccessControl(
         host_names=settings.host_names | {_host_name(host)},
         keys=keys,

@@ -108,6 +108,11 @@ class AsgiMiddleware:
     ) -> None:
         method = scope["method"]
         hot = self._hot.get((method, scope["path"]))
+        if method == "HEAD":
+            as_get = {**scope, "method": "GET"}  # a copy: by `scope` the server knows that it sends no body
+            await self._api(as_get, receive, exchange.send)
+            scope["route"] = as_get.get("route")
+            return
         if hot is None or not _plain(method, headers):
             await self._api(scope, receive, exchange.send)
             return

@@ -46,6 +46,8 @@ def moment(time: str | None) -> str:
 def state_of(campaign: Document) -> str:
     """Whether figures use a campaign and, where not, why."""
     if campaign["state"] == "withdrawn":
+        if campaign["discarded_at"] is not None:
+            return f"discarded: {campaign['withdraw_reason']}"
         return f"withdrawn: {campaign['withdraw_reason']}"
     if campaign["state"] == "corrected":
         return f"corrected by {campaign['corrected_by']}"

@@ -22,6 +22,7 @@ TOKEN = "form_token"  # noqa: S105 -- the name of the field
 UNLIKELY = "or tick “These values are right, unusual as they are”"
 _LARGEST_BYTES = 100_000
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
+_WITH_UNIT = re.compile(r"(\S*\d)\s*[^\W\d_].*")
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
@@ -107,7 +108,9 @@ def number(name: str, typed: str) -> float:
     """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput."""
     value = _value(typed)
     if value is None:
-        raise wrong_type(name, typed.strip()[:80])
+        before_unit = _WITH_UNIT.fullmatch(typed.strip())
+        alone = f" without its unit: {before_unit[1]}" if before_unit else ""
+        raise wrong_type(name, typed.strip()[:80], f"must be a number{alone}")
     return value
 
 

@@ -29,6 +29,19 @@ LINES: dict[str, Any] = {
 }
 
 
+@pytest.mark.parametrize("path", ["/", "/health", "/v1/skins", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6", "/openapi.json"])
+def test_head_has_the_headers_of_get_and_no_body(http: httpx.Client, path: str) -> None:
+    asked, whole = http.head(path), http.get(path)
+    assert asked.status_code == whole.status_code == 200
+    assert asked.content == b""
+    for name in ("content-type", "content-length"):
+        assert asked.headers.get(name) == whole.headers.get(name)
+
+
+def test_head_of_what_takes_post_alone_is_refused(http: httpx.Client) -> None:
+    assert http.head("/umbridge/Evaluate").status_code == 405
+
+
 def test_every_route_refuses_in_the_same_shape(http: httpx.Client) -> None:
     for method, path in all_routes(http):
         problem_of(http.request(method, path, headers={"Host": "evil.example"}), 421)

@@ -128,6 +128,8 @@ def test_metrics_count_requests_by_route(own: Server) -> None:
         ("GET", SIGMA, "/v1/sigma", 200, None),
         ("GET", f"{SIGMA}&model=half_space", "/v1/sigma", 200, None),
         ("GET", "/v1/sigma", "/v1/sigma", 422, None),
+        ("HEAD", SIGMA, "/v1/sigma", 200, None),
+        ("HEAD", "/no/such/route", "none", 404, None),
         ("POST", "/v1/frf", "/v1/frf", 422, {}),
         ("POST", "/umbridge/Info", "/umbridge/Info", 405, None),
         ("GET", "/no/such/route", "none", 404, None),

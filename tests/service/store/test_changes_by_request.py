@@ -219,6 +219,7 @@ def test_the_commands_have_the_same(server: Server) -> None:
     assert f"campaign {campaign_id} is called tuesday; tags: wet, cold; notes: by hand" in named
     assert "skin palm is called left palm" in told("annotate", "--skin", "palm", "--name", "left palm")
     assert "is discarded" in told("discard", "--campaign", campaign_id, "--reason", "a trial")
+    assert "discarded: a trial" in told("campaigns", campaign_id)
     entries = json.loads(told("changes", "--campaign", campaign_id, "--json"))
     assert [entry["action"] for entry in entries] == ["discard", "annotate"]
     assert f"undone of campaign {campaign_id}: discarded" in told("undo", entries[0]["id"])
