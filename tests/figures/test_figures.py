@@ -64,6 +64,12 @@ def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
     assert " V<extra>" in long.hovertemplate
 
 
+def test_a_unit_that_a_name_has_stands_once() -> None:
+    figure = raw_traces([Channel(name, "s", np.arange(5.0)) for name in ("Time [s]", "Time", "[s]")], None)
+    titles = [axis.title.text for axis in (figure.layout.yaxis, figure.layout.yaxis2, figure.layout.yaxis3)]
+    assert titles == ["Time<br>[s]", "Time<br>[s]", "[s]<br>[s]"]
+
+
 def test_the_value_under_the_pointer_has_its_unit() -> None:
     frequency = np.array([1.0, 10.0])
     entry = FrfLines("a", frequency, np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.array([1.0, 0.99]))

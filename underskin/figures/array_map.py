@@ -16,6 +16,7 @@ from underskin.units import Floats, Mask
 
 _SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
 _ALONE_MM = 1.0  # radius where there is no other
+_SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
 _DARK = 0.55  # luminance below which an id is written in white
@@ -150,16 +151,16 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
     """The colours' scale, and the values at its ends: as far as the values go, and at least as far as chance does."""
     known = value[np.isfinite(value)]
     if quantity.ends is not None:
-        return "Cividis", *quantity.ends
+        return _SCALE, *quantity.ends
     if len(known) == 0:
-        return "Cividis", 0.0, 1.0
+        return _SCALE, 0.0, 1.0
     if quantity.against == "nothing":
-        return "Cividis", 0.0, float(known.max()) or 1.0
+        return _SCALE, 0.0, float(known.max()) or 1.0
     middle = 0.0 if quantity.against == "zero" else float(np.median(known))
     sure = uncertainty[np.isfinite(uncertainty)]
     by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
     reach = max(float(np.abs(known - middle).max()), by_chance) or 1.0
-    return "PuOr_r" if quantity.against == "zero" else "Cividis", middle - reach, middle + reach
+    return "PuOr_r" if quantity.against == "zero" else _SCALE, middle - reach, middle + reach
 
 
 def _radius(x: Floats, y: Floats) -> float:

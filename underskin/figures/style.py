@@ -1,4 +1,5 @@
-"""Common style of all figures: the colours of Okabe and Ito, and Cividis, which colour-blind readers can tell apart."""
+"""Common style of all figures: the colours of Okabe and Ito, Cividis and Viridis, which colour-blind readers can tell
+apart."""
 
 from collections.abc import Sequence
 from html import escape

@@ -36,7 +36,8 @@ def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Fi
             row=row,
             col=1,
         )
-        short = label(trace.name if len(trace.name) <= _LONGEST else trace.name[: _LONGEST - 1] + "…")
+        bare = trace.name.removesuffix(f"[{trace.unit}]").strip() or trace.name
+        short = label(bare if len(bare) <= _LONGEST else bare[: _LONGEST - 1] + "…")
         figure.update_yaxes(title=f"{short}<br>[{label(trace.unit) or '?'}]", row=row, col=1)
     figure.update_xaxes(title="sample" if sample_rate_hz is None else "time [s]", row=len(traces), col=1)
     return styled(figure, "As it came", _EDGES + _ROW * len(traces))

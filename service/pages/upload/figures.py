@@ -69,7 +69,8 @@ def trace_columns(look: InspectedFile) -> dict[str, list[Any]]:
     for channel in block.channels:
         values = np.abs(channel.values) if np.iscomplexobj(channel.values) else channel.values
         filled = [*values.tolist(), *[None] * (length - len(values))]
-        columns[f"{channel.name} [{channel.unit}]" if channel.unit else channel.name] = filled
+        unit = f"[{channel.unit}]" if channel.unit else ""
+        columns[channel.name if channel.name.endswith(unit) else f"{channel.name} {unit}"] = filled
     return columns
 
 

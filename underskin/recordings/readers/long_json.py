@@ -58,9 +58,9 @@ def _cut(body: bytes, mark: str, most_numbers: int) -> tuple[bytes, list[Floats]
     arrays: list[Floats] = []
     behind = 0
     for part in _PARTS.finditer(body):
-        if part[0] == b'"':
+        if part.end() == part.start() + 1:  # the quotation mark; spans, since groups would be copies
             break
-        array = None if part[1] is None else _numbers(body, *part.span(1), most_numbers)
+        array = None if part.start(1) < 0 else _numbers(body, *part.span(1), most_numbers)
         if array is not None:
             kept += body[behind : part.start()], b'"%b:%d"' % (mark.encode(), len(arrays))
             arrays.append(array)
