@@ -40,7 +40,7 @@ def processes(count: int) -> Iterator[Executor]:
 def limit_process(memory_bytes: int, *, file_bytes: int | None = None, cpu_seconds: int | None = None) -> None:
     """Limit this process for good: address space beyond what it has now, files that it writes, time on processors.
 
-    For Linux. It leaves no core dump.
+    For Linux. It leaves no core dump; SIGXCPU tells that time is up.
     """
     import resource  # not on Windows, where no server runs
 
@@ -48,10 +48,10 @@ def limit_process(memory_bytes: int, *, file_bytes: int | None = None, cpu_secon
     limits = {resource.RLIMIT_AS: own + memory_bytes, resource.RLIMIT_CORE: 0}
     if file_bytes is not None:
         limits[resource.RLIMIT_FSIZE] = file_bytes
-    if cpu_seconds is not None:
-        limits[resource.RLIMIT_CPU] = cpu_seconds
     for kind, most in limits.items():
         resource.setrlimit(kind, (most, most))
+    if cpu_seconds is not None:
+        resource.setrlimit(resource.RLIMIT_CPU, (cpu_seconds, cpu_seconds + 1))  # at the second it is killed
 
 
 def _end_with_the_parent() -> None:

@@ -1,10 +1,9 @@
 """The paper's statements that can be checked, each beside what this project computes for it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from docs.paper.figures import varied_contacts
+from docs.paper.layer_claims import Claim, surface_deflection, tension
 from docs.paper.markdown import ceiling, percent
 from docs.paper.prototype import (
     BEST_FIT_D33_PC_PER_N,
@@ -34,15 +33,6 @@ _SPEED_OF_SOUND = 1000.0  # m/s, the paper's
 _THICKER_MM = np.linspace(1.5, 5.0, 71)
 
 
-@dataclass(frozen=True)
-class Claim:
-    """One row: what the paper says, what is found here, and the verdict."""
-
-    claim: str
-    found: str
-    verdict: str
-
-
 def checked(table: SigmaTable) -> list[Claim]:
     """All rows but the half space's error, which has a section of its own."""
     small, large = (press(table, radius, PRELOADS_N) for radius in INDENTERS_MM)
@@ -50,6 +40,8 @@ def checked(table: SigmaTable) -> list[Claim]:
         _identities(),
         *_point_like(),
         _thickness(),
+        surface_deflection(),
+        tension(),
         _rigid_base(),
         _incompressible(),
         *_load(table),

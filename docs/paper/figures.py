@@ -100,6 +100,7 @@ def _half_space_against_layer(figure: Figure, table: SigmaTable) -> None:
         if rho in _COMPARED:
             _curve(left, a, half_space.sigma(a, rho), rho, line)
             left.plot(contact, table.sigma(contact, rho, load).sigma, "o-", color=_colour(line), markersize=2)
+    _raise_top(left, 1.2)
     _label(left, "lines: half space; points: layer", "contact radius, a/h", "σ")
     change = 100 * (table.sigma(contact, RHO, load).sigma / linear_layer.sigma(contact, RHO) - 1)
     right.plot(contact, change, "ko:", markersize=3, label=f"rT/h = {RHO:g}")
@@ -116,6 +117,7 @@ def _strips_of_load(figure: Figure, table: SigmaTable) -> None:
     left.plot(a, half_space.sigma(a, RHO), "k:", label="half space")
     _label(left, f"rT/h = {RHO:g}", "contact radius, a/h", "σ")
     prototype_figures.mark_prototype(right, table)
+    _raise_top(right, 1.5)
     _label(right, "what L adds to σ(a/h)", "contact radius, a/h", "%")
 
 
@@ -126,6 +128,11 @@ def _curve(axes: Axes, x: Floats, y: Floats, rho: float, line: str) -> None:
 
 def _colour(line: str) -> str:
     return line.rstrip(":-")
+
+
+def _raise_top(axes: Axes, times: float) -> None:
+    """Room for the legend above the curves."""
+    axes.set_ylim(top=times * axes.get_ylim()[1])
 
 
 def _label(axes: Axes, title: str, x: str, y: str) -> None:

@@ -1,7 +1,7 @@
 """Storing the campaigns of uploads in one transaction; a repeated request is answered as before."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
 from underskin.errors import FileError, InvalidInput, conflicting, required
+from underskin.findings.alike import told_together, why_refused
 from underskin.recordings import plausibility, validation
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimators import Estimator
@@ -22,6 +23,7 @@ from underskin.recordings.rig_description import parse as parse_rig
 
 RIG = "rig"  # name of the form's part that is a rig description
 _MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
+_MOST_TOLD = 3  # of them in its sentence
 
 
 @dataclass(frozen=True)
@@ -141,24 +143,31 @@ def _require_keepable(arrived: Sequence[CheckedCampaign], options: IngestOptions
     if good and not (options.all_or_nothing and spoilt):
         return
     errors = [error for entry in arrived for error in _flat(entry, many=len(arrived) > 1)]
-    detail = f"Nothing was kept: {_first(arrived, errors[0])}" if errors else "No campaign was sent."
-    more = len(errors) - 1 + sum(entry.unlisted for entry in arrived)
-    if more > 0:
-        detail += f"; and {more} more"
-    raise Refusal(422, detail, title="Invalid input", errors=errors[:_MOST_ERRORS])
+    raise Refusal(422, _in_words(arrived), title="Invalid input", errors=errors[:_MOST_ERRORS])
 
 
-def _first(arrived: Sequence[CheckedCampaign], error: Mapping[str, Any]) -> str:
-    """The first error in words; the field names the file where there are many."""
-    file = f"{arrived[0].file}: " if len(arrived) == 1 and arrived[0].file else ""
-    return f"{file}{error['field']} {error['allowed']}"
+def _in_words(arrived: Sequence[CheckedCampaign]) -> str:
+    """The first errors; those alike of many recordings are one."""
+    told = [line for entry in arrived for line in _lines(entry)]
+    if not told:
+        return "No campaign was sent."
+    more = max(0, len(told) - _MOST_TOLD) + sum(entry.unlisted for entry in arrived)
+    return "; ".join([f"Nothing was kept: {told[0]}", *told[1:_MOST_TOLD], *([f"and {more} more"] if more else [])])
+
+
+def _lines(campaign: CheckedCampaign) -> list[str]:
+    file = f"{campaign.file}: " if campaign.file else ""
+    alike = told_together((entry["id"], why_refused(error)) for entry in campaign.refused for error in entry["errors"])
+    lines = [f"{file}recording{'s' if ', ' in names else ''} {names}: {why}" for names, why in alike]
+    return lines or [f"{file}{why_refused(error)}" for error in campaign.errors]
 
 
 def _flat(campaign: CheckedCampaign, *, many: bool) -> list[dict[str, Any]]:
     """All errors of a campaign as a problem lists them."""
     prefix = f"{campaign.file}: " if many and campaign.file else ""
     placed = [(f"{_place(entry['id'])}.", error) for entry in campaign.refused for error in entry["errors"]]
-    placed += [("", error) for error in campaign.errors]
+    if not placed:  # or they say no more than that every recording is refused
+        placed = [("", error) for error in campaign.errors]
     return [{**error, "index": None, "field": f"{prefix}{place}{error['field']}"} for place, error in placed]
 
 

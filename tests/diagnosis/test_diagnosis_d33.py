@@ -54,6 +54,16 @@ def test_an_effect_that_would_show_is_not_there_unseen(table: SigmaTable) -> Non
     assert found is None or np.ptp(found.mean) < 0.2
 
 
+def test_an_effect_that_shows_by_more_than_floats_hold_has_shares_all_the_same(table: SigmaTable) -> None:
+    fitting = problem(Made(("amplifier_high_pass",), (3.0,), lines=400, line=0.002), table)
+    (nothing,) = fitting.explain([Request(())])
+    assert nothing is not None
+    found = beside(fitting, nothing, "amplifier_high_pass", "d33")
+    assert found is not None
+    assert np.log(found.share.sum()) > 300
+    assert np.all(np.isfinite(found.share))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.94, 1.06])
 def test_the_stated_d33_holds_the_true_one_beside_an_effect_that_does_not_show(

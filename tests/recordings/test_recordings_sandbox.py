@@ -4,6 +4,7 @@ import io
 import os
 import signal
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -96,6 +97,23 @@ def test_attributes_named_as_no_field_is_are_refused_one_by_one() -> None:
 def test_a_file_that_takes_too_long_is_refused(stream: BinaryIO) -> None:
     with pytest.raises(FileError, match=r"slow\.tdms: reading it as TDMS took more than 0\.02 s"):
         parse_apart("TDMS", stream, "slow.tdms", ParsingLimits(seconds=0.02))
+
+
+def compute(_stream: BinaryIO) -> None:
+    while True:
+        pass
+
+
+def wait(_stream: BinaryIO) -> dict[str, Any]:
+    time.sleep(2.5)
+    return {}
+
+
+def test_time_on_a_processor_counts_and_waiting_for_one_does_not(stream: BinaryIO) -> None:
+    limits = ParsingLimits(seconds=2.0)
+    assert call_apart(f"{__name__}:wait", stream, "a", what="TDMS", limits=limits) == {}
+    with pytest.raises(FileError, match=r"a: reading it as TDMS took more than 2 s and was stopped"):
+        call_apart(f"{__name__}:compute", stream, "a", what="TDMS", limits=limits)
 
 
 def die(_stream: BinaryIO) -> None:

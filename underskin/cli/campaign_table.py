@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from underskin.cli.alike import told_together
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes
 from underskin.errors import InvalidInput
+from underskin.findings.alike import told_together
 from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
 from underskin.recordings import plausibility

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from underskin.cli.alike import told_together
 from underskin.errors import UnderskinError
+from underskin.findings.alike import told_together, why_refused
 from underskin.findings.formatting import significant
 
 if TYPE_CHECKING:
@@ -53,9 +53,9 @@ def _is_export(file: Path) -> bool:
 def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
     """What became of one campaign: its id and d33, remarks, and what was refused of it."""
     accepted = [entry for entry in result["recordings"] if entry["status"] == "ok"]
-    lines = [(False, _refused(error)) for error in result["errors"]]
-    refused = ((entry["id"], _refused(error)) for entry in result["recordings"] for error in entry["errors"])
-    lines += [(False, f"{names} {reason}") for names, reason in told_together(refused)]
+    lines = [(False, why_refused(error)) for error in result["errors"]]
+    left_out = ((entry["id"], why_refused(error)) for entry in result["recordings"] for error in entry["errors"])
+    lines += [(False, f"{names} {reason}") for names, reason in told_together(left_out)]
     lines += [(True, note) for note in result["notes"]]
     if result["status"] == "ok":
         count = f"{len(accepted)} recording{'s' if len(accepted) != 1 else ''}"
@@ -64,12 +64,6 @@ def outcome(client: "Client", result: Mapping[str, Any]) -> list[Line]:
         lines.insert(0, (True, f"campaign {result['id']} of skin {result['skin_id']}{before}, {count}: {figures}"))
         lines += [(True, remark) for remark in remarks]
     return lines
-
-
-def _refused(error: Mapping[str, Any]) -> str:
-    """A refused value in words; without the value where none was sent."""
-    value = "" if error["value"] is None else f" = {error['value']!r}"
-    return f"{error['field']}{value}: {error['allowed']}"
 
 
 def _figures(client: "Client", campaign_id: str) -> tuple[str, list[str]]:

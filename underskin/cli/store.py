@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 Url = Annotated[str, typer.Option(envvar="UNDERSKIN_URL", help="Where the service is.")]
 KeyOption = Annotated[
-    str | None, typer.Option(envvar="UNDERSKIN_API_KEY", help="API key of scope write, where keys are needed.")
+    str | None,
+    typer.Option(
+        envvar="UNDERSKIN_API_KEY", help="API key, where keys are needed; of scope write for what changes something."
+    ),
 ]
 LOCAL = "http://127.0.0.1:8000"
 _LONGEST_WAIT_S = 600.0

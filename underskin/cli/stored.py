@@ -80,7 +80,9 @@ def history(
 
 def _row(entry: Document) -> tuple[str, ...]:
     excluded = f" − {entry['excluded']}" if entry["excluded"] else ""
-    recorded = moment(entry["recorded_at"] or entry["received_at"])
+    recorded = moment(entry["recorded_at"])
+    if entry["recorded_at"] is None:
+        recorded = f"received {moment(entry['received_at'])}"
     return entry["id"], entry["skin_id"], entry["name"], recorded, f"{entry['recordings']}{excluded}", state_of(entry)
 
 

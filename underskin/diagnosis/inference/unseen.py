@@ -20,11 +20,13 @@ from underskin.units import Floats
 
 _PLACES = {0: 1, 1: 12, 2: 24}  # for so many parameters
 _MOST_PLACES = 48
+_MOST = 600.0  # nats that shares tell: e to the power of 710 is more than a float holds
 _COUNTS = 6.0  # nats behind the fit without the mechanism within which a place counts
 
 
 def beside(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> Normals | None:
-    """A parameter of the model with one more mechanism, each share relative to the explanation without it.
+    """A parameter of the model with one more mechanism, each share relative to the explanation without it, e^600 at
+    most.
 
     None where the recordings do not support the mechanism, or it moves no prediction.
     """
@@ -55,7 +57,8 @@ def beside(problem: FittingProblem, explanation: Explanation, name: str, paramet
     values, covariances = around_mean(held, at)
     whole = values + around_levels(held, at)
     without = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
-    shares = np.exp(whole - without) / len(fit)
+    gained = whole - without
+    shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
     place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
     spread = over_spread(held, at, place)
     if spread is not None:

@@ -16,7 +16,7 @@ _ALLOWED = {MEMORY_MB: (100.0, 1e6), SECONDS: (1.0, 86_400.0), EXPANSION: (1.0, 
 
 @dataclass(frozen=True)
 class ParsingLimits:
-    """`memory_bytes` beyond the interpreter's own, `seconds` by the clock; the contents may be `expansion` times as
+    """`memory_bytes` beyond the interpreter's own, `seconds` on a processor; the contents may be `expansion` times as
     long as the file, and 16 MB."""
 
     memory_bytes: int = 1_000_000_000

@@ -5,8 +5,10 @@ arrays, so that nothing it says is run here. When it dies, that is an error that
 """
 
 import importlib
+import math
 import os
 import secrets
+import signal
 import struct
 import subprocess
 import sys
@@ -27,6 +29,7 @@ from underskin.recordings.time_zone import TIME_ZONE
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)
 _LAST_WORDS = 500
+_WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to refuse a file
 _LENGTH = struct.Struct("<Q")
 
 
@@ -64,14 +67,15 @@ def call_apart(
     with tempfile.TemporaryFile() as answer, tempfile.TemporaryFile() as said:
         child = subprocess.Popen(command, stdin=stream, stdout=answer, stderr=said, env=environment)
         try:
-            status = child.wait(limits.seconds)
+            status = child.wait(_WAIT_TIMES * limits.seconds)
         except subprocess.TimeoutExpired:
-            reason = f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
-            reason += f" ({parsing_limits.SECONDS})"
-            raise FileError(file, "", reason) from None
+            status = -signal.SIGXCPU
         finally:
             child.kill()
             child.wait()
+        if status == -signal.SIGXCPU:
+            reason = f"reading it as {what} took more than {limits.seconds:g} s and was stopped"
+            raise FileError(file, "", f"{reason} ({parsing_limits.SECONDS})")
         if status != 0:
             raise FileError(file, "", f"the process that read it as {what} {_end(status, said)}")
         answer.seek(0)
@@ -122,7 +126,7 @@ def _parsed(stream: BinaryIO, name: str) -> dict[str, Any]:
 def _main() -> None:
     """The child: file on standard input, answer on standard output."""
     function, memory_bytes, seconds, longest, *given = sys.argv[1:]
-    limit_process(int(memory_bytes), file_bytes=int(memory_bytes), cpu_seconds=int(float(seconds)) + 1)
+    limit_process(int(memory_bytes), file_bytes=int(memory_bytes), cpu_seconds=math.ceil(float(seconds)))
     module, _, name = function.partition(":")
     try:
         with os.fdopen(0, "rb") as stream:

@@ -1,6 +1,7 @@
-"""What is wrong alike with many recordings, in one line instead of one each."""
+"""What is wrong with recordings, in words: alike with many, in one line instead of one each."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 _FEWEST = 3  # that are told together
 _NAMED = 3
@@ -20,3 +21,11 @@ def told_together(problems: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
             more = f" and {len(recordings) - _NAMED} more" if len(recordings) > _NAMED else ""
             told.append((f"{', '.join(recordings[:_NAMED])}{more}", reason))
     return told
+
+
+def why_refused(error: Mapping[str, Any]) -> str:
+    """An entry of the service's `errors`: the value where one was sent, and of a file only what is wrong."""
+    if error["field"] == "file":
+        return str(error["allowed"])
+    value = "" if error["value"] is None else f" = {error['value']!r}"
+    return f"{error['field']}{value}: {error['allowed']}"
