@@ -9,10 +9,9 @@ import pytest
 
 from service.store import database
 from service.store.tables import metadata
+from tests.service.backends import BACKENDS
 from tests.support import postgres
 from tests.support.store_server import Place, Server, running
-
-BACKENDS = ("sqlite", "postgresql")
 
 
 @pytest.fixture(scope="session")

@@ -157,7 +157,11 @@ def test_the_client_and_the_command(server: Server, tmp_path: Path) -> None:
     assert "6 recordings" in done.stdout
     Path(files[3]).write_text("{")
     done = server.place.command("import", *files, *there)
-    assert (done.returncode, "5 recordings" in done.stdout, "press-3.json file" in done.stderr) == (2, True, True)
+    assert (done.returncode, "5 recordings" in done.stdout, "press-3.json must be JSON" in done.stderr) == (
+        2,
+        True,
+        True,
+    )
     missing = server.place.command("import", *files, str(tmp_path / "missing.json"), *there)
     assert (missing.returncode, "missing.json cannot be opened" in missing.stderr) == (2, True)
     assert len(server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]) == 3

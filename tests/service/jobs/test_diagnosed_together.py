@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.service.backends import on
 from tests.service.requests import problem_of
 from tests.support.diagnosed import awaited, found, resonant, sent
 from tests.support.store_server import Place, Server, campaign, running
@@ -31,6 +32,7 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
     return problem_of(server.http.post(path, json=body), status)
 
 
+@on("sqlite")
 def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
         ids = [sent(server, resonant("array", seed=seed)) for seed in range(2)]
@@ -51,6 +53,7 @@ def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
         assert again["report"]["findings"][0]["statement"] == f"array ({ids[0]}): Left out: cable loose"
 
 
+@on("postgresql")
 def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
         ids = [sent(server, resonant("array", seed=number), f"palm-{number}") for number in range(3)]
@@ -62,6 +65,7 @@ def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
         assert client.fleets.diagnose(sorted(skins), "batch 7") == {"id": done["id"], "state": "done"}
 
 
+@on("postgresql")
 def test_a_killed_server_takes_up_a_diagnosis_of_several(place: Place) -> None:
     with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
         ids = [sent(server, resonant(name, seed=seed)) for seed, name in enumerate(("array", "again"))]

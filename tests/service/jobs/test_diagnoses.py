@@ -11,6 +11,7 @@ import pytest
 
 from service.store import database, diagnoses
 from service.store.tables import diagnoses as table_of_diagnoses
+from tests.service.backends import on
 from tests.support.diagnosed import asked, awaited, found, report, resonant, sent, table
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError, __version__
@@ -95,6 +96,7 @@ def test_a_campaign_is_diagnosed_once(file_place: Place) -> None:
             client.diagnoses.start(campaign_id)
 
 
+@on("sqlite")
 def test_a_killed_server_takes_up_what_it_was_at(place: Place) -> None:
     with running(place, **ONE) as server:
         first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
@@ -108,6 +110,7 @@ def test_a_killed_server_takes_up_what_it_was_at(place: Place) -> None:
             assert (diagnosis["state"], diagnosis["report"]) == ("done", report())
 
 
+@on("postgresql")
 def test_a_server_that_ends_puts_back_what_it_was_at(place: Place) -> None:
     with running(place, **ONE) as server:
         diagnosis_id = asked(server, sent(server, resonant("array")))

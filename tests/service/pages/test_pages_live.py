@@ -84,7 +84,7 @@ def test_what_a_bench_saves_is_on_the_page_at_once(reader: Visit, idle: Server, 
         words = ["watch", str(tmp_path), "--skin", "bench", "--url", reader.address, "--settle-s", "0.3"]
         watch = preloaded.start(words, os.environ, (0, log.fileno(), log.fileno()))
     (tmp_path / "tonight.json").write_bytes(orjson.dumps(campaign("tonight", sensors=1)))
-    page.get_by_role("link", name="tonight", exact=True).wait_for(timeout=60_000)
+    page.get_by_role("link", name="tonight", exact=True).wait_for(timeout=240_000)
     assert page.evaluate(STAYED)
     watch.terminate()
     assert watch.wait(30) == 0

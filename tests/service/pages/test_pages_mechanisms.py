@@ -25,7 +25,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
             page = visitor.page
             visitor.go(f"/campaigns/{campaign_id}")
             page.get_by_role("button", name="Diagnose").click()
-            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=60_000)
+            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=240_000)
             page.get_by_label("Name", exact=False).first.fill("Warm Amplifier")
             page.get_by_role("button", name="Keep it").click()  # which the browser refuses: capitals and a blank
             page.get_by_label("Name", exact=False).first.fill("warm_amplifier")
@@ -40,11 +40,11 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
 
             visitor.go(f"/campaigns/{campaign_id}")
             page.get_by_role("button", name="Diagnose").first.click()
-            page.get_by_role("heading", name="Suppose that it is not").wait_for(timeout=60_000)
+            page.get_by_role("heading", name="Suppose that it is not").wait_for(timeout=240_000)
             _require_accessible_at_both_widths(visitor)
             page.get_by_role("button", name="Without warm amplifier").click()
             page.get_by_text("Supposed that it is not warm amplifier").wait_for()
-            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=60_000)
+            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=240_000)
 
             page.get_by_role("link", name="Mechanisms", exact=True).click()
             page.get_by_role("button", name="Discard warm_amplifier").click()

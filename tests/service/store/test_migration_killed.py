@@ -20,7 +20,7 @@ from sqlalchemy import Engine, event
 
 from bench.soak import SOAK
 from service.store import backup, database, migrate
-from tests.service.conftest import BACKENDS
+from tests.service.backends import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, take_over
 from tests.support.store_server import Place
 

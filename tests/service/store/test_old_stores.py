@@ -13,7 +13,7 @@ from alembic.migration import MigrationContext
 from bench.soak import SOAK
 from service.store import database, migrate
 from service.store.tables import metadata
-from tests.service.conftest import BACKENDS
+from tests.service.backends import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, SECOND, WITH_THE_NEXT, answers, asked_of, take_over
 from tests.support.store_server import Place, campaign, running
 
