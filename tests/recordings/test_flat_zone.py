@@ -10,6 +10,7 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
+from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone, stacked
 from underskin.units import Complexes, Floats
@@ -162,3 +163,24 @@ def test_recordings_whose_lines_do_not_overlap_have_a_zone_and_no_warning() -> N
     conditions = [*low_conditions, *((radius, 5 * preload) for radius, preload in high_conditions)]
     zone = flat_zone(stacked([*low, *high]), conditions)
     assert 2 <= zone.low_hz < zone.high_hz <= 400
+
+
+def test_what_a_resonance_above_the_zone_puts_into_the_average_is_told() -> None:
+    frfs, conditions = recorded(np.arange(1.0, 401.0), "resonance", line=0.001)
+    stacks = stacked(frfs)
+    zone = flat_zone(stacks, conditions)
+    level, noise, _ = band_average(stacks, zone)
+    told = lower_half(stacks, zone, level, noise)
+    lower, _, _ = band_average(stacks, FlatZone(zone.low_hz, np.sqrt(zone.low_hz * zone.high_hz), ""))
+    change = 100 * float(np.median(lower / level - 1))
+    assert change < -0.3
+    assert told == f"; averaged over its lower half alone, d33 would be {-change:.1f} % lower"
+
+
+def test_a_flat_band_has_halves_alike() -> None:
+    for seed in range(20):
+        frfs, conditions = recorded(LINEAR_GRID, "flat", seed)
+        stacks = stacked(frfs)
+        zone = flat_zone(stacks, conditions)
+        level, noise, _ = band_average(stacks, zone)
+        assert lower_half(stacks, zone, level, noise) == ""

@@ -26,6 +26,7 @@ from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
 from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
 from underskin.recordings.plausibility import implausible
@@ -133,6 +134,7 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     frfs = stacked(measured)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
+    zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise))
     contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)

@@ -39,7 +39,7 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: 
     array = answer["array"]
     for shown, exact in ((value, "d33_pc_per_n"), (low, "d33_low_pc_per_n"), (high, "d33_high_pc_per_n")):
         assert shown == pytest.approx(array[exact], abs=(high - low) / 20)
-    assert "where the response is flat" in text
+    assert "where the response is flat within 2 %" in text
     page.get_by_text("Why this band").click()
     assert page.get_by_text("no resonance in any recording").is_visible()
     reader.require_accessible()
