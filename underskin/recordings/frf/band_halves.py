@@ -21,7 +21,8 @@ def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Fl
     """
     half = replace(zone, high_hz=float(np.sqrt(zone.low_hz * zone.high_hz)))
     lower, lower_noise, _ = band_average(stacks, half)
-    change, unsure = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
+        change, unsure = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
     known = np.isfinite(change) & np.isfinite(unsure)
     if not known.any():
         return ""
