@@ -14,6 +14,7 @@ from underskin.units import Floats
 
 _SPACING = 0.05  # of the grids in r/h and e/h; the profile turns over lengths of 0.3 h and more
 _RADIAL, _ANGULAR = 10, 20  # quadrature over the disc
+_AT_ONCE = 500  # rows of a profile
 _SCATTER_NODES = 7  # Gauss–Hermite, in x and y
 
 
@@ -74,12 +75,20 @@ def positioned_sigma(
     largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
     offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
     radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
-    profile = table.profile(radii, a_over_h[:, None], load_parameter[:, None])
+    profile = _profiles(table, radii, a_over_h, load_parameter)
     sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
     commanded = _each_row(curve, offset_over_h[:, None])[:, 0]
     seen = disc_known & (offset_over_h <= offsets[-1]) & np.isfinite(sigma).all(axis=1)
     return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
+
+
+def _profiles(table: SigmaTable, radii: Floats, a_over_h: Floats, load_parameter: Floats) -> Floats:
+    """The profiles of contacts (rows, radii), some at a time: one evaluation holds up the other threads of a server."""
+    pieces = (slice(first, first + _AT_ONCE) for first in range(0, max(len(a_over_h), 1), _AT_ONCE))
+    return np.concatenate(
+        [table.profile(radii, a_over_h[piece, None], load_parameter[piece, None]) for piece in pieces]
+    )
 
 
 def sigma_beside(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> tuple[Floats, Floats]:
