@@ -150,7 +150,16 @@ def test_a_diameter_is_halved_and_that_is_told() -> None:
     assert "second column of indenter_radius_mm" in both.reason
 
 
-@pytest.mark.parametrize(("heading", "turn"), [("frf_phase_deg", 180 / math.pi), ("Frf phase [rad]", 1.0)])
+@pytest.mark.parametrize(
+    ("heading", "turn"),
+    [
+        ("frf_phase_deg", 180 / math.pi),
+        ("Frf phase [rad]", 1.0),
+        ("Phase [deg]", 180 / math.pi),
+        ("phase [°]", 180 / math.pi),
+        ("Phase (rad)", 1.0),
+    ],
+)
 def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, turn: float) -> None:
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", f"frf_magnitude_pc_per_n,{heading}")
     polar = [cmath.polar(value) for value in (7.1 - 0.5j, 7.2 - 0.6j)]
@@ -159,9 +168,14 @@ def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, tur
     alone = refusal(
         ABOVE + HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,coherence") + ROWS
     )
-    assert "needs frf_phase_rad beside it" in alone.reason
+    assert "needs frf_phase_deg or frf_phase_rad beside it" in alone.reason
     beside = refusal(ABOVE + head.replace("\n", ",frf_re_pc_per_n\n") + f"r1,s01,4,1.0,0.09,10,{rows[0]},7\n")
     assert "stands beside real and imaginary parts" in beside.reason
+
+
+def test_a_phase_without_a_magnitude_is_guessed() -> None:
+    head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "Phase [deg],Size [pC/N]")
+    assert "is it frf_phase_deg, which the table lacks?" in refusal(ABOVE + head + ROWS).reason
 
 
 def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_asked_for() -> None:

@@ -190,8 +190,7 @@ class _Template:
         except NoField as error:
             raise self.error(start - 1, str(error), error.place) from None
         self.warnings += left_out
-        halved = [column.heading for column in columns if column.heading.lower().startswith("indenter")]
-        self.warnings += [f"{heading!r} is halved" for heading in halved if "diameter" in heading.lower()]
+        self.warnings += template_columns.halved(column.heading for column in columns)
         return columns
 
     def _field(self, name: str, index: int) -> tuple[str, float]:

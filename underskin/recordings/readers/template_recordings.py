@@ -9,10 +9,11 @@ import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS
-from underskin.recordings.readers import template_columns
+from underskin.recordings.readers import polar_columns
 from underskin.recordings.readers.calendar_times import of_two_cells
 from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
-from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, MAGNITUDE, PARTS, PHASE, Column
+from underskin.recordings.readers.polar_columns import MAGNITUDE, PARTS, PHASE
+from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, Column
 from underskin.recordings.readers.template_lines import TemplateLines
 from underskin.units import Floats
 
@@ -120,7 +121,7 @@ class TemplateRecordings:
             one.field: self._reader.value(one.field, cells.get(one.place, ""), (index, one.place), one.factor)
             for one in self._columns
         }
-        return template_columns.with_parts(values)
+        return polar_columns.with_parts(values)
 
     def _take_run(self, own: str, index: int, rows: PlainRows, run: slice) -> bool:
         """Take rows of one id at once; False where single rows must tell what they are."""
