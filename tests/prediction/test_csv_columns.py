@@ -40,6 +40,10 @@ def test_points_or_commas_are_the_decimal_mark(text: str) -> None:
         ("preload_n\tfrf_pc_per_n\n1,000\t7.5\n", "1,000 can be 1000 or 1.000: write it without a comma"),
         ('preload_n,frf_pc_per_n\n"1,000",7.5\n', "1,000 can be 1000 or 1.000: write it without a comma"),
         ("preload_n;frf_pc_per_n\n0,5;7\n1.200;7\n", r"preload_n\[1\] = '1.200': must be a number \(line 3\)"),
+        (
+            "preload_n,frf_pc_per_n\n1,x\n2,7\n3,y\n",
+            r"\[0\] = 'x': must be a number \(line 2, and 1 more in this column\)",
+        ),
         ("preload_n;frf_pc_per_n\n0,5;7.5\n", r"frf_pc_per_n\[0\] = '7.5': must be a number \(line 2\)"),
     ],
 )

@@ -140,6 +140,27 @@ def test_a_note_under_the_table_is_left_out_and_told() -> None:
     assert reading.warnings == ["line 13 under the table, 'measured by mb', is left out"]
 
 
+@pytest.mark.parametrize(
+    "note",
+    [
+        "\nmeasured in the cold room, air conditioning off",
+        "measured in the cold room, air conditioning off",
+        "\nby mb, in the cold room, air, conditioning, off, all, day, long, too",
+        "by mb, in the cold room, air at 23 °C",
+    ],
+)
+def test_words_with_separators_under_the_table_are_a_note(note: str) -> None:
+    (warning,) = same_as_plain(f"{PLAIN}{note}\n").warnings
+    assert warning == f"line {12 + note.count(chr(10))} under the table, {note.strip()!r}, is left out"
+
+
+def test_words_between_recordings_are_not_taken_for_a_note() -> None:
+    reading = read(PLAIN + "\nin the cold room, air off\n" + ROWS.replace("r1", "r2"))
+    assert {problem.recording for problem in reading.problems} == {"in the cold room"}
+    cut = read(PLAIN + "r2,s01,four\n")
+    assert {problem.recording for problem in cut.problems} == {"r2"}
+
+
 def test_a_diameter_is_halved_and_that_is_told() -> None:
     for heading in ("indenter_diameter_mm", "Indenter diameter [mm]"):
         reading = same_as_plain(changed("indenter_radius_mm", heading).replace("r1,s01,4,", "r1,s01,8,"))
@@ -206,6 +227,13 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(old: str, new: str, fiel
     (problem,) = read(changed(old, new)).problems
     assert (problem.recording, problem.field) == ("r1", field)
     assert problem.allowed == f"must be a number ({place})"
+
+
+def test_of_several_cells_that_are_no_numbers_the_first_is_told_with_the_count() -> None:
+    more = "".join(f",,,,,{line},7.{line},{'x' if line % 2 else -0.5}\n" for line in range(30, 36))
+    (problem,) = read(PLAIN + more).problems
+    assert problem.field == "frf_im_pc_per_n[3]"
+    assert problem.allowed == "must be a number (line 13, column 8, and 2 more in this column)"
 
 
 def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:

@@ -8,7 +8,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from underskin.errors import FileError, wrong_type
+from underskin.errors import FileError, InvalidInput, wrong_type
 from underskin.recordings.readers import polar_columns, template_columns, template_lines, text
 from underskin.recordings.readers.polar_columns import MAGNITUDE, PHASE
 
@@ -34,14 +34,17 @@ class CsvColumn:
 
     def numbers(self, field: str) -> list[float]:
         """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
-        return [self._number(field, row, cell) for row, cell in enumerate(self.cells)]
+        values = [_number(cell, self.decimal) for cell in self.cells]
+        if None in values:
+            raise self._refused(field, [row for row, value in enumerate(values) if value is None])
+        return [value * self.factor for value in values if value is not None]
 
-    def _number(self, field: str, row: int, cell: str) -> float:
-        value = _number(cell, self.decimal)
-        if value is not None:
-            return value * self.factor
+    def _refused(self, field: str, rows: Sequence[int]) -> InvalidInput:
+        """Of these rows, which hold no number, the first, and how many more there are."""
+        cell = self.cells[rows[0]]
+        more = f", and {len(rows) - 1} more in this column" if len(rows) > 1 else ""
         hint = f"; {cell} {text.ungrouped(cell)}" if text.is_grouped(cell) else ""
-        raise wrong_type(field, cell, f"must be a number (line {self.lines[row]}){hint}", row)
+        return wrong_type(field, cell, f"must be a number (line {self.lines[rows[0]]}{more}){hint}", rows[0])
 
 
 @dataclass(frozen=True)

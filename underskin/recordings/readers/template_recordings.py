@@ -15,6 +15,7 @@ from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
 from underskin.recordings.readers.polar_columns import MAGNITUDE, PARTS, PHASE
 from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, Column
 from underskin.recordings.readers.template_lines import TemplateLines
+from underskin.recordings.shown_values import CellText
 from underskin.units import Floats
 
 POSITION = ("position_x_mm", "position_y_mm")
@@ -234,7 +235,16 @@ def _joined(parts: Sequence[Floats | list[Any]]) -> Floats | list[Any]:
     """An array where some parts are, and the others hold numbers alone; else a list."""
     if any(isinstance(part, np.ndarray) for part in parts) and not any(map(_is_other, parts)):
         return np.concatenate(parts)
-    return [entry for part in parts for entry in (part.tolist() if isinstance(part, np.ndarray) else part)]
+    return _counted([entry for part in parts for entry in (part.tolist() if isinstance(part, np.ndarray) else part)])
+
+
+def _counted(entries: list[Any]) -> list[Any]:
+    """The entries of a column, of which the first that is no number says how many more there are."""
+    wrong = [place for place, entry in enumerate(entries) if isinstance(entry, CellText)]
+    if len(wrong) > 1:
+        first = entries[wrong[0]]
+        entries[wrong[0]] = CellText(first, f"{first.place}, and {len(wrong) - 1} more in this column")
+    return entries
 
 
 def _is_other(part: Floats | list[Any]) -> bool:
