@@ -135,32 +135,6 @@ def test_a_force_that_is_no_amplitude_is_not_taken_for_one(heading: str) -> None
     assert "did you mean" not in reason
 
 
-def test_a_note_under_the_table_is_left_out_and_told() -> None:
-    reading = same_as_plain(PLAIN + "\nmeasured by mb\n")
-    assert reading.warnings == ["line 13 under the table, 'measured by mb', is left out"]
-
-
-@pytest.mark.parametrize(
-    "note",
-    [
-        "\nmeasured in the cold room, air conditioning off",
-        "measured in the cold room, air conditioning off",
-        "\nby mb, in the cold room, air, conditioning, off, all, day, long, too",
-        "by mb, in the cold room, air at 23 °C",
-    ],
-)
-def test_words_with_separators_under_the_table_are_a_note(note: str) -> None:
-    (warning,) = same_as_plain(f"{PLAIN}{note}\n").warnings
-    assert warning == f"line {12 + note.count(chr(10))} under the table, {note.strip()!r}, is left out"
-
-
-def test_words_between_recordings_are_not_taken_for_a_note() -> None:
-    reading = read(PLAIN + "\nin the cold room, air off\n" + ROWS.replace("r1", "r2"))
-    assert {problem.recording for problem in reading.problems} == {"in the cold room"}
-    cut = read(PLAIN + "r2,s01,four\n")
-    assert {problem.recording for problem in cut.problems} == {"r2"}
-
-
 def test_a_diameter_is_halved_and_that_is_told() -> None:
     for heading in ("indenter_diameter_mm", "Indenter diameter [mm]"):
         reading = same_as_plain(changed("indenter_radius_mm", heading).replace("r1,s01,4,", "r1,s01,8,"))
@@ -257,7 +231,7 @@ def test_local_times_are_read_and_their_zone_told(written: str, time: str, monke
         reading = same_as_plain(text)
         assert only(reading).recorded_at == time + offset
         (warning,) = reading.warnings
-        assert f"in the zone {zone} (UNDERSKIN_TIME_ZONE)" in warning
+        assert warning == f"times such as {written} are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Berlln")
     with pytest.raises(InvalidInput, match="must be a time zone such as Europe/Rome"):
         read(text)

@@ -43,7 +43,6 @@ _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) i
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(POSITION)) - {"conditions"}
 _ID = "id"
 _MOST_ABOVE = 10_000  # lines
-_NO_ZONE = "times such as 24.12.2025 09:30 are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"
 _FLAGS = {"true": True, "false": False}
 
 
@@ -86,6 +85,7 @@ class _Template:
         self.rows = self._to_the_headings()
         self.stated: dict[str, int] = {}  # where the fields above the table stand
         self.warnings: list[str] = []
+        self.has_local_times = False
 
     def _to_the_headings(self) -> list[list[str]]:
         """The rows above the table, and last the headings."""
@@ -242,8 +242,9 @@ class _Template:
             time = iso_time(cell, zone)
         except ValueError as error:
             raise self.error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
-        if time != cell and (said := _NO_ZONE.format(zone=zone)) not in self.warnings:
-            self.warnings.append(said)
+        if time != cell and not self.has_local_times:
+            self.has_local_times = True
+            self.warnings.append(f"times such as {cell} are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)")
         return time
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:
