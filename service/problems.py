@@ -143,8 +143,21 @@ def unexpected() -> Refusal:
 
 def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
     """The same problem from pydantic's list of errors."""
+    return invalid_input(_listed(errors))
+
+
+def _listed(errors: ValidationError | Sequence[Any]) -> list[InvalidInput]:
     details = errors.errors(include_url=False) if isinstance(errors, ValidationError) else errors
-    return invalid_input(_as_invalid_input(detail) for detail in details)
+    return [_as_invalid_input(detail) for detail in details]
+
+
+def _guessed(error: InvalidInput, known: Collection[str]) -> InvalidInput:
+    """The error; of an unknown field with the one that was probably meant."""
+    unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in known
+    close = get_close_matches(error.field.lower(), known, n=1) if unknown else []
+    if not close:
+        return error
+    return InvalidInput(error.field, error.value, f"{error.allowed}; did you mean {close[0]}?", code=error.code)
 
 
 def validated(kind: type[_Model], document: Any) -> _Model:
@@ -152,7 +165,7 @@ def validated(kind: type[_Model], document: Any) -> _Model:
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise from_validation(error) from None
+        raise invalid_input(_guessed(one, kind.model_fields) for one in _listed(error)) from None
 
 
 def parsed(kind: type[_Model], document: Any) -> _Model:

@@ -13,7 +13,7 @@ from service.problems import Refusal, validated
 from service.routes.npz_body import NPZ, fields_of_npz
 from service.schemas.columns import ColumnsRequest
 from underskin.errors import ErrorCode, FileError, InvalidInput, conflicting, wrong_type
-from underskin.prediction.csv_columns import CsvColumn, CsvError, from_csv
+from underskin.prediction.csv_columns import CsvColumn, CsvError, RealPart, from_csv
 from underskin.recordings.reading import sheet_text
 
 try:
@@ -161,14 +161,14 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[
         found = from_csv(body, kind.model_fields)
     except CsvError as error:
         raise Refusal(400, f"{what} {error}.") from None
-    # The request's own checks refuse unknown columns.
+    # The request's own checks refuse unknown columns, by their first values.
     return {
-        **found.unknown,
+        **{name: cells[0] for name, cells in found.unknown.items()},
         **{name: _cells(kind, name, column) for name, column in found.fields.items()},
     }, found.labels
 
 
-def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn) -> Any:
+def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn | RealPart) -> Any:
     if name in kind.lists:
         raise wrong_type(name, column.cells[0], f"cannot be sent as CSV; send application/json or {NPZ}")
     return _constant(name, column.cells) if name in kind.constants else column.numbers(name)

@@ -1,10 +1,12 @@
 """The FRF that a skin should show, and d33 from measured FRF: by the paper's model or by the adopted one."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
+from service.problems import invalid_input
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
@@ -28,13 +30,24 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     require_paper(request)
     columns = _sent(request, *FIELDS, "d33_pc_per_n")
     count = rows(columns)
-    answer = answers.frf(table, columns, request.units_checked)
+    with _all_refused(columns, request.units_checked):
+        answer = answers.frf(table, columns, request.units_checked)
     frequency = _asked_lines(request)
     results, shared = dict(answer.columns), {}
     if frequency is not None:
         results |= _flat_spectra(frequency, results["frf_pc_per_n"], count)
         shared["frequency_hz"] = frequency
     return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency, limits=answer.limits)
+
+
+@contextmanager
+def _all_refused(columns: Mapping[str, Floats], units_checked: bool) -> Iterator[None]:
+    """Raises Refusal with all that is wrong where one of the columns was refused."""
+    try:
+        yield
+    except InvalidInput as first:
+        others = [error for error in answers.refused(columns, units_checked) if error.field != first.field]
+        raise invalid_input([first, *others]) from None
 
 
 def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:
@@ -83,7 +96,8 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
     columns = _sent(request, *FIELDS) | measured
     count = _rows(request, columns)
-    answer = answers.d33(table, columns, request.units_checked)
+    with _all_refused(columns, request.units_checked):
+        answer = answers.d33(table, columns, request.units_checked)
     plateau = {name: answer.columns[name] for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     results = {name: answer.columns[name] for name in _RESULTS}
     leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}

@@ -144,6 +144,8 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
         ("preload_n,frf_pc_per_n\n", "at least one row"),
         ("preload_n;frf_pc_per_n\n1;7\n3;1.000,5\n", "frf_pc_per_n[1] = '1.000,5': must be a number"),
         ("preload_n,frf_pc_per_n,humidity\n1,7,40\n", "has the column 'humidity'; allowed, once each"),
+        ("prelod_n,frf_pc_per_n\n1,7\n", "has the column 'prelod_n'; did you mean preload_n? Allowed, once each"),
+        ("preload_n,frf_magnitude_pc_per_n\n1,7\n", "needs frf_phase_deg or frf_phase_rad beside it"),
         ("preload_n,preload_n\n1,7\n", "must name each field once; its header has 'preload_n' twice"),
         (
             "preload_n,frf_pc_per_n\n1,7\n1\n",
@@ -159,6 +161,18 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], says: str) -> 
 )
 def test_bad_csv_is_one_line_and_status_2(text: str, says: str) -> None:
     assert says in refused("d33", *SKIN, "--input", "-", given=text)
+
+
+@pytest.mark.slow
+def test_what_is_read_otherwise_than_headed_or_left_out_is_told() -> None:
+    table = "preload_n,indenter_diameter_mm,frf_pc_per_n\n1,8,7\n\nmeasured by mb, in the cold room\n"
+    found = run("d33", *SKIN[:6], "--input", "-", "--csv", given=table)
+    assert found.stderr.splitlines() == [
+        "underskin: line 4 under the table, 'measured by mb, in the cold room', is left out",
+        "underskin: 'indenter_diameter_mm' is halved",
+    ]
+    (radius,) = next(csv.DictReader(io.StringIO(found.stdout)))["indenter_radius_mm"].split()
+    assert float(radius) == 4
 
 
 @pytest.mark.slow

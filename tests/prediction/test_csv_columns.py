@@ -6,7 +6,7 @@ import openpyxl
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.prediction.csv_columns import from_csv
+from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.recordings.reading import sheet_text
 
 FIELDS = ("preload_n", "frf_pc_per_n")
@@ -40,6 +40,10 @@ def test_points_or_commas_are_the_decimal_mark(text: str) -> None:
         ("preload_n\tfrf_pc_per_n\n1,000\t7.5\n", "1,000 can be 1000 or 1.000: write it without a comma"),
         ('preload_n,frf_pc_per_n\n"1,000",7.5\n', "1,000 can be 1000 or 1.000: write it without a comma"),
         ("preload_n;frf_pc_per_n\n0,5;7\n1.200;7\n", r"preload_n\[1\] = '1.200': must be a number \(line 3\)"),
+        (
+            "preload_n,frf_pc_per_n\n1,x\n2,7\n3,y\n",
+            r"\[0\] = 'x': must be a number \(line 2, and 1 more in this column\)",
+        ),
         ("preload_n;frf_pc_per_n\n0,5;7.5\n", r"frf_pc_per_n\[0\] = '7.5': must be a number \(line 2\)"),
     ],
 )
@@ -56,3 +60,63 @@ def test_a_text_in_a_workbook_that_may_have_its_thousands_apart_is_refused() -> 
     book.save(content)
     with pytest.raises(InvalidInput, match=r"frf_pc_per_n\[1\] = '1,000': .*1,000 can be 1000 or 1.000"):
         numbers(sheet_text(content.getvalue(), "measured.xlsx"))
+
+
+@pytest.mark.parametrize(
+    ("headings", "phase"),
+    [
+        ("frf_magnitude_pc_per_n,frf_phase_deg", "60"),
+        ("frf_magnitude_pc_per_n,FRF phase [rad]", "1.0471975511965976"),
+        ("FRF magnitude [pC/N],Phase [deg]", "60"),
+        ("FRF magnitude [pC/N],phase [°]", "60"),
+        ("frf_magnitude_pc_per_n,frf_phase", "60"),
+    ],
+)
+def test_magnitude_and_phase_are_taken_as_the_real_part(headings: str, phase: str) -> None:
+    found = from_csv(f"preload_n,{headings}\n1,7,{phase}\n".encode(), FIELDS)
+    assert found.fields["frf_pc_per_n"].numbers("frf_pc_per_n") == pytest.approx([3.5])
+    assert found.unknown == {}
+    assert "the real part is taken as frf_pc_per_n" in found.notes[-1]
+    unnamed = from_csv(f"preload_n,{headings}\n1,7,{phase}\n".encode(), ("preload_n",))
+    assert "frf_pc_per_n" not in unnamed.fields
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("frf_magnitude_pc_per_n\n7\n", "needs frf_phase_deg or frf_phase_rad beside it"),
+        ("frf_phase_deg\n7\n", "needs frf_magnitude_pc_per_n beside it"),
+        (
+            "frf_magnitude_pc_per_n,frf_phase\n7,1\n",
+            "may be degrees or radians: call it frf_phase_deg or frf_phase_rad",
+        ),
+        ("frf_magnitude_pc_per_n,frf_phase_deg,frf_pc_per_n\n7,1,7\n", "its header has 'frf_pc_per_n' twice"),
+        ("frf_magnitude_pc_per_n,frf_phase_deg,FRF phase [°]\n7,1,7\n", "its header has 'frf_phase_rad' twice"),
+    ],
+)
+def test_magnitude_and_phase_that_are_not_clear_are_refused(text: str, says: str) -> None:
+    with pytest.raises(CsvError, match=says):
+        from_csv(text.encode(), FIELDS)
+
+
+def test_a_cell_of_a_phase_that_is_no_number_is_told_by_its_heading() -> None:
+    text = b"preload_n,frf_magnitude_pc_per_n,frf_phase_deg\n1,7,x\n"
+    with pytest.raises(InvalidInput, match=r"frf_phase_deg\[0\] = 'x': must be a number \(line 2\)"):
+        from_csv(text, FIELDS).fields["frf_pc_per_n"].numbers("frf_pc_per_n")
+
+
+@pytest.mark.parametrize("note", ["measured by mb", "in the cold room, air conditioning off", "a,b,c,d", "mb,,"])
+def test_words_below_a_blank_line_under_the_table_are_a_note(note: str) -> None:
+    text = "preload_n,frf_pc_per_n\n0.5,1200\n1,7.5\n"
+    assert numbers(f"{text}\n{note}\n") == [[0.5, 1.0], [1200.0, 7.5]]
+    (told,) = from_csv(f"{text}\n{note}\n".encode(), FIELDS).notes
+    assert told.startswith("line 5 under the table, ")
+    for other in (f"{text}{note}\n", f"{text}\n{note}\n2,7\n", f"{text}\n3\n"):
+        with pytest.raises((CsvError, InvalidInput)):
+            numbers(other)
+
+
+def test_a_diameter_is_halved_and_that_is_told() -> None:
+    found = from_csv(b"Indenter diameter [mm]\n8\n", ("indenter_radius_mm",))
+    assert found.fields["indenter_radius_mm"].numbers("indenter_radius_mm") == [4.0]
+    assert found.notes == ["'Indenter diameter [mm]' is halved"]

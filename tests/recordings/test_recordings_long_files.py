@@ -10,7 +10,7 @@ import pytest
 from tests.recordings.contents_of_files import contents
 from tests.recordings.test_recordings_cells import ABOVE, HEADINGS
 from underskin.errors import FileError, InvalidInput
-from underskin.recordings import read_file
+from underskin.recordings import read_file, reading
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers import csv_file, text_blocks
@@ -39,9 +39,9 @@ def template(per_recording: int, *, every_id: bool = False) -> list[str]:
 
 
 def read(lines: list[str], end: str = "\n") -> list[FrfRecording]:
-    reading = read_file(end.join(lines).encode(), "a.csv")
-    assert reading.problems == []
-    return [entry for entry in reading.campaign.recordings if isinstance(entry, FrfRecording)]
+    found = read_file(end.join(lines).encode(), "a.csv")
+    assert found.problems == []
+    return [entry for entry in found.campaign.recordings if isinstance(entry, FrfRecording)]
 
 
 def values_of(recordings: list[FrfRecording]) -> np.ndarray:
@@ -90,8 +90,17 @@ def test_what_is_wrong_in_a_long_template_is_named_by_its_line(change: tuple[str
 def test_an_empty_cell_in_a_long_template_is_refused_with_its_recording() -> None:
     lines = template(300)
     lines[717] = lines[717].rpartition(",")[0] + ","
-    reading = read_file("\n".join(lines).encode(), "a.csv")
-    assert [(problem.recording, problem.field) for problem in reading.problems] == [("r2", "frf_im_pc_per_n[108]")]
+    problems = read_file("\n".join(lines).encode(), "a.csv").problems
+    assert [(problem.recording, problem.field) for problem in problems] == [("r2", "frf_im_pc_per_n[108]")]
+
+
+def test_a_bad_cell_of_a_file_that_is_parsed_apart_is_named_by_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "_LARGEST_TEXT", 1000)
+    lines = template(900)
+    lines[717] = lines[717].rpartition(",")[0] + ",x"
+    (problem,) = read_file("\n".join(lines).encode(), "a.csv").problems
+    assert (problem.field, problem.value) == ("frf_im_pc_per_n[708]", "x")
+    assert problem.allowed == "must be a number (line 718, column 8)"
 
 
 def table(separator: str, decimal: str) -> list[str]:

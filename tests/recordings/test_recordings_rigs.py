@@ -182,3 +182,17 @@ def test_times_that_are_not_evenly_spaced_give_no_sample_rate() -> None:
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: file.stem)
 def test_the_example_rig_descriptions_are_valid(file: Path) -> None:
     assert rig_description.parse(file.read_bytes(), file.name).channels
+
+
+def test_a_channel_may_be_named_without_the_unit_in_brackets_behind_it() -> None:
+    described, rows = parsed(SMALL), "0;0\n100;2.5\n200;2.5"
+    (recording,) = read_file(f"depth [um];load (V)\n{rows}".encode(), "a.csv", described).campaign.recordings
+    assert isinstance(recording, IndentationRecording)
+    assert recording.force_n == pytest.approx([0, 0.25, 0.25])
+    both = rows.replace(";0", ";0;1").replace(";2.5", ";2.5;1")
+    with pytest.raises(
+        FileError, match=r"no part holds .*: load is missing; it has depth \[um\], load \[V\], load \[mV\]"
+    ):
+        read_file(f"depth [um];load [V];load [mV]\n{both}".encode(), "a.csv", described)
+    (exact,) = read_file(f"depth [um];load;load [mV]\n{both}".encode(), "a.csv", described).campaign.recordings
+    assert exact.force_n == pytest.approx([0, 0.25, 0.25])

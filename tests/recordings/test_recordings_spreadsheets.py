@@ -135,11 +135,6 @@ def test_a_force_that_is_no_amplitude_is_not_taken_for_one(heading: str) -> None
     assert "did you mean" not in reason
 
 
-def test_a_note_under_the_table_is_left_out_and_told() -> None:
-    reading = same_as_plain(PLAIN + "\nmeasured by mb\n")
-    assert reading.warnings == ["line 13 under the table, 'measured by mb', is left out"]
-
-
 def test_a_diameter_is_halved_and_that_is_told() -> None:
     for heading in ("indenter_diameter_mm", "Indenter diameter [mm]"):
         reading = same_as_plain(changed("indenter_radius_mm", heading).replace("r1,s01,4,", "r1,s01,8,"))
@@ -150,7 +145,16 @@ def test_a_diameter_is_halved_and_that_is_told() -> None:
     assert "second column of indenter_radius_mm" in both.reason
 
 
-@pytest.mark.parametrize(("heading", "turn"), [("frf_phase_deg", 180 / math.pi), ("Frf phase [rad]", 1.0)])
+@pytest.mark.parametrize(
+    ("heading", "turn"),
+    [
+        ("frf_phase_deg", 180 / math.pi),
+        ("Frf phase [rad]", 1.0),
+        ("Phase [deg]", 180 / math.pi),
+        ("phase [°]", 180 / math.pi),
+        ("Phase (rad)", 1.0),
+    ],
+)
 def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, turn: float) -> None:
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", f"frf_magnitude_pc_per_n,{heading}")
     polar = [cmath.polar(value) for value in (7.1 - 0.5j, 7.2 - 0.6j)]
@@ -159,9 +163,14 @@ def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, tur
     alone = refusal(
         ABOVE + HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,coherence") + ROWS
     )
-    assert "needs frf_phase_rad beside it" in alone.reason
+    assert "needs frf_phase_deg or frf_phase_rad beside it" in alone.reason
     beside = refusal(ABOVE + head.replace("\n", ",frf_re_pc_per_n\n") + f"r1,s01,4,1.0,0.09,10,{rows[0]},7\n")
     assert "stands beside real and imaginary parts" in beside.reason
+
+
+def test_a_phase_without_a_magnitude_is_guessed() -> None:
+    head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "Phase [deg],Size [pC/N]")
+    assert "is it frf_phase_deg, which the table lacks?" in refusal(ABOVE + head + ROWS).reason
 
 
 def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_asked_for() -> None:
@@ -194,6 +203,13 @@ def test_a_cell_that_is_no_number_is_told_with_its_line(old: str, new: str, fiel
     assert problem.allowed == f"must be a number ({place})"
 
 
+def test_of_several_cells_that_are_no_numbers_the_first_is_told_with_the_count() -> None:
+    more = "".join(f",,,,,{line},7.{line},{'x' if line % 2 else -0.5}\n" for line in range(30, 36))
+    (problem,) = read(PLAIN + more).problems
+    assert problem.field == "frf_im_pc_per_n[3]"
+    assert problem.allowed == "must be a number (line 13, column 8, and 2 more in this column)"
+
+
 def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:
     with pytest.raises(InvalidInput, match=r"skin.thickness_mm = 'thin': must be a number \(line 3, column 2\)"):
         read(changed("skin.thickness_mm,2.5", "skin.thickness_mm,thin"))
@@ -215,7 +231,7 @@ def test_local_times_are_read_and_their_zone_told(written: str, time: str, monke
         reading = same_as_plain(text)
         assert only(reading).recorded_at == time + offset
         (warning,) = reading.warnings
-        assert f"in the zone {zone} (UNDERSKIN_TIME_ZONE)" in warning
+        assert warning == f"times such as {written} are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Berlln")
     with pytest.raises(InvalidInput, match="must be a time zone such as Europe/Rome"):
         read(text)

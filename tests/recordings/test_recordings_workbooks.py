@@ -92,6 +92,14 @@ def test_what_is_wrong_on_a_sheet_is_named_as_in_the_csv() -> None:
     assert (error.place, "did you mean preload_n?" in error.reason) == ("sheet 'May', line 9, column 4", True)
 
 
+def test_a_cell_that_is_no_number_is_told_with_its_sheet_and_line() -> None:
+    table = cells(ROWS.replace("7.1", "7x1").replace("7.2", "x"))
+    reading = read_file(workbook({"May": [*cells(ABOVE + HEADINGS), *table]}), "palm.xlsx")
+    (problem,) = reading.problems
+    assert (problem.field, problem.value) == ("frf_re_pc_per_n[0]", "7x1")
+    assert problem.allowed == "must be a number (sheet 'May', line 10, column 7, and 1 more in this column)"
+
+
 def test_the_skin_on_one_sheet_and_the_table_on_the_next_are_one_campaign() -> None:
     table = cells(HEADINGS + ROWS)
     data = workbook({"Skin": cells(ABOVE), "Notes": [["warm day"]], "May": table})

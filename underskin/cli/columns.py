@@ -25,6 +25,7 @@ from underskin.prediction.columns import statuses, to_csv, told
 from underskin.prediction.csv_columns import CsvError, from_csv
 from underskin.prediction.domain_limits import Words
 from underskin.recordings.readers.formats import ZIP
+from underskin.recordings.readers.template_columns import misspelt
 from underskin.recordings.reading import sheet_text
 from underskin.units import LAB, Floats, Mask
 
@@ -106,8 +107,12 @@ def _from_csv(path: str, sheet: str | None, allowed: Sequence[str]) -> tuple[dic
     except CsvError as error:
         raise unreadable("input", path, str(error)) from error
     for name in found.unknown:
-        words = f"has the column {name!r}; allowed, once each: {', '.join(allowed)}"
+        meant = misspelt(name, allowed)
+        guess = f"did you mean {meant}? Allowed" if meant else "allowed"
+        words = f"has the column {name!r}; {guess}, once each: {', '.join(allowed)}"
         raise InvalidInput("input", path, words, code=ErrorCode.UNKNOWN_FIELD)
+    for note in found.notes:
+        sys.stderr.write(f"underskin: {note}\n")
     return {name: np.array(column.numbers(name)) for name, column in found.fields.items()}, found.labels
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.physics import half_space
 from underskin.physics.skin import Indenter, Skin
@@ -18,6 +19,7 @@ from underskin.units import Floats, Mask, checked, finite, non_negative, to_lab,
 
 SigmaModelName = Literal["layer", "half_space"]
 _SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
+_DECLARED = (*_SKIN[:-1], "indenter_radius_mm", "preload_n", "d33_pc_per_n")
 _FRF_UNCERTAINTY = "frf_uncertainty_pc_per_n"
 
 
@@ -110,6 +112,17 @@ def measured(given: Mapping[str, Floats]) -> dict[str, Floats]:
     if _FRF_UNCERTAINTY in given:
         unsure = non_negative(_FRF_UNCERTAINTY, given[_FRF_UNCERTAINTY])
     return {"frf_pc_per_n": finite("frf_pc_per_n", given["frf_pc_per_n"]), _FRF_UNCERTAINTY: unsure}
+
+
+def refused(given: Mapping[str, Floats], units_checked: bool) -> list[InvalidInput]:
+    """What is wrong with each of these columns whose values are declared, in lab units."""
+    found = []
+    for name in (one for one in _DECLARED if one in given):
+        try:
+            checked(name, given[name], units_checked=units_checked)
+        except InvalidInput as error:
+            found.append(error)
+    return found
 
 
 def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:

@@ -3,13 +3,16 @@ template of campaigns are.
 """
 
 import csv
+import math
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from underskin.errors import FileError, wrong_type
-from underskin.recordings.readers import template_columns, text
+from underskin.errors import FileError, InvalidInput, wrong_type
+from underskin.recordings.readers import polar_columns, template_columns, template_lines, text
+from underskin.recordings.readers.polar_columns import MAGNITUDE, PHASE
 
+REAL = "frf_pc_per_n"  # which has no imaginary part
 _SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)
 _LABELS = ("id", "sensor", "name", "recorded_at")  # columns that only say what a row is, in numbers too
 
@@ -31,24 +34,65 @@ class CsvColumn:
 
     def numbers(self, field: str) -> list[float]:
         """Its values in the field's unit; raises InvalidInput that names the field, the row and the line."""
-        return [self._number(field, row, cell) for row, cell in enumerate(self.cells)]
+        values = [_number(cell, self.decimal) for cell in self.cells]
+        if None in values:
+            raise self._refused(field, [row for row, value in enumerate(values) if value is None])
+        return [value * self.factor for value in values if value is not None]
 
-    def _number(self, field: str, row: int, cell: str) -> float:
-        value = _number(cell, self.decimal)
-        if value is not None:
-            return value * self.factor
+    def _refused(self, field: str, rows: Sequence[int]) -> InvalidInput:
+        """Of these rows, which hold no number, the first, and how many more there are."""
+        cell = self.cells[rows[0]]
+        more = f", and {len(rows) - 1} more in this column" if len(rows) > 1 else ""
         hint = f"; {cell} {text.ungrouped(cell)}" if text.is_grouped(cell) else ""
-        raise wrong_type(field, cell, f"must be a number (line {self.lines[row]}){hint}", row)
+        return wrong_type(field, cell, f"must be a number (line {self.lines[rows[0]]}{more}){hint}", rows[0])
+
+
+@dataclass(frozen=True)
+class RealPart:
+    """The real part of an FRF in columns of its magnitude [pC/N] and its phase [rad]."""
+
+    magnitude: CsvColumn
+    phase: CsvColumn
+
+    @property
+    def heading(self) -> str:
+        """Both headings as written."""
+        return f"{self.magnitude.heading}, {self.phase.heading}"
+
+    @property
+    def cells(self) -> Sequence[str]:
+        """Those of the magnitude."""
+        return self.magnitude.cells
+
+    def numbers(self, _field: str) -> list[float]:
+        """Its values in pC/N; raises InvalidInput that names magnitude or phase, the row and the line."""
+        polar = zip(self.magnitude.numbers(MAGNITUDE), self.phase.numbers(self.phase.heading), strict=True)
+        return [size * math.cos(angle) for size, angle in polar]
 
 
 @dataclass(frozen=True)
 class CsvColumns:
     """The columns by field; the cells of `unknown` ones, which hold numbers and name no field, and of `labels`, which
-    only say what a row is, by heading."""
+    only say what a row is, by heading; and in `notes` what was left out or read otherwise than its heading says."""
 
-    fields: dict[str, CsvColumn]
+    fields: dict[str, CsvColumn | RealPart]
     unknown: dict[str, list[str]]
     labels: dict[str, list[str]]
+    notes: list[str]
+
+
+@dataclass(frozen=True)
+class _Table:
+    """The header, the rows with as many cells, their lines, and the separator; `notes` are the lines left out."""
+
+    header: list[str]
+    rows: list[list[str]]
+    lines: list[int]
+    separator: str
+    notes: list[str]
+
+    def columns(self) -> list[list[str]]:
+        return [[row[place] for row in self.rows] for place in range(len(self.header))]
 
 
 def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
@@ -56,40 +100,72 @@ def from_csv(data: bytes, known: Collection[str]) -> CsvColumns:
 
     The text is UTF-8, UTF-16 or Latin-1. Cells are separated by commas, or by semicolons or tabs where the header is;
     all numbers have the decimal mark that `text.decimal_mark` finds. Headings are read in capitals or not, with units
-    in brackets or in the name. A first line `sep=;`, lines that begin with # and lines without a cell say nothing, and
-    neither does a column without a heading that is empty or counts the rows.
+    in brackets or in the name; magnitude and phase of an FRF are its real part, `frf_pc_per_n`, where that is known. A
+    first line `sep=;`, lines that begin with # and lines without a cell say nothing, and neither does a column without
+    a heading that is empty or counts the rows. Words below a blank line under the table are a note.
 
     Raises:
         CsvError: the text is no CSV, a field comes twice, or a row has too many or too few cells.
     """
-    header, rows, lines, separator = _table(data)
-    fields: dict[str, CsvColumn] = {}
-    unknown: dict[str, list[str]] = {}
-    labels: dict[str, list[str]] = {}
-    columns = [[row[place] for row in rows] for place in range(len(header))]
-    values = [cells for heading, cells in zip(header, columns, strict=True) if not _is_named_label(heading)]
-    decimal = text.decimal_mark(lambda _: values, separator)
-    for place, (heading, cells) in enumerate(zip(header, columns, strict=True)):
-        meant = template_columns.field_of(heading, known)
-        if meant is not None and meant[0] in known:
+    table = _table(data)
+    found = CsvColumns({}, {}, {}, table.notes)
+    columns = table.columns()
+    values = [cells for heading, cells in zip(table.header, columns, strict=True) if not _is_named_label(heading)]
+    decimal = text.decimal_mark(lambda _: values, table.separator)
+    polar = (MAGNITUDE, PHASE) if REAL in known else ()
+    parts: dict[str, CsvColumn] = {}
+    meanings = template_columns.fields_of(table.header, known)
+    for place, (heading, cells, meant) in enumerate(zip(table.header, columns, meanings, strict=True)):
+        if meant is None and polar and polar_columns.is_phase_alone(heading):
+            meant = PHASE, _angle(heading, cells, decimal, found.notes)
+        if meant is not None and meant[0] in (*known, *polar):
             field, factor = meant
-            if field in fields:
-                twice = f"{fields[field].heading!r} and {heading!r} are the same"
-                raise CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
-            fields[field] = CsvColumn(heading, cells, lines, factor, decimal)
+            if field in (fields := parts if field in polar else found.fields):
+                raise _twice(field, fields[field].heading, heading)
+            fields[field] = CsvColumn(heading, cells, table.lines, factor, decimal)
         elif _only_counts(place, heading, cells):
             continue
         elif _is_label(heading, cells, decimal):
-            if heading in labels:
+            if heading in found.labels:
                 raise CsvError(f"must name each column once; its header has {heading!r} twice")
-            labels[heading] = cells
+            found.labels[heading] = cells
         else:
-            unknown[heading] = cells
-    return CsvColumns(fields, unknown, labels)
+            found.unknown[heading] = cells
+    found.notes.extend(template_columns.halved(column.heading for column in found.fields.values()))
+    if parts:
+        real = _real_part(parts)
+        if REAL in found.fields:
+            raise _twice(REAL, found.fields[REAL].heading, real.heading)
+        found.fields[REAL] = real
+        found.notes.append(f"{real.heading}: the real part is taken as {REAL}")
+    return found
 
 
-def _table(data: bytes) -> tuple[list[str], list[list[str]], list[int], str]:
-    """The header, the rows with as many cells, their lines, and the separator."""
+def _twice(field: str, one: str, other: str) -> CsvError:
+    twice = f"{one!r} and {other!r} are the same"
+    return CsvError(f"must name each field once; its header has {field!r} twice: {twice}")
+
+
+def _angle(heading: str, cells: Sequence[str], decimal: str, notes: list[str]) -> float:
+    """The factor to rad of a phase without a unit, by its values; a note says so."""
+    numbers = [abs(number) for cell in cells if (number := _number(cell, decimal)) is not None]
+    try:
+        factor = polar_columns.angle_by_values(heading, max(numbers, default=0.0))
+    except ValueError as error:
+        raise CsvError(f"has a phase that is not clear: {error}") from None
+    notes.append(f"{heading!r} {template_columns.READ_AS_DEGREES}")
+    return factor
+
+
+def _real_part(parts: Mapping[str, CsvColumn]) -> RealPart:
+    """Of magnitude and phase; raises CsvError where one is missing."""
+    if len(parts) == 1:
+        ((field, column),) = parts.items()
+        raise CsvError(f"must have magnitude and phase of an FRF: {column.heading!r} {polar_columns.lacking(field)}")
+    return RealPart(parts[MAGNITUDE], parts[PHASE])
+
+
+def _table(data: bytes) -> _Table:
     try:
         content = text.decode(data, "the text")
     except FileError as error:
@@ -110,14 +186,26 @@ def _table(data: bytes) -> tuple[list[str], list[list[str]], list[int], str]:
                 lines.append(numbered[reader.line_num - 1][0])
     except csv.Error as error:
         raise CsvError(f"must be readable as CSV ({error})") from error
+    header = _without_empty_end(table[0], 1) if table else []
+    notes = _notes_under(table, lines) if len(header) > 1 else []
     if len(table) < 2:
         raise CsvError("must have a header of field names and at least one row")
-    header = _without_empty_end(table[0], 1)
     for row, line in zip(table[1:], lines[1:], strict=True):
         if len(_without_empty_end(row, len(header))) != len(header):
             raise CsvError(f"must have as many cells in each row as in the header: {len(row)} on line {line}, "
                            f"{len(header)} in the header")  # fmt: skip
-    return header, table[1:], lines[1:], separator
+    return _Table(header, table[1:], lines[1:], separator, notes)
+
+
+def _notes_under(table: list[list[str]], lines: list[int]) -> list[str]:
+    """Takes the rows of words below a blank line under a table off it: what they say, in words."""
+    end = len(table)
+    while end > 2 and template_lines.is_note(table[end - 1]):
+        end -= 1
+    start = next((row for row in range(end, len(table)) if lines[row] > lines[row - 1] + 1), len(table))
+    notes = [template_lines.note_told(line, row) for line, row in zip(lines[start:], table[start:], strict=True)]
+    del table[start:], lines[start:]
+    return notes
 
 
 def _without_empty_end(cells: list[str], least: int) -> list[str]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.recordings.readers.unit_labels import in_brackets
 from underskin.units import Floats
 
 Values = Floats | NDArray[np.complex128]
@@ -37,6 +38,11 @@ class Block:
     def channel(self, name: str) -> Channel | None:
         """The channel of that name, or None."""
         return next((channel for channel in self.channels if channel.name == name), None)
+
+    def headed(self, name: str) -> Channel | None:
+        """The channel of that name, or the only one whose heading is it with a unit in brackets: `Piezo [V]`."""
+        named = [one for one in self.channels if (in_brackets(one.name) or ("",))[0] == name]
+        return self.channel(name) or (named[0] if len(named) == 1 else None)
 
 
 @dataclass(frozen=True, eq=False)

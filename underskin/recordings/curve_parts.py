@@ -31,7 +31,7 @@ def _parts(block: Block, curves: str | CurveChannel | None, file: str) -> list[B
     if isinstance(curves, str):
         return list(_cut(block, block.group_starts or (0,), []))
     name = curves.channel or curves.segments or ""
-    channel = block.channel(name)
+    channel = block.headed(name)
     assert channel is not None
     values = channel.values.real
     changed = np.diff(values) < 0 if curves.channel is None else np.diff(values) != 0

@@ -95,7 +95,7 @@ class MappedBlock:
 
     def _signal(self, field: str, mapping: SignalMapping) -> tuple[Values, str]:
         """A channel's values in the unit of a field, and in words what was taken."""
-        channel = self.block.channel(mapping.channel)
+        channel = self.block.headed(mapping.channel)
         assert channel is not None
         place = f"channel {channel.name!r}"
         if len(channel.values) == 0:
@@ -114,9 +114,9 @@ class MappedBlock:
     def _automatic_sign(self, mapping: SignalMapping) -> int:
         """-1 where a channel falls as the curve is pressed: told from the channels as they came, so that a travel less
         a deflection has both right."""
-        travel = self.block.channel(self.rig.channels["displacement_mm"].channel)
+        travel = self.block.headed(self.rig.channels["displacement_mm"].channel)
         is_travel = mapping is self.rig.channels["displacement_mm"]
-        force = self.block.channel((self.rig.channels["force_n"] if is_travel else mapping).channel)
+        force = self.block.headed((self.rig.channels["force_n"] if is_travel else mapping).channel)
         assert travel is not None
         assert force is not None
         falls = falling(force.values.real, travel.values.real, sphere=self.rig.kind == "indentation")

@@ -14,6 +14,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording, Recording, Rec
 from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.readers import formats, template_columns
+from underskin.recordings.readers.polar_columns import MAGNITUDE, PARTS
 from underskin.recordings.readers.sandbox import call_apart, parse_apart
 from underskin.recordings.rig_description import RigDescription
 
@@ -85,8 +86,8 @@ def understood(contents: Contents | Document, name: str, rig: RigDescription | N
 def _holds_frfs(contents: Contents) -> bool:
     """Whether a channel is headed as the FRF of the CSV template is."""
     names = {channel.name for block in contents.blocks for channel in block.channels}
-    meant = [template_columns.field_of(one, template_columns.PARTS) for one in names]
-    return any(one is not None and one[0] in (template_columns.MAGNITUDE, *template_columns.PARTS) for one in meant)
+    meant = [template_columns.field_of(one, PARTS) for one in names]
+    return any(one is not None and one[0] in (MAGNITUDE, *PARTS) for one in meant)
 
 
 def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:

@@ -60,11 +60,11 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
 def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[Block]:
     """The blocks that hold every channel that the rig names."""
     names = _channel_names(rig)
-    blocks = [block for block in contents.blocks if all(block.channel(name) for name in names)]
+    blocks = [block for block in contents.blocks if all(block.headed(name) for name in names)]
     if blocks:
         return blocks
-    nearest = max(contents.blocks, key=lambda block: sum(map(bool, map(block.channel, names))), default=Block("", ()))
-    missing = ", ".join(name for name in names if not nearest.channel(name))
+    nearest = max(contents.blocks, key=lambda block: sum(map(bool, map(block.headed, names))), default=Block("", ()))
+    missing = ", ".join(name for name in names if not nearest.headed(name))
     raise FileError(
         file, "", f"no part holds all of the rig's channels: {missing} is missing; it has {contents.described()}"
     )

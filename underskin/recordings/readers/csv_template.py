@@ -10,7 +10,7 @@
     ,,,20,7.2,-0.6
 
 Separator, decimal mark and units are the file's own: `;` and `,` work, `preload [mN]` is converted. A first line
-`sep=;` and lines that begin with `#` say nothing; a line of one cell, below a blank one under the table, is a note. A
+`sep=;` and lines that begin with `#` say nothing; a line of words, below a blank one under the table, is a note. A
 cell in quotes may hold the separator. An empty cell under a quantity that a recording has once repeats the one above;
 an empty `id` continues the recording, and so does its own id where every row has it. A column `conditions.NAME` holds
 whatever else the lab noted. A cell too many, a field that comes again and a recording that begins twice are refused.
@@ -43,7 +43,6 @@ _SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) i
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(POSITION)) - {"conditions"}
 _ID = "id"
 _MOST_ABOVE = 10_000  # lines
-_NO_ZONE = "times such as 24.12.2025 09:30 are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)"
 _FLAGS = {"true": True, "false": False}
 
 
@@ -57,13 +56,16 @@ def has_table(content: str) -> bool:
     return any(_begins_table(line.split("\t")) for line in content.splitlines())
 
 
-def read(stream: BinaryIO, file: str) -> Document:
-    """The campaign document of a filled-in template; raises FileError that names the line."""
+def read(stream: BinaryIO, file: str, sheet: str = "") -> Document:
+    """The campaign document of a filled-in template; raises FileError that names the line.
+
+    `sheet`: where in a workbook the text stands, in words, for cells that are no number.
+    """
     source = BlockText(stream, file)
     separator = template_lines.separator_of(next(source.blocks()))
     if separator is None:
         raise FileError(file, "line 1", f"must be schema,{SCHEMA}")
-    template = _Template(file, TemplateLines(source, separator, file))
+    template = _Template(file, TemplateLines(source, separator, file), sheet)
     return Document(template.document(), tuple(template.warnings))
 
 
@@ -74,14 +76,16 @@ def _begins_table(row: Sequence[str]) -> bool:
 
 
 class _Template:
-    def __init__(self, file: str, lines: TemplateLines) -> None:
+    def __init__(self, file: str, lines: TemplateLines, sheet: str) -> None:
         self.file = file
+        self.sheet = sheet
         self.lines = lines
         self.separator = lines.separator
         self.decimal = text.decimal_mark(lines.holding, lines.separator)
         self.rows = self._to_the_headings()
         self.stated: dict[str, int] = {}  # where the fields above the table stand
         self.warnings: list[str] = []
+        self.has_local_times = False
 
     def _to_the_headings(self) -> list[list[str]]:
         """The rows above the table, and last the headings."""
@@ -153,10 +157,10 @@ class _Template:
         return recordings.documents()
 
     def _end(self) -> int:
-        """The row behind the last of the table; single cells below a blank line under it are notes."""
+        """The row behind the last of the table; words under it are notes, single ones below a blank line."""
         start = len(self.rows)
         end = start
-        under: list[list[str]] = []  # the rows behind the last that has several cells
+        under: list[list[str]] = []  # the rows behind the last that has numbers
         for first, lines in self.lines.blocks(start):
             last = next(
                 (place for place in reversed(range(len(lines))) if self._is_full(first + place, lines[place])), None
@@ -165,18 +169,30 @@ class _Template:
                 end, under = first + last + 1, []
             rest = enumerate(lines[0 if last is None else last + 1 :], start=first if last is None else end)
             under += [self.lines.cells(index, line) for index, line in rest]
-        single = sum(1 for _ in takewhile(any, under))
-        notes = [(index, row[0]) for index, row in enumerate(under[single:], start=end + single) if row[0]]
-        self.warnings += [f"line {index + 1} under the table, {note!r}, is left out" for index, note in notes]
-        return end + single
+        cut = sum(1 for _ in takewhile(self._may_be_cut, under))
+        notes = [(index, row) for index, row in enumerate(under[cut:], start=end + cut) if row[0]]
+        self.warnings += [template_lines.note_told(index + 1, row) for index, row in notes]
+        return end + cut
 
     def _is_full(self, index: int, line: str) -> bool:
-        """Whether a line has anything behind its first cell; one whose quotes do not close is refused when its turn
-        comes."""
+        """Whether a line has more than words; one whose quotes do not close is refused when its turn comes."""
+        if self.separator not in line:
+            return False
         try:
-            return self.separator in line and any(self.lines.cells(index, line)[1:])
+            cells = self.lines.cells(index, line)
         except FileError:
             return True
+        return any(cells[1:]) and not template_lines.is_note(cells)
+
+    def _may_be_cut(self, row: Sequence[str]) -> bool:
+        """Whether words directly under the rows may begin a recording whose numbers are missing: no cell names a sensor
+        or a kind that there is none of."""
+        known = {"sensor": self._sensors(), "kind": set(KINDS)}
+        names = [(known.get(heading.lower()), cell) for heading, cell in zip(self.rows[-1], row, strict=False)]
+        return any(row) and all(not cell or not those or cell in those for those, cell in names)
+
+    def _sensors(self) -> set[str]:
+        return {row[1] for row in self.rows[:-1] if row[0].lower() == "sensor" and len(row) > 1}
 
     def _columns(self, start: int, end: int) -> list[Column]:
         """The field of each column and the factor to its unit, each field once."""
@@ -190,8 +206,7 @@ class _Template:
         except NoField as error:
             raise self.error(start - 1, str(error), error.place) from None
         self.warnings += left_out
-        halved = [column.heading for column in columns if column.heading.lower().startswith("indenter")]
-        self.warnings += [f"{heading!r} is halved" for heading in halved if "diameter" in heading.lower()]
+        self.warnings += template_columns.halved(column.heading for column in columns)
         return columns
 
     def _field(self, name: str, index: int) -> tuple[str, float]:
@@ -219,7 +234,7 @@ class _Template:
             return number * factor
         if text.is_grouped(cell):
             raise self.error(place[0], f"{field} = {cell!r} {text.ungrouped(cell)}", place[1])
-        return CellText(cell, f"line {place[0] + 1}, column {place[1] + 1}")
+        return CellText(cell, f"{self.sheet and f'{self.sheet}, '}line {place[0] + 1}, column {place[1] + 1}")
 
     def _time(self, cell: str, place: tuple[int, int]) -> str:
         zone = time_zone()
@@ -227,8 +242,9 @@ class _Template:
             time = iso_time(cell, zone)
         except ValueError as error:
             raise self.error(place[0], f"recorded_at = {cell!r} {error}", place[1]) from None
-        if time != cell and (said := _NO_ZONE.format(zone=zone)) not in self.warnings:
-            self.warnings.append(said)
+        if time != cell and not self.has_local_times:
+            self.has_local_times = True
+            self.warnings.append(f"times such as {cell} are taken to be in the zone {zone} (UNDERSKIN_TIME_ZONE)")
         return time
 
     def error(self, index: int, reason: str, column: int | None = None) -> FileError:

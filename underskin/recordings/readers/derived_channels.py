@@ -10,7 +10,7 @@ from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers import channel_arithmetic, text
 from underskin.recordings.readers.channel_arithmetic import Formula, Quantity, in_unit
 from underskin.recordings.readers.dimensions import described, exponents, label_of
-from underskin.recordings.readers.unit_labels import in_brackets, labelled_unit, unit
+from underskin.recordings.readers.unit_labels import labelled_unit, unit
 from underskin.recordings.shown_values import LONGEST_NAME
 
 Stated = Mapping[str, str | float]
@@ -92,12 +92,9 @@ class _Derivation:
         return in_unit(number, self._unit(name, labelled_unit(name), stated_unit))
 
     def _channel(self, name: str) -> Channel | None:
-        """The channel of that name, or the only one whose heading is it with a unit in brackets: `Piezo [V]`."""
-        channel = self.block.channel(name)
-        if channel is not None or name in self.stated or name in self._constants:
-            return channel
-        headed = [one for one in self.block.channels if (in_brackets(one.name) or ("",))[0] == name]
-        return headed[0] if len(headed) == 1 else None
+        """The channel of that name; one whose heading has a unit behind it only where nothing else is called so."""
+        stated = name in self.stated or name in self._constants
+        return self.block.channel(name) if stated else self.block.headed(name)
 
     def _unit(self, name: str, label: str, stated: str | None) -> str:
         """The unit in brackets, else the label; where they differ that in brackets counts, of the same dimension."""

@@ -24,12 +24,13 @@ from underskin.recordings.channels import Block, Channel, Contents, Document
 from underskin.recordings.readers import parsing_limits
 from underskin.recordings.readers.formats import parse
 from underskin.recordings.readers.parsing_limits import ParsingLimits
-from underskin.recordings.shown_values import shown
+from underskin.recordings.shown_values import CellText, shown
 from underskin.recordings.time_zone import TIME_ZONE
 
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", TIME_ZONE, parsing_limits.EXPANSION)
 _LAST_WORDS = 500
 _WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to refuse a file
+_CELL = 2  # entries of a cell in an answer: its text and its place
 _LENGTH = struct.Struct("<Q")
 
 
@@ -102,13 +103,15 @@ def _understood(answer: BinaryIO, file: str) -> dict[str, Any]:
 
 
 def _with_arrays(contents: Any, mark: str, answer: BinaryIO, behind: int) -> Any:
-    """What was answered, with the array that each {mark: [type, start, count]} stands for; the first one begins
-    `behind` the header."""
+    """What was answered, with the array that each {mark: [type, start, count]} stands for, the first of them beginning
+    `behind` the header, and the cell of each {mark: [text, place]}."""
     if isinstance(contents, list):
         return [_with_arrays(entry, mark, answer, behind) for entry in contents]
     if not isinstance(contents, dict):
         return contents
     if contents.keys() == {mark}:
+        if len(contents[mark]) == _CELL:
+            return CellText(*contents[mark])
         kind, start, count = contents[mark]
         answer.seek(behind + start)
         return np.fromfile(answer, dtype=kind, count=count)
@@ -153,6 +156,17 @@ def _encoded(answer: dict[str, Any]) -> list[Any]:
 
     def plain(value: Any) -> Any:
         nonlocal position
+        match value:  # classes of their own, such as NumPy's texts, come here too
+            case CellText():
+                return {mark: [str(value), value.place]}
+            case str():
+                return str(value)
+            case int():
+                return int(value)
+            case list():
+                return list(value)
+            case dict():
+                return dict(value)
         if not isinstance(value, np.ndarray) or value.dtype.kind not in "iufc" or value.ndim != 1:
             return shown(value)
         array = np.ascontiguousarray(value)
@@ -160,7 +174,7 @@ def _encoded(answer: dict[str, Any]) -> list[Any]:
         start, position = position, position + array.nbytes
         return {mark: [array.dtype.str, start, array.size]}
 
-    header = orjson.dumps({"mark": mark, "answer": answer}, default=plain)
+    header = orjson.dumps({"mark": mark, "answer": answer}, default=plain, option=orjson.OPT_PASSTHROUGH_SUBCLASS)
     return [_LENGTH.pack(len(header)), header, *arrays]
 
 

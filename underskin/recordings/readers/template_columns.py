@@ -5,24 +5,19 @@ date and a time of day are `recorded_at`. A column without a heading that only c
 it, or is empty, and a column of words that names no field, are left out.
 """
 
-import cmath
-import math
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any
 
-from underskin.recordings.readers import text
-from underskin.recordings.readers.unit_labels import in_brackets, lab_field, unit
+from underskin.recordings.readers import polar_columns, text
+from underskin.recordings.readers.polar_columns import IN_DEGREES, MAGNITUDE, PARTS, PHASE, Meaning
+from underskin.recordings.readers.unit_labels import in_brackets, lab_field
 
 FURTHER = "conditions."  # what else the lab noted, a column each
-MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_rad"
 DATE, CLOCK = "date", "time of day"
 _DATED = {"date": DATE, "datum": DATE, "time": CLOCK, "uhrzeit": CLOCK}
-PARTS = ("frf_re_pc_per_n", "frf_im_pc_per_n")
-_ANGLES = {"rad": 1.0, "deg": math.pi / 180, "°": math.pi / 180}
-_PHASE_ALONE, _TURN = "frf_phase", 2 * math.pi
+READ_AS_DEGREES = "is read as degrees: it has values beyond 2π"
 NO_NAME = ("", "unnamed: 0")  # the second by pandas
 _ALIKE = 0.8  # of a heading and a field, from which on the one may be meant for the other
 # What each FRF needs, without the unit, by its field
@@ -33,7 +28,6 @@ _NEEDED = {
     "frequency_hz": "frequency",
     MAGNITUDE: "frf_magnitude",
 }
-_Meaning = tuple[str, float] | None  # a field, and the factor to its unit
 _NO_AMPLITUDE = re.compile(r"\b(p[- ]?p|pk[- ]?pk|peak.to.peak|rms)\b")
 
 
@@ -96,7 +90,7 @@ def columns(
     """
     found: dict[str, Column] = {}
     left_out: list[str] = []
-    meanings = [field_of(heading, known) for heading in headings]
+    meanings = fields_of(headings, known)
     if not any(meant is not None and meant[0] == "recorded_at" for meant in meanings):
         meanings = _dated(headings, meanings)
     present = {meant[0] for meant in meanings if meant is not None}
@@ -106,11 +100,14 @@ def columns(
             if cell:
                 column.see(cell, decimal)
     for place, (heading, meant) in enumerate(zip(headings, meanings, strict=True)):
-        if meant is None and heading.strip().lower().replace(" ", "_") == _PHASE_ALONE:
-            meant = PHASE, _angle_of(place, heading, others[place])
-            left_out.append(f"{heading!r} is read as degrees: it has values beyond 2π")
+        if meant is None and polar_columns.is_phase_alone(heading):
+            try:
+                meant = PHASE, polar_columns.angle_by_values(heading, others[place].largest)
+            except ValueError as error:
+                raise NoField(place, str(error)) from None
+            left_out.append(f"{heading!r} {READ_AS_DEGREES}")
         if meant is None:
-            left_out += _without(place, heading, others[place], [*known, MAGNITUDE, PHASE], present)
+            left_out += _without(place, heading, others[place], known, present)
             continue
         field, factor = meant
         if field in found:
@@ -120,27 +117,38 @@ def columns(
     return list(found.values()), left_out
 
 
-def field_of(heading: str, known: Collection[str]) -> _Meaning:
+def fields_of(headings: Sequence[str], known: Collection[str]) -> list[Meaning]:
+    """The field of each heading and the factor to its unit; of a phase also by the magnitude beside it."""
+    return polar_columns.with_short_phase(headings, [field_of(heading, known) for heading in headings])
+
+
+def field_of(heading: str, known: Collection[str]) -> Meaning:
     """The field of a heading and the factor to its unit; None where it names none."""
     heading = heading.strip()
     if heading.lower().startswith(FURTHER):
         return FURTHER + heading[len(FURTHER) :], 1.0
     lower = heading.lower()
-    if (whole := lower.replace(" ", "_")) in known or whole == MAGNITUDE:
+    if (whole := lower.replace(" ", "_")) in known:
         return whole, 1.0
-    if lower in ("frf_phase_deg", PHASE):
-        return PHASE, _ANGLES[lower.rpartition("_")[2]]
-    bracketed = in_brackets(heading)
-    if bracketed is not None:
-        name, given = bracketed[0].lower().replace(" ", "_"), unit(bracketed[1])
-        if name == "frf_phase" and bracketed[1] in _ANGLES:
-            return PHASE, _ANGLES[bracketed[1]]
-        if name == "frf_magnitude" and given is not None and given.dimension == "charge/force":
-            return MAGNITUDE, given.to_si / 1e-12
-    return lab_field(heading) or lab_field(lower)
+    return polar_columns.field_of(heading) or lab_field(heading) or lab_field(lower)
 
 
-def _dated(headings: Sequence[str], meanings: Sequence[_Meaning]) -> list[_Meaning]:
+def misspelt(heading: str, fields: Iterable[str]) -> str | None:
+    """The field that a heading which names none is nearly the name of."""
+    alike = get_close_matches(_plain(heading), list(fields), 1, _ALIKE)
+    return alike[0] if alike else None
+
+
+def halved(headings: Iterable[str]) -> list[str]:
+    """That diameters among the headings of fields are halved, in words."""
+    return [f"{heading!r} is halved" for heading in headings if _plain(heading).startswith("indenter_diameter")]
+
+
+def _plain(heading: str) -> str:
+    return heading.strip().lower().replace(" ", "_")
+
+
+def _dated(headings: Sequence[str], meanings: Sequence[Meaning]) -> list[Meaning]:
     """The meanings, those of a date and of the time of day beside it too; without a date, a time is none of the day."""
     dated = [_DATED.get(heading.strip().lower()) for heading in headings]
     if DATE not in dated:
@@ -154,16 +162,9 @@ def in_small_letters(name: str) -> str:
     return name[:bracket].lower() + name[bracket:]
 
 
-def _angle_of(place: int, heading: str, column: _Nameless) -> float:
-    """The factor to rad of a phase whose unit its heading does not say, by its values; raises NoField where they may be
-    either."""
-    if column.largest > _TURN:
-        return _ANGLES["deg"]
-    names = " or ".join(f"{_PHASE_ALONE}_{angle}" for angle in ("deg", "rad"))
-    raise NoField(place, f"{heading!r} has no unit, and its values may be degrees or radians: call it {names}")
-
-
-def _without(place: int, heading: str, column: _Nameless, fields: Sequence[str], present: Collection[str]) -> list[str]:
+def _without(
+    place: int, heading: str, column: _Nameless, known: Collection[str], present: Collection[str]
+) -> list[str]:
     """That a column which names none of the fields is left out, in words, if it matters; raises NoField where that
     loses something. `present` are the fields of the other columns."""
     if heading.strip().lower() in NO_NAME:
@@ -174,9 +175,8 @@ def _without(place: int, heading: str, column: _Nameless, fields: Sequence[str],
     words = heading.lower().replace("_", " ")
     if "force" in words and _NO_AMPLITUDE.search(words):
         raise NoField(place, f"{none}; dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms")
-    alike = get_close_matches(heading.strip().lower().replace(" ", "_"), fields, 1, _ALIKE)
-    if alike:
-        raise NoField(place, f"{none}; did you mean {alike[0]}?")
+    if alike := misspelt(heading, [*known, MAGNITUDE, PHASE, IN_DEGREES]):
+        raise NoField(place, f"{none}; did you mean {alike}?")
     keep = f"{FURTHER}NAME keeps a column of anything else"
     if column.has_numbers:
         lacking = _lacking(heading, present)
@@ -194,6 +194,9 @@ def _lacking(heading: str, present: Collection[str]) -> list[str]:
     labelled = in_brackets(heading)
     if labelled is None or "displacement_mm" in present:
         return []
+    phase = polar_columns.phase_in(labelled[1])
+    if phase and not {PHASE, PARTS[1]} & {*present}:
+        return [phase]
     has = {*present, *([MAGNITUDE] if PARTS[0] in present else [])}
     return [
         field
@@ -206,21 +209,6 @@ def _require_whole(found: dict[str, Column]) -> None:
     """That a magnitude has its phase, and that no parts stand beside them."""
     given = [found[name] for name in (MAGNITUDE, PHASE) if name in found]
     if len(given) == 1:
-        other = PHASE if given[0].field == MAGNITUDE else MAGNITUDE
-        raise NoField(given[0].place, f"{given[0].heading!r} needs {other} beside it")
+        raise NoField(given[0].place, f"{given[0].heading!r} {polar_columns.lacking(given[0].field)}")
     if given and any(part in found for part in PARTS):
         raise NoField(given[0].place, f"{given[0].heading!r} stands beside real and imaginary parts: leave out either")
-
-
-def with_parts(line: dict[str, Any]) -> dict[str, Any]:
-    """The values of a row, real and imaginary part in place of magnitude and phase."""
-    if MAGNITUDE not in line:
-        return line
-    others = {field: value for field, value in line.items() if field not in (MAGNITUDE, PHASE)}
-    magnitude, phase = line[MAGNITUDE], line[PHASE]
-    if magnitude is None and phase is None:
-        return {**others, **dict.fromkeys(PARTS)}
-    if not isinstance(magnitude, float) or not isinstance(phase, float):
-        return {**others, PARTS[0]: magnitude, PARTS[1]: phase}  # for the campaign's checks to refuse
-    value = cmath.rect(magnitude, phase)
-    return {**others, PARTS[0]: value.real, PARTS[1]: value.imag}

@@ -33,6 +33,20 @@ def _says_nothing(line: str) -> bool:
     return not bare or bare.startswith("#") or _TO_SPREADSHEETS.fullmatch(bare) is not None
 
 
+def is_note(row: Sequence[str]) -> bool:
+    """Whether a row may be a note: it begins with its first cell, and none holds a number."""
+    return bool(row[0]) and not any(text.is_grouped(cell) or _is_number(cell) for cell in row)
+
+
+def note_told(number: int, row: Sequence[str]) -> str:
+    """That a note on a line, counted from 1, is left out, in words."""
+    return f"line {number} under the table, {', '.join(filter(None, row))!r}, is left out"
+
+
+def _is_number(cell: str) -> bool:
+    return any(text.number(cell, mark) is not None for mark in ".,")
+
+
 class TemplateLines:
     """The lines, and the cells of each; a line that says nothing has one empty cell."""
 
@@ -54,7 +68,7 @@ class TemplateLines:
                 raise FileError(self._file, f"line {index + 1}", str(error)) from None
             cells = [""]
         # An id may begin with #, as numbers of presses do: then numbers follow it.
-        counts = any(text.number(cell, mark) is not None for cell in cells[1:] for mark in ".,")
+        counts = any(map(_is_number, cells[1:]))
         return cells if counts or not _says_nothing(line) else [""]
 
     def holding(self, mark: str) -> Iterator[list[str]]:

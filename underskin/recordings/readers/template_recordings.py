@@ -9,11 +9,13 @@ import numpy as np
 
 from underskin.errors import FileError
 from underskin.recordings.campaign import COLUMNS
-from underskin.recordings.readers import template_columns
+from underskin.recordings.readers import polar_columns
 from underskin.recordings.readers.calendar_times import of_two_cells
 from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
-from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, MAGNITUDE, PARTS, PHASE, Column
+from underskin.recordings.readers.polar_columns import MAGNITUDE, PARTS, PHASE
+from underskin.recordings.readers.template_columns import CLOCK, DATE, FURTHER, Column
 from underskin.recordings.readers.template_lines import TemplateLines
+from underskin.recordings.shown_values import CellText
 from underskin.units import Floats
 
 POSITION = ("position_x_mm", "position_y_mm")
@@ -120,7 +122,7 @@ class TemplateRecordings:
             one.field: self._reader.value(one.field, cells.get(one.place, ""), (index, one.place), one.factor)
             for one in self._columns
         }
-        return template_columns.with_parts(values)
+        return polar_columns.with_parts(values)
 
     def _take_run(self, own: str, index: int, rows: PlainRows, run: slice) -> bool:
         """Take rows of one id at once; False where single rows must tell what they are."""
@@ -233,7 +235,16 @@ def _joined(parts: Sequence[Floats | list[Any]]) -> Floats | list[Any]:
     """An array where some parts are, and the others hold numbers alone; else a list."""
     if any(isinstance(part, np.ndarray) for part in parts) and not any(map(_is_other, parts)):
         return np.concatenate(parts)
-    return [entry for part in parts for entry in (part.tolist() if isinstance(part, np.ndarray) else part)]
+    return _counted([entry for part in parts for entry in (part.tolist() if isinstance(part, np.ndarray) else part)])
+
+
+def _counted(entries: list[Any]) -> list[Any]:
+    """The entries of a column, of which the first that is no number says how many more there are."""
+    wrong = [place for place, entry in enumerate(entries) if isinstance(entry, CellText)]
+    if len(wrong) > 1:
+        first = entries[wrong[0]]
+        entries[wrong[0]] = CellText(first, f"{first.place}, and {len(wrong) - 1} more in this column")
+    return entries
 
 
 def _is_other(part: Floats | list[Any]) -> bool:

@@ -63,7 +63,7 @@ def _with_table(name: str, sheets: dict[str, str]) -> tuple[str, str]:
 
 def _campaign(place: str, text: str, file: str) -> Document:
     try:
-        return csv_template.read(BytesIO(text.encode()), file)
+        return csv_template.read(BytesIO(text.encode()), file, place)
     except FileError as error:
         raise _at(place, error) from None
 

@@ -1,0 +1,59 @@
+"""Headings of CSV columns over HTTP are those of the CSV template; what is wrong is told at once."""
+
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.routes.test_service_columns import SKIN
+
+
+def sent(http: httpx.Client, path: str, columns: dict[str, Any]) -> httpx.Response:
+    """The answer to one row."""
+    body = ",".join(columns) + "\n" + ",".join(map(str, columns.values())) + "\n"
+    return http.post(path, content=body, headers={"Content-Type": "text/csv"})
+
+
+def errors(answer: httpx.Response) -> list[dict[str, Any]]:
+    assert answer.status_code == 422, answer.text
+    found: list[dict[str, Any]] = answer.json()["errors"]
+    return found
+
+
+def test_a_misspelt_field_is_guessed_in_csv_and_json(http: httpx.Client) -> None:
+    columns = {**SKIN, "prelaod_n": 1, "frf_pc_per_n": 7}
+    for answer, value in ((sent(http, "/v1/d33", columns), "1"), (http.post("/v1/d33", json=columns), 1)):
+        _, misspelt = errors(answer)
+        assert (misspelt["field"], misspelt["value"]) == ("prelaod_n", value)
+        assert misspelt["allowed"] == "is not a field of this request; did you mean preload_n?"
+
+
+def test_an_unknown_column_is_told_with_its_first_value(http: httpx.Client) -> None:
+    body = "run,a_over_h,rt_over_h\n1,0.3,0.6\n2,0.4,0.6\n"
+    answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"})
+    assert answer.json()["detail"] == "run = '1': is not a field of this request"
+
+
+@pytest.mark.parametrize("phase", ["frf_phase_deg", "Phase [deg]"])
+def test_magnitude_and_phase_are_the_real_part(http: httpx.Client, phase: str) -> None:
+    polar = sent(http, "/v1/d33", {**SKIN, "preload_n": 1, "frf_magnitude_pc_per_n": 14, phase: 60})
+    real = http.post("/v1/d33", json={**SKIN, "preload_n": 1, "frf_pc_per_n": [7.0]})
+    assert polar.json()["d33_pc_per_n"] == pytest.approx(real.json()["d33_pc_per_n"], rel=1e-12)
+    alone = sent(http, "/v1/d33", {**SKIN, "preload_n": 1, "frf_magnitude_pc_per_n": 14})
+    assert alone.status_code == 400
+    assert "needs frf_phase_deg or frf_phase_rad beside it" in alone.json()["detail"]
+    assert [one["field"] for one in errors(sent(http, "/v1/frf", {**SKIN, "preload_n": 1, phase: 60}))] == [
+        "d33_pc_per_n",
+        phase,
+    ]
+
+
+@pytest.mark.parametrize(("path", "result"), [("/v1/frf", "d33_pc_per_n"), ("/v1/d33", "frf_pc_per_n")])
+def test_all_wrong_fields_are_told_at_once(http: httpx.Client, path: str, result: str) -> None:
+    wrong = {**SKIN, "thickness_mm": -2.5, "youngs_modulus_mpa": -16, "preload_n": [-1, -2, -3], result: 7}
+    found = errors(http.post(path, json=wrong))
+    assert [(one["field"], one["index"]) for one in found] == [
+        ("thickness_mm", None),
+        ("youngs_modulus_mpa", None),
+        ("preload_n", 0),
+    ]
