@@ -18,6 +18,7 @@ from tests.support.store_server import Server
 DEPTH_UM = np.linspace(-0.5, 1.5, 17)
 FORCE_UN = np.where(DEPTH_UM > 0, 20 * np.abs(DEPTH_UM) ** 1.5, 0.0)
 DEFLECTION_UM = FORCE_UN / 3  # 3 N/m
+IN_LAB = {"mm": 1.0, "µm": 1e-3, "nm": 1e-6, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9}
 
 
 def table(columns: dict[str, Any], above: str = "") -> str:
@@ -65,8 +66,13 @@ class Upload:
     @property
     def curve(self) -> tuple[np.ndarray, np.ndarray]:
         """Depth [mm] and force [N] of the figure."""
-        (trace,) = self.figure("curves")["data"]
-        return decoded(trace["x"]), decoded(trace["y"])
+        figure = self.figure("curves")
+        columns = []
+        for axis in "xy":
+            unit = figure["layout"][f"{axis}axis"]["title"]["text"].partition("[")[2].removesuffix("]")
+            values = [decoded(trace[axis]) for trace in figure["data"]]
+            columns.append(IN_LAB[unit] * np.concatenate([values[0], *(one[1:] for one in values[1:])]))
+        return columns[0], columns[1]
 
 
 def decoded(values: Any) -> np.ndarray:
