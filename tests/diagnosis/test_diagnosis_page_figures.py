@@ -13,6 +13,7 @@ from underskin.diagnosis.reporting.figures import explanations, figures
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
 from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import load_table
+from underskin.units import readable_unit
 
 RESONANT = Made(
     mechanisms=("contact_resonance",), parameters=(6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2
@@ -111,7 +112,10 @@ def test_a_long_explanation_is_broken_into_lines_that_an_axis_has_room_for() -> 
 @pytest.mark.slow
 def test_a_map_of_curves_that_agree_is_pale_and_its_labels_differ() -> None:
     found = diagnose(parse(adhesive_curves(0.0)[0]), load_table())
-    drawn = figures(found, report(found))["where"]
+    every = figures(found, report(found))
+    largest = max(max(one["force_n"]) for one in adhesive_curves(0.0)[0]["recordings"])
+    assert every["before_after"].layout.xaxis.title.text == f"predicted force [{readable_unit('force_n', largest)[0]}]"
+    drawn = every["where"]
     labels, (cells,) = drawn.layout.xaxis.ticktext, drawn.data
     assert 2 < len(set(labels)) == len(labels) <= 12
     assert max(map(len, labels)) <= 5
