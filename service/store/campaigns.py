@@ -158,10 +158,13 @@ def by_time(connection: Connection, root: str, before: int | None, limit: int) -
 
 
 def current_by_time(
-    connection: Connection, skin_id: str | None, limit: int, *, oldest_first: bool = False
+    connection: Connection, skin_id: str | None, limit: int, *, kind: str | None = None, oldest_first: bool = False
 ) -> Sequence[AnyRow]:
-    """Rows of current campaigns, of one skin or of all, the one recorded last first, or else the oldest first."""
+    """Rows of current campaigns, of one skin or of all, the one recorded last first, or else the oldest first; `kind`:
+    of those with recordings of a kind."""
     query = select(campaigns).where(CURRENT)
+    if kind is not None:
+        query = query.where(_has(kind))
     if skin_id is not None:
         query = query.where(_counting_as(skin_id))
     by = (TIME, campaigns.c.number) if oldest_first else (TIME.desc(), campaigns.c.number.desc())

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, case, func, select
 
 from service.store import campaigns as kept
 from service.store import inversions
@@ -14,7 +14,7 @@ from service.store import skins as kept_skins
 from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnoses, sensor_d33, skins
 from service.store.tables import inversions as derived
 
-_OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision")
+_OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision", "recorded_at")
 _OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at", "name")
 _LATELY = 12  # campaigns of a trend
 
@@ -43,7 +43,8 @@ def glances(
 ) -> list[Glance]:
     """Skins by their latest arrival, those that arrived before the number `before`."""
     last = func.max(campaigns.c.number)
-    query = select(skins.c.root_id, func.count(), last).join(skins, skins.c.id == campaigns.c.skin_id)
+    listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not what was discarded
+    query = select(skins.c.root_id, listed, last).join(skins, skins.c.id == campaigns.c.skin_id)
     put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
     query = query.where(skins.c.root_id.not_in(put_away))
     query = query.group_by(skins.c.root_id).order_by(last.desc()).limit(limit)

@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.support.adhesive_curves import adhesive_curves
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.figures import explanations, figures
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import load_table
+from underskin.units import readable_unit
 
 RESONANT = Made(
     mechanisms=("contact_resonance",), parameters=(6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2
@@ -105,3 +107,19 @@ def test_a_long_explanation_is_broken_into_lines_that_an_axis_has_room_for() -> 
         "preload dependent d33 +<br>sensor spread +<br>contact resonance",
         "none of these",
     ]
+
+
+@pytest.mark.slow
+def test_a_map_of_curves_that_agree_is_pale_and_its_labels_differ() -> None:
+    found = diagnose(parse(adhesive_curves(0.0)[0]), load_table())
+    every = figures(found, report(found))
+    largest = max(max(one["force_n"]) for one in adhesive_curves(0.0)[0]["recordings"])
+    assert every["before_after"].layout.xaxis.title.text == f"predicted force [{readable_unit('force_n', largest)[0]}]"
+    drawn = every["where"]
+    labels, (cells,) = drawn.layout.xaxis.ticktext, drawn.data
+    assert 2 < len(set(labels)) == len(labels) <= 12
+    assert max(map(len, labels)) <= 5
+    assert drawn.layout.xaxis.title.text == "displacement as recorded [mm]"
+    assert cells.zmax >= 2 * drawn.layout.meta["noise_percent"] > 0
+    assert np.abs(np.asarray(cells.z, dtype=float)).max() < 0.5 * cells.zmax
+    assert set(np.ravel(cells.text)) == {"0"}

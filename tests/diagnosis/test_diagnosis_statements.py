@@ -155,7 +155,7 @@ def test_the_model_that_lacks_something_is_called_by_its_name(table: SigmaTable,
 
 
 def test_every_axis_has_words() -> None:
-    from underskin.diagnosis.reporting.figures import AXES as LABELS
+    from underskin.diagnosis.reporting.figure_data import AXES as LABELS
 
     assert set(LABELS) == set(WORDS)
     assert LABELS["preload_n"] == "preload [N]"

@@ -6,6 +6,7 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.figures.array import frf_versus_preload, response_per_sensor
+from underskin.figures.curves import ForceCurve, force_curves
 from underskin.figures.frf import frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
@@ -65,9 +66,23 @@ def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
 
 
 def test_a_unit_that_a_name_has_stands_once() -> None:
-    figure = raw_traces([Channel(name, "s", np.arange(5.0)) for name in ("Time [s]", "Time", "[s]")], None)
-    titles = [axis.title.text for axis in (figure.layout.yaxis, figure.layout.yaxis2, figure.layout.yaxis3)]
-    assert titles == ["Time<br>[s]", "Time<br>[s]", "[s]<br>[s]"]
+    figure = raw_traces([Channel(name, "s", np.arange(5.0)) for name in ("Time [s]", "Time", "[s]", "t (s)")], None)
+    titles = [figure.layout[f"yaxis{number}"].title.text for number in ("", 2, 3, 4)]
+    assert titles == ["Time<br>[s]", "Time<br>[s]", "[s]<br>[s]", "t<br>[s]"]
+
+
+def test_ticks_have_no_prefixes_and_a_small_force_its_own_unit() -> None:
+    figure = force_curves([ForceCurve("c", np.array([0.0, 2e-3]), np.array([0.0, 3e-5]))])
+    assert figure.layout.yaxis.title.text == "force [µN]"
+    assert figure.layout.xaxis.title.text == "displacement [µm]"
+    assert figure.data[0].y.tolist() == pytest.approx([0, 30])
+    assert figure.layout.template.layout.yaxis.exponentformat == "none"
+
+
+def test_a_history_of_one_date_has_days_under_its_axis() -> None:
+    points = SensorPoints("s", ["2026-11-27T09:00:00+00:00"], [14.0], [0.1], "no trend")
+    axis = d33_history([points]).layout.xaxis
+    assert (axis.dtick, axis.tickformat) == (86_400_000, "%d %b %Y")
 
 
 def test_the_value_under_the_pointer_has_its_unit() -> None:

@@ -108,6 +108,8 @@ def test_a_campaign_of_which_nothing_can_be_used_says_what_exceeds_what(table: S
     assert hertz.contact_radius(float(limit[1]), 4e-3, 16e6) == pytest.approx(3 * 0.05e-3, rel=0.01)
     wide = replace(campaign, skin=replace(campaign.skin, thickness_mm=1.0, sensor_radius_mm=4.0))
     assert "rT/h = 4 exceeds 3" in refusal(wide, table)
+    heavy = moved(moved(wide, 0, preload_n=1000.0), 1, preload_n=1000.0)
+    assert "at most" not in refusal(heavy, table)
 
 
 def test_a_recording_without_a_line_in_the_band_is_told_apart(table: SigmaTable) -> None:

@@ -42,6 +42,9 @@ def test_the_stated_force_is_the_highest(fields: dict[str, float], exceeds: list
 
 def test_what_no_force_helps_is_named_alone() -> None:
     assert limits(sensor_radius_mm=10.0) == ["rT/h = 4 exceeds 3"]
+    (both,) = limits(preload_n=260.0, thickness_mm=0.4, indenter_radius_mm=40.0, sensor_radius_mm=2.0)
+    assert both is not None
+    assert re.fullmatch(r"a/h = \S+ exceeds 3, rT/h = 5 exceeds 3", both)
     assert limits(poisson_ratio=0.3) == ["Poisson's ratio = 0.3: the table is of incompressible elastomer, 0.5"]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from underskin.figures.style import label, line, styled
-from underskin.units import Floats
+from underskin.units import Floats, readable_unit
 
 _MOST_SAMPLES = 400  # of one curve
 
@@ -22,19 +22,27 @@ class ForceCurve:
 
 
 def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
-    """Each recording's curve, thinned evenly if it has more samples than a figure shows."""
+    """Each recording's curve, in units in which the numbers read well; thinned evenly if it has more samples than a
+    figure shows."""
     figure = go.Figure()
+    length, per_mm = _readable("displacement_mm", [one.displacement_mm for one in curves])
+    force, per_n = _readable("force_n", [one.force_n for one in curves])
     for number, curve in enumerate(curves):
         count = len(curve.force_n)
         chosen = np.unique(np.linspace(0, count - 1, min(count, _MOST_SAMPLES)).round().astype(int))
         figure.add_scatter(
-            x=curve.displacement_mm[chosen].astype(np.float32),
-            y=curve.force_n[chosen].astype(np.float32),
+            x=(per_mm * curve.displacement_mm[chosen]).astype(np.float32),
+            y=(per_n * curve.force_n[chosen]).astype(np.float32),
             mode="lines",
             name=label(curve.name),
             line=line(number, 1.4),
-            hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} mm: %{{y:.4g}} N<extra></extra>",
+            hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} {length}: %{{y:.4g}} {force}<extra></extra>",
         )
-    figure.update_xaxes(title="displacement [mm]")
-    figure.update_yaxes(title="force [N]")
+    figure.update_xaxes(title=f"displacement [{length}]")
+    figure.update_yaxes(title=f"force [{force}]")
     return styled(figure, "Force against displacement")
+
+
+def _readable(field: str, columns: Sequence[Floats]) -> tuple[str, float]:
+    """The unit in which all read well, and how many make the lab's."""
+    return readable_unit(field, max((float(np.nanmax(np.abs(one), initial=0.0)) for one in columns), default=0.0))

@@ -13,7 +13,7 @@ from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 _MOST_POINTS = 600  # of a history that shows each sensor
 _MOST_FAINT = 6000  # of a history that shows their median and spread
 _CHOSEN = COLOURS[2]
-_DAY = timedelta(days=1)
+_DAY, _DAY_MS = timedelta(days=1), 86_400_000
 
 
 @dataclass(frozen=True)
@@ -129,6 +129,7 @@ def _finished(figure: go.Figure, title: str, times: Sequence[str], *, legend: bo
     figure.update_xaxes(title="recorded", type="date")
     moments = sorted(datetime.fromisoformat(time) for time in times)
     if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
-        figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY])
+        figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY], dtick=_DAY_MS, tickformat="%d %b %Y")
     figure.update_yaxes(title="d33, 95 % [pC/N]")
-    return styled(figure.update_layout(showlegend=legend), title)
+    # Dates may have two lines of ticks above the axis' title.
+    return styled(figure.update_layout(showlegend=legend, margin={"b": 75}), title)

@@ -18,6 +18,7 @@ DASHES = ("solid", "dash", "dot", "dashdot")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
 SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows
 _LONGEST_LABEL = 60
+PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
 _AXIS = {
     "gridcolor": GRID,
     "zerolinecolor": "#c3cad1",
@@ -27,9 +28,11 @@ _AXIS = {
     "tickcolor": "#8a949e",
     "ticklen": 4,
     "title": {"standoff": 8},
+    **PLAIN,
     # No automargin: it makes the browser draw everything again, three times as long.
 }
 _TEMPLATE = go.layout.Template(
+    data={"heatmap": [{"colorbar": PLAIN}], "scatter": [{"marker": {"colorbar": PLAIN}}]},
     layout={
         "font": {
             "family": "system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif",
@@ -45,7 +48,7 @@ _TEMPLATE = go.layout.Template(
         "margin": {"l": 70, "r": 20, "t": 50, "b": 55},
         "legend": {"orientation": "h", "yanchor": "bottom", "y": 1.02, "x": 0},
         "title": {"font": {"size": 16}, "x": 0},
-    }
+    },
 )
 
 

@@ -13,6 +13,7 @@ from underskin.units import Floats, Indices
 _MOST_POINTS = 700  # of one channel
 _ROW = 130  # pixels
 _EDGES = 110
+_LEFT = 110  # pixels, for ticks such as -1.25e-7 beside a title of two lines
 _LONGEST = 18  # letters of a name beside its axis
 
 
@@ -36,10 +37,11 @@ def raw_traces(traces: Sequence[Channel], sample_rate_hz: float | None) -> go.Fi
             row=row,
             col=1,
         )
-        bare = trace.name.removesuffix(f"[{trace.unit}]").strip() or trace.name
+        bare = trace.name.removesuffix(f"[{trace.unit}]").removesuffix(f"({trace.unit})").strip() or trace.name
         short = label(bare if len(bare) <= _LONGEST else bare[: _LONGEST - 1] + "…")
-        figure.update_yaxes(title=f"{short}<br>[{label(trace.unit) or '?'}]", row=row, col=1)
+        figure.update_yaxes(title=f"{short}<br>[{label(trace.unit) or '?'}]", tickformat="~g", row=row, col=1)
     figure.update_xaxes(title="sample" if sample_rate_hz is None else "time [s]", row=len(traces), col=1)
+    figure.update_layout(margin={"l": _LEFT})
     return styled(figure, "As it came", _EDGES + _ROW * len(traces))
 
 

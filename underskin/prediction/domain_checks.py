@@ -70,11 +70,11 @@ def beyond(pressed: RowConditions, numbers: Sequence[float], table: SigmaTable) 
     force, radius, modulus = pressed.preload_n, pressed.indenter_radius_mm, pressed.youngs_modulus_mpa
     most_a, most_rt, most_load = (table.domain[name][1] for name in ("a_over_h", "rt_over_h", "load_parameter"))
     row = f"F = {force:g} N, R = {radius:g} mm, E = {modulus:g} MPa, L = {load:.3g}, a/h = {over_h:.3g}"
+    if rt_over_h > most_rt:  # first, since no force changes it
+        return f"{row}: rT/h = {rt_over_h:.3g} exceeds {most_rt:g}: the sensor is too large for this thickness"
     if load > most_load:
         most = most_load * radius**2 * modulus
         slip = "; is the preload in mN?" if force >= _LIKE_MILLI and force / 1000 <= most else ""
         return f"{row}: L = {load:.3g} exceeds {most_load:g}: at most {most:.3g} N with this sphere{slip}"
-    if over_h > most_a:
-        most = force * (most_a / over_h) ** 3  # a grows with the cube root of F, by Hertz
-        return f"{row}: a/h = {over_h:.3g} exceeds {most_a:g}: at most {most:.3g} N with this sphere"
-    return f"{row}: rT/h = {rt_over_h:.3g} exceeds {most_rt:g}: the sensor is too large for this thickness"
+    most = force * (most_a / over_h) ** 3  # a grows with the cube root of F, by Hertz
+    return f"{row}: a/h = {over_h:.3g} exceeds {most_a:g}: at most {most:.3g} N with this sphere"

@@ -49,7 +49,8 @@ def of_pressed(reached: Transmission, preload_n: Floats, domain: Domain) -> list
 def in_words(
     inside: Mask, count: int, limits: Sequence[Limit], poisson_ratio: Floats | float = INCOMPRESSIBLE
 ) -> Words | None:
-    """Of each row that is not inside what it exceeds, and the force that it may have; None where all are inside."""
+    """Of each row that is not inside what it exceeds, and where a force would be inside the highest; None where all
+    are inside."""
     rows = np.flatnonzero(~np.broadcast_to(inside, (count,)))
     if not rows.size:
         return None
@@ -66,8 +67,9 @@ def in_words(
             for number, limit in enumerate(limits)
             for told in _told(limit, values[number][place])
         ]
-        force = min((force for _, force in beyond), default=math.inf)
-        at_most = f": at most {_rounded_down(force)} N" if math.isfinite(force) else ""
+        forces = [force for _, force in beyond]
+        # No force brings a row back that exceeds another limit as well.
+        at_most = f": at most {_rounded_down(min(forces))} N" if forces and all(map(math.isfinite, forces)) else ""
         words[row] = (", ".join(told for told, _ in beyond) or NOT_FINITE) + at_most
     return words
 

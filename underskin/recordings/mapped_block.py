@@ -132,7 +132,8 @@ class MappedBlock:
             return column
         zero = float(column[: max(1, round(percent / _PERCENT * len(column)))].mean())
         self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over the first {percent:g} %"
-        self.warnings.append(f"{field} is 0 on average over the first {percent:g} % of each curve: it was tared so")
+        words = field.rpartition("_")[0]
+        self.warnings.append(f"the {words} is 0 on average over the first {percent:g} % of each curve: it was tared so")
         return column - zero
 
     def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:
@@ -196,7 +197,8 @@ class MappedBlock:
         for field, column in columns.items():
             finite = column[np.isfinite(column)]
             if field in LAB and field in self.taken and len(finite):
-                self.taken[field] += f": {finite.min():.4g} to {finite.max():.4g} {LAB[field].unit}"
+                low, high = finite.min() + 0.0, finite.max() + 0.0  # 0 instead of -0
+                self.taken[field] += f": {low:.4g} to {high:.4g} {LAB[field].unit}"
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
         """Force must rise with displacement, unless the rig says a sign for both."""

@@ -10,6 +10,7 @@ from service.dependencies import Store, Table
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, sensors_of
 from service.pages.shared.html import page
+from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
 from underskin.surrogate.sigma_table import SigmaTable
@@ -29,17 +30,17 @@ Chosen = Annotated[str, Query(max_length=200)]
 def compare(
     request: Request, store: Store, table: Table, first: Chosen = "", second: Chosen = "", skin: Chosen = ""
 ) -> Response:
-    """Of the campaigns `first` and `second`; where one is not named, that in use of `skin` that was recorded first or
-    last."""
+    """Of the campaigns `first` and `second`; where one is not named, the one with FRFs in use of `skin` that was
+    recorded first or last."""
     with store.reading() as connection:
-        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED))
+        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind="frf"))
         if listed:
-            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, oldest_first=True)
+            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind="frf", oldest_first=True)
             first, second = first or oldest.id, second or listed[0].id
         both = [campaigns.find(connection, one) for one in (first, second) if one]
     listed += [row for row in both if row.id not in {one.id for one in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]
-    rows = _rows(answers)
+    rows = _rows(answers) if first != second else []
     return page(
         request,
         "compare.html",
@@ -99,10 +100,13 @@ def drawn_maps(
     for name, row, answer in zip(("first", "second"), both, answers, strict=True):
         own = sensors_of(row, answer)
         names, x_mm, y_mm, reasons = columns_of(own, "sensor", "x_mm", "y_mm", "reasons")
-        d33, uncertainty = columns_of(own, "d33_pc_per_n", "d33_uncertainty_pc_per_n")
-        figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, Quantity("d33", "pC/N", "nothing", ends))
+        d33, uncertainty, *intervals = columns_of(own, *D33Value.model_fields)
+        quantity = Quantity("d33", "pC/N", ends=ends, intervals=tuple(zip(*intervals, strict=True)))
+        figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity)
         figure.update_layout(title=f"d33, {name}")
-        maps.append(drawn(f"map-{name}", figure, f"{row.name}, skin {row.skin_id}; colours as on the other map."))
+        told = told_apart(d33, uncertainty, quantity)
+        about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {told}"
+        maps.append(drawn(f"map-{name}", figure, about))
     places = {sensor["id"]: sensor for row in both for sensor in row.about["skin"]["sensors"]}
     shared = [row for row in rows if row["difference_pc_per_n"] is not None]
     if not shared:

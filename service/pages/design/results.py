@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from service.pages.design.sliders import SLIDERS
-from service.pages.shared.formats import short_and_exact
+from service.pages.shared.formats import change_in_percent, short_and_exact
 from service.schemas.design import DesignAnswer
 
 BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
@@ -90,5 +90,5 @@ def _compared(name: str, words: str, both: Sequence[tuple[str, float | None]]) -
     change = "–"
     if before and after is not None:
         percent = 100 * (after / before - 1)
-        change = "same" if abs(percent) < 0.05 else f"{percent:+.3g} %".replace("-", "−")
+        change = "same" if abs(percent) < 0.05 else f"{change_in_percent(percent, 3)} %"
     return Compared(name, words, pinned, stands, change)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import quote
 
+import orjson
 from fastapi import APIRouter, Request, Response
 from jinja2 import UndefinedError
 from markupsafe import Markup
@@ -23,6 +24,7 @@ from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words
+from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
 
@@ -32,8 +34,7 @@ if TYPE_CHECKING:
 router = APIRouter()
 
 _ABOUT = {
-    "where": "Each cell is the mean over the recordings in it, empty where there is none; steps of frequency are even "
-    "in its logarithm; the outlined region holds most of the misfit.",
+    "where": "Each cell is the mean over the recordings in it, empty where there is none.",
     "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
     "predicted on the band that 95 % of the noise stays in. A double click shows residuals beyond the panel.",
     "curve": "One recording with the models before and after, the worst explained one first; below, measured less "
@@ -97,7 +98,7 @@ def diagnosis(
         adopted_as=adopted_as,
         in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
         may_be_adopted=alone and report is not None and not_adopted is None,
-        open=alone and report is not None and left_open(report),
+        open=alone and report is not None and "curve" not in figures and left_open(report),
         limit_fields=FIELDS,
         without=in_words(diagnoses.without(row)),
         without_names=" ".join(diagnoses.without(row)),
@@ -220,11 +221,32 @@ def _drawn(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
     if texts:
         return {
-            name: drawn_before(name, texts[name], about, numbers(name))
-            for name, about in _ABOUT.items()
+            name: drawn_before(name, texts[name], _about(name, texts[name]), numbers(name))
+            for name in _ABOUT
             if name in texts
         }
     return {name: drawn(name, figure, _ABOUT[name], numbers(name)) for name, figure in of_report(report).items()}
+
+
+def _about(name: str, text: str) -> str:
+    """What is to be seen in a figure; of the map of the misfit, of what it draws."""
+    if name != "where":
+        return _ABOUT[name]
+    layout = orjson.loads(text)["layout"]
+    axes = [layout[axis]["title"].get("text", "") for axis in ("xaxis", "yaxis")]
+    said = [_ABOUT[name]]
+    if any(title.startswith("frequency") for title in axes):
+        said.append("Steps of frequency are even in its logarithm.")
+    if any(title.startswith("displacement") for title in axes):
+        said.append("The displacement is that of the file; the curve's figure counts depth from the contact point.")
+    if layout.get("shapes"):
+        said.append("The outlined region holds most of the misfit.")
+    if "noise_percent" in layout.get("meta", {}):
+        noise = in_digits(layout["meta"]["noise_percent"], 2)
+        said.append(
+            f"95 % of the noise of a point stays within ±{noise} %; the colours reach twice as far, or farther."
+        )
+    return " ".join(said)
 
 
 def _cannot_be_shown(row: AnyRow) -> NoReturn:

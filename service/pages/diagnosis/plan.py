@@ -166,10 +166,13 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
     with store.reading() as connection:
         row = diagnoses.find(connection, diagnosis_id)
         name = str(campaigns.find(connection, row.campaign_id).name)
+        of_curves = "curve" in diagnoses.figures_of(connection, row.number)
     if row.kind != "campaign":
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} is of several campaigns: plan after the diagnosis of one.")
     if row.state != "done":
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} has no report: its state is {row.state}.")
+    if of_curves:
+        raise Refusal(404, f"Diagnosis {diagnosis_id!r} is of curves: only recordings of FRFs are planned.")
     return row, name
 
 

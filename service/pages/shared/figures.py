@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import orjson
 from fastapi import Response
 from markupsafe import Markup
@@ -13,7 +14,8 @@ from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
 from service.store import AnyRow
 from underskin.prediction.columns import to_csv
-from underskin.recordings.campaign import FrfRecording, Recording
+from underskin.recordings.campaign import CurveRecording, FrfRecording, Recording
+from underskin.units import Floats
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -60,15 +62,29 @@ def drawn_before(name: str, text: str, about: str, numbers: str | None = None) -
 
 
 def drawn_curves(recordings: Iterable[Recording], most: int, noun: str = "", numbers: str | None = None) -> list[Drawn]:
-    """The first recordings of curves in one figure; none where there are none. `noun`: what they are called."""
+    """The first recordings of curves in one figure, of a single one its loading and its way back; none where there are
+    none. `noun`: what they are called."""
     from underskin.figures.curves import ForceCurve, force_curves
 
     chosen = [one for one in recordings if not isinstance(one, FrfRecording)]
     if not chosen:
         return []
+    parts = _there_and_back(chosen[0]) if len(chosen) == 1 else []
+    if parts:
+        figure = force_curves([ForceCurve(*part) for part in parts])
+        return [drawn("curves", figure, "Force against displacement, loading and way back.", numbers)]
     figure = force_curves([ForceCurve(one.id, one.displacement_mm, one.force_n) for one in chosen[:most]])
     about = f"Force against displacement of {min(len(chosen), most)} of {len(chosen)}{noun}."
     return [drawn("curves", figure, about, numbers)]
+
+
+def _there_and_back(curve: CurveRecording) -> list[tuple[str, Floats, Floats]]:
+    """A curve's loading and its way back from the deepest sample, by name; none where it has not both."""
+    depth, force = np.asarray(curve.displacement_mm), np.asarray(curve.force_n)
+    turn = int(np.argmax(depth))
+    if not 0 < turn < len(depth) - 1:
+        return []
+    return [("loading", depth[: turn + 1], force[: turn + 1]), ("way back", depth[turn:], force[turn:])]
 
 
 class CsvAnswer(Response):

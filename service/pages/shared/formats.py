@@ -8,7 +8,7 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
-from underskin.findings.formatting import in_percent, significant
+from underskin.findings.formatting import in_digits, in_percent, significant
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
@@ -63,6 +63,11 @@ def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, s
     return shown.replace("-", "−"), f"{value!r} {unit}".strip()
 
 
+def change_in_percent(percent: float, digits: int = 2) -> str:
+    """A change with its sign, never as a power of ten."""
+    return f"{'−' if percent < 0 else '+'}{in_digits(abs(percent), digits)}"
+
+
 def _with_unit(shown: str, exact: str, unit: str) -> Markup:
     text = Markup('<span class="number" title="{}">{}</span>').format(exact, shown)
     return text + Markup('&nbsp;<span class="unit">{}</span>').format(unit) if unit else text
@@ -108,6 +113,6 @@ def capitalize_first(text: str) -> str:
 
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
-    "in_percent": in_percent, "interval": interval, "end_of": end_of,
+    "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
     "capitalize_first": capitalize_first, "limit": limit,
 }  # fmt: skip

@@ -71,12 +71,20 @@ function point_at(id) {
   }
 }
 
+// Where a figure is narrow its legend has a line an entry, which panels one above the other have no room for.
+const NARROW = 500, LEGEND_LINE = 19;
+function in_legend(data, layout) {
+  if (!layout.yaxis2 || layout.yaxis2.matches || layout.showlegend === false) return 0;
+  return data.filter((trace) => trace.showlegend !== false && trace.visible !== false).length;
+}
+
 // With the JSON as it is now.
 async function redraw(plot) {
   const { data, layout } = document_of(plot);
   const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
+  const height = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout) : 0);
   // The caption above says the title.
-  await Plotly.react(plot, data, { ...layout, title: undefined, margin, autosize: true }, CONFIG);
+  await Plotly.react(plot, data, { ...layout, title: undefined, height, margin, autosize: true }, CONFIG);
   plot.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));
 }
 
@@ -105,7 +113,7 @@ function on_sheet(plot, place) {
   const height = place ? (long ? 170 : 210) : (long ? 260 : 340);
   const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
   const axes = Object.keys(plot.layout).filter((name) => /^[xy]axis/.test(name));
-  const titles = Object.fromEntries(axes.map((name) => [`${name}.title.font.size`, 7]));
+  const titles = Object.fromEntries(axes.map((name) => [`${name}.title.font.size`, 9]));
   return { width: place ? SHEET / 2 - 5 : SHEET, height, margin, "font.size": 8, ...titles };
 }
 addEventListener("beforeprint", () => {

@@ -1,6 +1,6 @@
 """A recording over its samples: loading, the way back, and what the trim leaves out; brushing it sets the trim."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from service.ingest.reading import InspectedFile
 from service.pages.shared.figures import Drawn, drawn
+from service.pages.upload import turned_curves
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
 from underskin.recordings.rig_description import RigDescription, Trim
@@ -24,8 +25,9 @@ _LOADING, _BACK, _USED, _LEFT_OUT = "loading", "way back", "used", "left out"
 _BLUE, _ORANGE, _GREY = "#0072B2", "#D55E00", "#8a949e"
 
 
-def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None) -> list[Drawn]:
-    """The figure of the file's first recording over time or displacement; none of a file without channels."""
+def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None, *, turned: bool) -> list[Drawn]:
+    """The figure of the file's first recording over time or displacement; none of a file without channels. `turned`:
+    whether what counts pressing negative is."""
     used = rig_of(summary, rig)
     mapped = None if used is None else mapped_file(look, summary, replace(used, trim=None))
     if used is None or mapped is None or not mapped.document["recordings"]:
@@ -34,10 +36,18 @@ def course(look: InspectedFile, summary: FileSummary, rig: RigDescription | None
     columns = {name: first[name] for name in _SHOWN if name in first and "frequency_hz" not in first}
     if not columns or len({len(column) for column in columns.values()}) > 1:
         return []
+    if turned:
+        columns = turned_curves.turned(columns, _to_turn(look, summary, used))
     of = len(mapped.document["recordings"])
     which = "The recording" if of == 1 else f"{str(first['id'])[:60]!r}, the first of {of} recordings"
     about = f"{which}, sample by sample. Drag across the figure to choose the samples that are used."
     return [drawn(_NAME, _figure(columns, used.trim or Trim()), about)]
+
+
+def _to_turn(look: InspectedFile, summary: FileSummary, used: RigDescription) -> Sequence[str]:
+    """What is turned of the first recording, as the samples that are used tell."""
+    trimmed = mapped_file(look, summary, used)
+    return () if trimmed is None else turned_curves.counted_negative(trimmed.document["recordings"][0])
 
 
 def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":

@@ -7,7 +7,7 @@ import numpy as np
 from service.ingest.reading import InspectedFile
 from service.pages.shared.figures import Drawn, drawn, drawn_curves
 from service.usecases.figure_data import frf_columns, measured
-from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
+from underskin.recordings.campaign import Campaign
 from underskin.recordings.rig_mapping import MappedFile
 
 _MOST_TRACES = 8
@@ -20,26 +20,11 @@ def figures(look: InspectedFile, place: str, mapped: MappedFile | None) -> list[
     mapping makes of the file, whatever that still lacks."""
     campaigns = _campaigns(look)
     recordings = [recording for campaign in campaigns for recording in campaign.recordings]
-    curves = [one for one in recordings if not isinstance(one, FrfRecording)]
-    alone = _there_and_back(curves[0]) if len(curves) == 1 else []
     return [
-        *(alone or drawn_curves(curves, _MOST_CURVES) or _mapped_curves(mapped)),
+        *(drawn_curves(recordings, _MOST_CURVES) or _mapped_curves(mapped)),
         *_traces(look, place),
         *_frf(campaigns, place),
     ]
-
-
-def _there_and_back(curve: CurveRecording) -> list[Drawn]:
-    """A curve's loading and its way back from the deepest sample, apart; none where it has not both."""
-    from underskin.figures.curves import ForceCurve, force_curves
-
-    depth, force = np.asarray(curve.displacement_mm), np.asarray(curve.force_n)
-    turn = int(np.argmax(depth))
-    if not 0 < turn < len(depth) - 1:
-        return []
-    loading = ForceCurve("loading", depth[: turn + 1], force[: turn + 1])
-    back = ForceCurve("way back", depth[turn:], force[turn:])
-    return [drawn("curves", force_curves([loading, back]), "Force against displacement, loading and way back.")]
 
 
 def _mapped_curves(mapped: MappedFile | None) -> list[Drawn]:

@@ -13,7 +13,11 @@ from service.pages.upload.file_summary import ChannelSummary, FileSummary, seen
 from service.pages.upload.keep import counts_pressing_negative, worth_knowing
 from service.pages.upload.mapping import CHOICES, mapped_file
 from service.pages.upload.pending_uploads import PendingUpload
+from service.pages.upload.turned_curves import with_curves_turned
 from service.store import Missing
+from underskin.recordings.rig_mapping import MappedFile
+
+_WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
 
 
 def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
@@ -40,9 +44,7 @@ def look_at_all(request: Request, pending: PendingUpload) -> None:
         pending.negative |= counts_pressing_negative(inspected)
         known = worth_knowing(request, inspected, pending.skin, pending.corrects)
         summary = seen(upload, inspected, known)
-        mapped = mapped_file(inspected, summary, pending.rig)
-        layout = inspected.contents.layout if inspected.contents is not None else ""
-        summaries.append(replace(summary, taken=mapped.taken if mapped else {"": layout} if layout else {}))
+        summaries.append(replace(summary, taken=_taken(inspected, _mapped(pending, inspected, summary))))
         if number == 0:
             drawn = _figures(pending, 0, inspected, summary)
     pending.seen, pending.drawn = summaries, {0: drawn}
@@ -55,9 +57,24 @@ def draw(request: Request, pending: PendingUpload, number: int) -> None:
 
 
 def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:
-    mapped = mapped_file(inspected, summary, pending.rig)
-    course = course_figure.course(inspected, summary, pending.rig)
+    mapped = _mapped(pending, inspected, summary)
+    course = course_figure.course(inspected, summary, pending.rig, turned=pending.turned)
     return [*course, *figures(inspected, f"/upload/{pending.id}/{number}/", mapped)]
+
+
+def _mapped(pending: PendingUpload, inspected: InspectedFile, summary: FileSummary) -> MappedFile | None:
+    """What a mapping makes of a file, its curves turned where that was asked."""
+    mapped = mapped_file(inspected, summary, pending.rig)
+    return mapped if mapped is None or not pending.turned else with_curves_turned(mapped)
+
+
+def _taken(inspected: InspectedFile, mapped: MappedFile | None) -> dict[str, str]:
+    """By field what was taken for it, under none how the text was read: a workbook's cells have no separators."""
+    layout = "" if inspected.contents is None else inspected.contents.layout
+    taken = dict(mapped.taken) if mapped is not None else {"": layout} if layout else {}
+    if inspected.kind == _WORKBOOK and "" in taken:
+        taken[""] = taken[""].replace(_OF_TEXT, "")
+    return taken
 
 
 def channels_of(pending: PendingUpload) -> list[ChannelSummary]:

@@ -177,7 +177,9 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again, as a form says what they are."""
     base = pending.draft or (pending.rig.document if pending.rig is not None else {})
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
-    pending.draft, wrong = mappings.document_of(sent, base)
+    said, wrong = mappings.document_of(sent, base)
+    guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
+    pending.draft = mappings.with_guesses(said, base, guess)
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:

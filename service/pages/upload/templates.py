@@ -7,6 +7,7 @@ from typing import Any
 import orjson
 
 from service.ingest.instruments import template_of, with_skin
+from service.pages.upload import workbench
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import SKIN
 from service.pages.upload.pending_uploads import PendingUpload
@@ -17,7 +18,8 @@ from underskin.recordings import rig_description
 @dataclass(frozen=True)
 class OfferedTemplate:
     """A template as the page offers it: what the instrument is called, by whom and when it was said, what it says: also
-    which samples are used, and whether unusual values were said to be right."""
+    which samples are used, over how much of a curve [%] a quantity, in words, is 0, and whether unusual values were
+    said to be right."""
 
     name: str
     kept_at: str
@@ -25,6 +27,7 @@ class OfferedTemplate:
     channels: Mapping[str, Any]
     derived: Mapping[str, str]
     trim: Mapping[str, int]
+    tares: Mapping[str, float]
     units_checked: bool
 
 
@@ -43,6 +46,7 @@ def offered(store: Database, pending: PendingUpload, file: FileSummary) -> Offer
         document["channels"],
         document.get("derived") or {},
         document.get("trim") or {},
+        workbench.tares_of(document["channels"]),
         document.get("units_checked", False),
     )
 

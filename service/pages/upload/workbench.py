@@ -107,6 +107,11 @@ def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mappin
     return result
 
 
+def tares_of(channels: Mapping[str, Any]) -> dict[str, float]:
+    """Over how much of a curve [%] each quantity is 0, by its words."""
+    return {words: channels[field][_TARE] for field, (words, _) in TARES.items() if _TARE in channels.get(field, {})}
+
+
 def trim_of(form: Mapping[str, str], base: Any) -> Any:
     """The samples that are used; as in `base` where the form does not say."""
     if not any(name in form for name in TRIM):

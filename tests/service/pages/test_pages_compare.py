@@ -1,6 +1,8 @@
 """Two campaigns side by side: the same colours, the difference and what of it is beyond chance."""
 
 import csv
+import re
+import time
 from dataclasses import replace
 
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
+from tests.support.blocks import block
 from tests.support.diagnosed import sent, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.store_server import Server
@@ -88,3 +91,48 @@ def test_sensors_without_d33_leave_nothing_to_draw() -> None:
     nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
     rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
     assert drawn_maps([], [{"sensors": [{"sensor": "s0", **nothing}]}] * 2, rows) == []
+
+
+def one_sensor(number: int) -> dict[str, object]:
+    made = campaign(replace(BEFORE, sensors=2), table())
+    undated = tuple(replace(entry, recorded_at=None) for entry in made.recordings)
+    return to_dict(replace(made, name=f"single {number}", recordings=undated))
+
+
+def test_only_what_has_frfs_is_offered_and_none_with_itself(idle: Server) -> None:
+    first = sent(idle, one_sensor(1), "mixed")
+    sent(idle, block("a block", recorded_at="2031-01-01T00:00:00Z"), "mixed")
+    text = idle.http.get("/compare?skin=mixed", headers=BROWSING).text
+    assert text.count("<option ") == 2
+    assert "a block" not in text
+    assert f"{first}" in text
+    assert "There is one campaign with FRFs of this skin: nothing to compare it with." in text
+    assert 'id="figure-map-first"' not in text
+    assert f"single 1, received {time.strftime('%Y', time.gmtime())}-" in text
+
+
+def test_a_map_is_grey_where_that_of_its_campaign_is(idle: Server) -> None:
+    ids = [sent(idle, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
+    own = idle.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
+    beside = idle.http.get("/compare?skin=alike", headers=BROWSING).text
+    told = re.search(r"[^.<]*differ from the others beyond chance[^.<]*", own)
+    assert told is not None
+    captions = re.findall(r"<figcaption.*?</figcaption>", beside, re.DOTALL)
+    assert [told[0] in caption for caption in captions] == [True, True, False]
+
+
+def test_a_discarded_campaign_is_not_counted_at_the_start(idle: Server) -> None:
+    kept = [sent(idle, one_sensor(number), "counted") for number in (2, 3)]
+    reason = {"reason": "a mere trial"}
+    for one, count in zip(kept, (1, 0), strict=True):
+        assert idle.http.post(f"/v1/campaigns/{one}/discard", json=reason).status_code == 200
+        start = idle.http.get("/?find=counted", headers=BROWSING).text
+        assert f'<td class="figures" data-label="Campaigns">{count}</td>' in start
+    assert "none in use" in start
+
+
+def test_the_start_tells_a_time_of_arrival_from_one_of_recording(idle: Server) -> None:
+    sent(idle, one_sensor(4), "arrived")
+    sent(idle, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
+    assert '<span class="quiet">received <time' in idle.http.get("/?find=arrived", headers=BROWSING).text
+    assert '<span class="quiet"><time' in idle.http.get("/?find=recorded", headers=BROWSING).text

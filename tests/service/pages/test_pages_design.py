@@ -45,6 +45,12 @@ def test_a_design_is_pinned_and_the_other_one_moves_beside_it(reader: Visit) -> 
     expect(page.get_by_role("heading", name="A, pinned")).to_have_count(0)
 
 
+def test_a_large_change_is_a_plain_number(server: Server) -> None:
+    text = server.http.get("/design?preload_n=25&pin=preload_n%3D1", headers={"Accept": "text/html"}).text
+    assert "+2400 %" in text
+    assert "e+0" not in text
+
+
 def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     answer = server.http.get("/design?pin=pitch_mm%3D1", headers={"Accept": "text/html"})
     assert answer.status_code == 200

@@ -1,6 +1,7 @@
 """A diagnosis in the browser: asked for, watched, read, saved, adopted; and what nobody else may do with it."""
 
 import csv
+import json
 from copy import deepcopy
 from pathlib import Path
 
@@ -238,3 +239,23 @@ def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Serv
             answer = somebody.post(path, data=form, headers=own)
             assert answer.status_code == 403
             assert "scope read" in answer.text
+
+
+def test_the_map_s_words_follow_what_it_draws(idle: Server, made: Made) -> None:
+    place = f"/diagnoses/{keep(idle, resonant('region', lines=LINES), made, 'region')}"
+    said = idle.http.get(place, headers=BROWSING).text
+    assert "Steps of frequency are even in its logarithm. The outlined region holds most" in said
+    assert "the colours reach twice as far" in said
+    where = json.loads(made.figures["where"])
+    where["layout"]["xaxis"]["title"]["text"] = "displacement as recorded [µm]"
+    where["layout"].pop("shapes")
+    figures = {**made.figures, "where": json.dumps(where), "curve": adhesive_figure().to_json()}
+    place = f"/diagnoses/{keep(idle, resonant('travel', lines=LINES), Made(made.report, figures), 'travel')}"
+    said = idle.http.get(place, headers=BROWSING).text
+    assert "The displacement is that of the file" in said
+    assert "logarithm" not in said
+    assert "outlined" not in said
+    assert "Within the limits of your rig" not in said  # of curves none is planned
+    refused = idle.http.get(f"{place}/plan", headers=BROWSING)
+    assert refused.status_code == 404
+    assert "only recordings of FRFs are planned" in refused.text

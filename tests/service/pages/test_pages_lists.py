@@ -2,7 +2,10 @@
 
 import csv
 import io
+import json
+import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,6 +14,8 @@ from playwright.sync_api import Browser
 
 from service.pages.shared.workbooks import workbook
 from tests.service.pages.conftest import Visit, visit
+from tests.service.pages.forms import BROWSING
+from tests.support.blocks import block
 from tests.support.store_server import Server, campaign
 
 SENSORS = 40
@@ -102,3 +107,34 @@ def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> 
         ground = dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
         assert ground == "rgb(20, 25, 31)", path
         dark.require_accessible()
+
+
+def test_titles_of_panels_stay_apart_on_a_phone(reader: Visit) -> None:
+    page = reader.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    document = campaign("many preloads", lines=4)
+    first = document["recordings"][0]
+    document["recordings"] = [{**first, "id": f"r{number}", "preload_n": 0.5 + 0.1 * number} for number in range(10)]
+    kept = reader.page.request.post(f"{reader.address}/v1/campaigns?skin=phone", data=document).json()["id"]
+    reader.go(f"/campaigns/{kept}")
+    page.locator("#figure-frf .plot").scroll_into_view_if_needed()
+    page.locator("#figure-frf .main-svg").first.wait_for()
+    titles = page.locator("#figure-frf .g-ytitle, #figure-frf .g-y2title, #figure-frf .g-y3title")
+    boxes = sorted((box["y"], box["y"] + box["height"]) for one in titles.all() if (box := one.bounding_box()))
+    assert len(boxes) == 3
+    assert all(above[1] < below[0] for above, below in pairwise(boxes))
+
+
+def test_a_single_curve_has_its_way_back_in_another_colour(idle: Server) -> None:
+    document = block("there and back")
+    (recording,) = document["recordings"]
+    for name in ("displacement_mm", "force_n"):
+        recording[name] += recording[name][-2::-1]
+    kept = idle.http.post("/v1/campaigns?skin=back", json=document).raise_for_status().json()["id"]
+    shown = idle.http.get(f"/campaigns/{kept}", headers=BROWSING).text
+    assert "Force against displacement, loading and way back." in shown
+    figure = re.search(r'id="figure-curves".*?<script type="application/json">(.*?)</script>', shown, re.DOTALL)
+    assert figure is not None
+    loading, back = json.loads(figure[1])["data"]
+    assert (loading["name"], back["name"]) == ("loading", "way back")
+    assert loading["line"]["color"] != back["line"]["color"]

@@ -2,11 +2,13 @@
 
 import base64
 import html
+import io
 import re
 from typing import Any
 
 import httpx
 import numpy as np
+import openpyxl
 import orjson
 import pytest
 
@@ -16,6 +18,7 @@ from tests.support.store_server import Server
 DEPTH_UM = np.linspace(-0.5, 1.5, 17)
 FORCE_UN = np.where(DEPTH_UM > 0, 20 * np.abs(DEPTH_UM) ** 1.5, 0.0)
 DEFLECTION_UM = FORCE_UN / 3  # 3 N/m
+IN_LAB = {"mm": 1.0, "µm": 1e-3, "nm": 1e-6, "N": 1.0, "mN": 1e-3, "µN": 1e-6, "nN": 1e-9}
 
 
 def table(columns: dict[str, Any], above: str = "") -> str:
@@ -26,10 +29,11 @@ def table(columns: dict[str, Any], above: str = "") -> str:
 class Upload:
     """One file on its page, without a browser."""
 
-    def __init__(self, client: httpx.Client, content: str) -> None:
+    def __init__(self, client: httpx.Client, content: str | bytes, name: str = "curve.txt") -> None:
         self.client = client
         form = {"form_token": token_of(client.get("/upload").text)}
-        answer = client.post("/upload", data=form, files={"file": ("curve.txt", content.encode())})
+        sent = content.encode() if isinstance(content, str) else content
+        answer = client.post("/upload", data=form, files={"file": (name, sent)})
         self.address, self.page = answer.headers["location"], ""
         self.look()
 
@@ -51,13 +55,24 @@ class Upload:
         assert self.client.post(f"{self.address}/mapping", data=sent | token).status_code == 303
         self.look()
 
+    def figure(self, name: str) -> dict[str, Any]:
+        """As plotly has it."""
+        place = f'id="figure-{name}".*?<script type="application/json">(.*?)</script>'
+        drawn = re.search(place, self.page, re.DOTALL)
+        assert drawn is not None
+        found: dict[str, Any] = orjson.loads(html.unescape(drawn[1]))
+        return found
+
     @property
     def curve(self) -> tuple[np.ndarray, np.ndarray]:
         """Depth [mm] and force [N] of the figure."""
-        drawn = re.search(r'id="figure-curves".*?<script type="application/json">(.*?)</script>', self.page, re.DOTALL)
-        assert drawn is not None
-        (trace,) = orjson.loads(html.unescape(drawn[1]))["data"]
-        return decoded(trace["x"]), decoded(trace["y"])
+        figure = self.figure("curves")
+        columns = []
+        for axis in "xy":
+            unit = figure["layout"][f"{axis}axis"]["title"]["text"].partition("[")[2].removesuffix("]")
+            values = [decoded(trace[axis]) for trace in figure["data"]]
+            columns.append(IN_LAB[unit] * np.concatenate([values[0], *(one[1:] for one in values[1:])]))
+        return columns[0], columns[1]
 
 
 def decoded(values: Any) -> np.ndarray:
@@ -119,3 +134,53 @@ def test_curves_of_one_file_are_told_apart_in_the_form(client: httpx.Client) -> 
     upload.say(curves="groups", indenter_radius_mm="0.0075", units_checked="yes")
     assert "<b>2</b> recordings understood" in upload.page
     assert client.get(f"{upload.address}/rig.json").json()["curves"] == "groups"
+
+
+def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
+    depth = np.concatenate([DEPTH_UM - DEPTH_UM[0], DEPTH_UM[-2::-1] - DEPTH_UM[0]])
+    force = np.concatenate([FORCE_UN, FORCE_UN[-2::-1]])
+    upload = Upload(client, table({"Depth (um)": -depth, "Force (uN)": -force}))
+    upload.say(indenter_radius_mm="0.0075", units_checked="yes")
+    assert "-0.002 to 0 mm" in html.unescape(upload.page)
+    token = {"form_token": token_of(upload.page)}
+    assert client.post(f"{upload.address}/signs", data={"turned": "yes"} | token).status_code == 303
+    upload.look()
+    said = html.unescape(upload.page)
+    assert "-0.002 to 0 mm; turned round: 0 to 0.002 mm" in said
+    assert re.search(r"<b>force</b>: [^<]*; turned round: 0 to 3\.67\de-05 N", said)
+    course = upload.figure("course")
+    assert {trace["name"] for trace in course["data"]} == {"loading", "way back"}
+    assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])
+
+
+def test_a_formula_that_is_cleared_gives_way_to_the_guess(client: httpx.Client) -> None:
+    raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
+    upload = Upload(client, table(raw, "k (N/m)\t3"))
+    formula = {"derived-name-0": "depth", "derived-is-0": "displacement_mm"}
+    formula["derived-formula-0"] = "'Piezo (um)' - 'Deflection (nm)'"
+    upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{**formula, "is-0": "", "is-1": "deflection"})
+    assert client.get(f"{upload.address}/rig.json").json()["channels"]["displacement_mm"] == {"channel": "depth"}
+    upload.say(units_checked="yes", **dict.fromkeys(formula, ""))
+    assert client.get(f"{upload.address}/rig.json").json()["channels"] == {
+        "displacement_mm": {"channel": "Piezo (um)", "deflection": {"channel": "Deflection (nm)"}},
+        "force_n": {"channel": "Deflection (nm)", "spring_constant_n_per_m": {"property": "k (N/m)"}},
+    }
+    assert upload.curve[0] == pytest.approx(1e-3 * DEPTH_UM, abs=1e-9)
+
+
+def test_a_workbook_has_no_separators(client: httpx.Client) -> None:
+    book = openpyxl.Workbook()
+    for row in [("Depth (um)", "Force (uN)"), *zip(DEPTH_UM.tolist(), FORCE_UN.tolist(), strict=True)]:
+        book.active.append(row)
+    data = io.BytesIO()
+    book.save(data)
+    said = html.unescape(Upload(client, data.getvalue(), "curve.xlsx").page)
+    assert "rows of 2 numbers from line 2 to 18; names from line 1" in said
+    assert "separated by" not in said
+    assert "CSV, XLSX, MATLAB" in client.get("/upload").text
+
+
+def test_a_tare_is_told_in_words(client: httpx.Client) -> None:
+    upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
+    upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{"tare-force_n": "10"})
+    assert "<li>the force is 0 on average over the first 10 % of each curve" in upload.page

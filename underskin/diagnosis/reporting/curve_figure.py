@@ -15,7 +15,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.curve_data import CurvePrediction, Mark, ShownCurve
-from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED
+from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.units import Floats, readable_unit
@@ -65,7 +65,7 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
         figure.layout[path] = value
     figure.update_layout(
         title=_TITLES[kind],
-        template="plotly_white",
+        template=TEMPLATE,
         font={"size": 14, "color": "#222222"},
         height=height,
         margin={"t": 80, "b": 130},

@@ -4,21 +4,27 @@ A point is one recording, or one recording at some neighbouring lines where the 
 lines. Its values are means weighted with 1/variance.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import recording_axes
+from underskin.diagnosis.data.axes import WORDS, recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
 from underskin.diagnosis.reporting.report import DiagnosisResult
-from underskin.units import Array, Complexes, Floats, Indices
+from underskin.units import Array, Complexes, Floats, Indices, readable_unit
+
+AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
+_TRAVEL = "displacement_mm"
 
 _MOST_POINTS = 600
 _LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
+_MOST_OF_TRAVEL = 12  # of the displacement, whose labels are long
+_DIGITS, _DECIMALS = range(3, 10), range(7)  # of a label: as many as tell it from its neighbours
 _ALMOST_ALL = 0.9  # of the gaps between neighbouring lines that are no wider than a step
 _SLACK = 1e-9  # of a step, for lines on its edge
 _SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a residual
@@ -41,15 +47,33 @@ class Points:
         residual: Complexes = 100 * (self.measured - self.predicted) / np.maximum(size, _SMALLEST * size.max())
         return residual
 
+    def times(self, factor: float) -> "Points":
+        """In a unit of which so many make the one that they are in."""
+        return replace(
+            self,
+            measured=factor * self.measured,
+            predicted=factor * self.predicted,
+            deviation=factor * self.deviation,
+        )
+
+    @property
+    def noise_percent(self) -> Floats:
+        """Its standard deviation over the same."""
+        size = np.abs(self.predicted)
+        noise: Floats = 100 * np.hypot(self.deviation, self.gain * size) / np.maximum(size, _SMALLEST * size.max())
+        return noise
+
 
 @dataclass(frozen=True)
 class Levels:
-    """An axis in steps: of each point the step, of each step its name and the values that it holds."""
+    """An axis in steps: of each point the step, of each step its name and the values that it holds; `title` says what
+    the names are."""
 
     step: Indices  # (points,)
     names: list[str]
     low: Array  # (steps,)
     high: Array  # (steps,)
+    title: str = ""
 
 
 class Thinned:
@@ -95,10 +119,10 @@ class Thinned:
             return self._of_lines(column)
         if column.dtype.kind != "U":
             column = self._mean(column)
-            return _stepped(column) if np.ptp(column) > 0 else None
+            return _stepped(column, axis) if np.ptp(column) > 0 else None
         first = np.unique(self._point, return_index=True)[1]
         names, step = np.unique(column[first], return_inverse=True)
-        return Levels(step.reshape(-1), names.tolist(), names, names) if len(names) > 1 else None
+        return Levels(step.reshape(-1), names.tolist(), names, names, AXES[axis]) if len(names) > 1 else None
 
     def _of_lines(self, frequency: Floats) -> Levels | None:
         """The steps that all recordings have in common, neighbouring ones together where they are too many."""
@@ -111,7 +135,7 @@ class Thinned:
         low, high = np.full(steps, np.inf), np.zeros(steps)
         np.minimum.at(low, of_row, frequency)
         np.maximum.at(high, of_row, frequency)
-        return Levels(step, [_short(np.sqrt(a * b)) for a, b in zip(low, high, strict=True)], low, high)
+        return Levels(step, _distinct(np.sqrt(low * high), _DIGITS, fractional=False), low, high, AXES["frequency_hz"])
 
     def axes(self) -> list[str]:
         """The axes that the points can be laid out along, those of the rows first."""
@@ -155,17 +179,28 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
     return np.unique(place, return_inverse=True)[1].reshape(-1)
 
 
-def _stepped(column: Floats) -> Levels:
-    """Its distinct values, or as many steps of like counts."""
+def _stepped(column: Floats, axis: str) -> Levels:
+    """Its distinct values, or as many steps of like counts; a displacement is named in the unit in which it reads
+    well."""
     distinct, number = np.unique(np.round(column, 6), return_inverse=True)
-    steps = min(len(distinct), _MOST_LEVELS)
+    steps = min(len(distinct), _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS)
     of_value = np.arange(len(distinct)) * steps // len(distinct)
     starts = np.searchsorted(of_value, np.arange(steps))
     low, high = distinct[starts], distinct[np.append(starts[1:], len(distinct)) - 1]
-    names = [_short((a + b) / 2) for a, b in zip(low, high, strict=True)]
-    return Levels(of_value[number.reshape(-1)], names, low, high)
+    step, middle = of_value[number.reshape(-1)], (low + high) / 2
+    if axis != _TRAVEL:
+        return Levels(step, _distinct(middle, _DIGITS, fractional=False), low, high, AXES[axis])
+    unit, scale = readable_unit(axis, float(np.abs(distinct).max()))
+    names = _distinct(scale * middle, _DECIMALS, fractional=True)
+    return Levels(step, names, low, high, f"displacement as recorded [{unit}]")
 
 
-def _short(value: float) -> str:
-    """Three digits, never as a power of ten."""
-    return np.format_float_positional(value, precision=3, fractional=False, trim="-")
+def _distinct(values: Floats, digits: Iterable[int], *, fractional: bool) -> list[str]:
+    """As labels that differ, of so few digits, or decimals, as suffice; never as a power of ten, nor -0."""
+    labels: list[str] = []
+    for count in digits:
+        rounded = [float(np.format_float_positional(value, count, fractional=fractional)) + 0.0 for value in values]
+        labels = [np.format_float_positional(value, trim="-") for value in rounded]
+        if len(set(labels)) == len(labels):
+            break
+    return labels

@@ -11,7 +11,6 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT
@@ -27,11 +26,11 @@ from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.unnamed.laws import in_plain_words
 from underskin.recordings.campaign import Campaign
-from underskin.units import Floats
+from underskin.units import Floats, readable_unit
 
-AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
 _GREY = "#BBBBBB"
-_MOST_LABELLED = 80  # cells of a map that show their number
+_MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, that show their number
+_ABOVE_NOISE = 2.0  # times what 95 % of the noise stays in: as far the colours of a map reach at least
 _BAND = 60  # points along a band
 _LABEL = 24  # characters on a line of a label
 _EDGE = 0.04  # of what is shown: room at an axis' ends
@@ -114,7 +113,8 @@ def _in_lines(names: Sequence[str]) -> str:
 def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -> go.Figure:
     """Measured less the model to which nothing is added, over the located axes; the region outlined.
 
-    A cell is the mean over the points in it; out of phase where the misfit lies in the phase.
+    A cell is the mean over the points in it; out of phase where the misfit lies in the phase. What is within the noise
+    is pale; `meta` of the layout has what 95 % of it stays in [%].
     """
     part, name = _part(diagnosis, before.residual_percent)
     x_axis, y_axis = _map_axes(diagnosis, thinned)
@@ -126,7 +126,9 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
     count = np.bincount(cell, minlength=size)
     mean = np.where(count > 0, np.bincount(cell, part, size) / np.maximum(count, 1), np.nan)
     shape = (len(y.names), len(x.names))
-    limit = float(np.nanmax(np.abs(mean))) or 1.0
+    noise = SDS_OF_95 * float(np.median(before.noise_percent))
+    limit = max(float(np.nanmax(np.abs(mean))), _ABOVE_NOISE * noise) or 1.0
+    labelled = size <= _MOST_LABELLED and len(x.names) <= _MOST_ABREAST
     figure = go.Figure()
     figure.add_heatmap(
         z=mean.reshape(shape),
@@ -135,23 +137,32 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         zmax=limit,
         colorscale="PuOr_r",
         customdata=count.reshape(shape),
-        texttemplate="%{z:+.0f}" if size <= _MOST_LABELLED else None,
+        text=np.array([_whole(value) for value in mean]).reshape(shape) if labelled else None,
+        texttemplate="%{text}" if labelled else None,
         xgap=1,
         ygap=1,
         colorbar={"title": {"text": f"{name} [%]", "side": "right"}},
         hovertemplate="%{z:+.3g} % (mean of %{customdata})<extra></extra>",
     )
-    for entry, axis, update in ((x, x_axis, figure.update_xaxes), (y, y_axis, figure.update_yaxes)):
+    for entry, update in ((x, figure.update_xaxes), (y, figure.update_yaxes)):
         labels = [escape(label) for label in entry.names]
-        update(title=AXES.get(axis or "", ""), tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
+        update(title=entry.title, tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     if diagnosis.region:
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": MEASURED, "width": 3})
     figure.update_layout(
         title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}, in percent of it",
         height=170 + 40 * max(4, min(len(y.names), 12)),
+        meta={"noise_percent": noise},
     )
     return styled(figure)
+
+
+def _whole(percent: float) -> str:
+    """A number of a cell with its sign; empty where there is none."""
+    if np.isnan(percent):
+        return ""
+    return f"{percent:+.0f}" if round(percent) else "0"
 
 
 def before_and_after(
@@ -165,6 +176,11 @@ def before_and_after(
         horizontal_spacing=0.12,
     )
     _, name = _part(diagnosis, before.measured)
+    unit = f"FRF, {name} [pC/N]"
+    if thinned.lines.curves:
+        largest = max(float(np.abs(points.measured).max()) for points in (before, after))
+        readable, per_n = readable_unit("force_n", largest)
+        unit, before, after = f"force [{readable}]", before.times(per_n), after.times(per_n)
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
     shown_part = _part(diagnosis, both)[0]
     room = _EDGE * float(np.ptp(shown_part))
@@ -205,7 +221,6 @@ def before_and_after(
             row=1,
             col=place,
         )
-    unit = "force [N]" if thinned.lines.curves else f"FRF, {name} [pC/N]"
     figure.update_xaxes(title=f"predicted {unit}", range=whole)
     figure.update_yaxes(title=f"measured {unit}", col=1)
     for place in (1, 2):

@@ -13,7 +13,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED
+from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.frf_data import ShownFrf
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
@@ -82,7 +82,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         figure.layout[path] = value
     figure.update_layout(
         title="Measured and predicted, recording by recording",
-        template="plotly_white",
+        template=TEMPLATE,
         font={"size": 14, "color": "#222222"},
         height=_HEIGHT,
         margin={"l": 90, "t": 80, "b": 100},

@@ -8,7 +8,7 @@ from typing import Any
 
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
-from underskin.diagnosis.reporting.figures import AXES
+from underskin.diagnosis.reporting.figure_data import AXES
 from underskin.diagnosis.reporting.sentences import capital
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED

@@ -1,0 +1,35 @@
+"""Curves of a file's channels as they are taken where what counts pressing negative is turned."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from underskin.recordings.curve_signs import falling
+from underskin.recordings.rig_mapping import MappedFile
+from underskin.units import LAB
+
+
+def counted_negative(recording: Mapping[str, Any]) -> Sequence[str]:
+    """Those of `force_n` and `displacement_mm` that fall while a curve of a campaign document is pressed."""
+    if recording["kind"] == "frf" or not {"force_n", "displacement_mm"} <= recording.keys():
+        return ()
+    columns = np.asarray(recording["force_n"]), np.asarray(recording["displacement_mm"])
+    return falling(*columns, sphere=recording["kind"] == "indentation")
+
+
+def turned(columns: Mapping[str, Any], fields: Sequence[str]) -> dict[str, Any]:
+    """The columns, those of `fields` turned."""
+    return {name: -np.asarray(column) if name in fields else column for name, column in columns.items()}
+
+
+def with_curves_turned(mapped: MappedFile) -> MappedFile:
+    """A file with every such curve turned; what was taken for what says so, with the range of the first curve."""
+    before: Sequence[dict[str, Any]] = mapped.document["recordings"]
+    recordings = [turned(one, counted_negative(one)) for one in before]
+    taken = dict(mapped.taken)
+    for field in counted_negative(before[0]) if before else ():
+        low, high = np.nanmin(recordings[0][field]), np.nanmax(recordings[0][field])
+        taken[field] += f"; turned round: {low + 0.0:.4g} to {high + 0.0:.4g} {LAB[field].unit}"
+    return replace(mapped, document={**mapped.document, "recordings": recordings}, taken=taken)
