@@ -36,7 +36,8 @@ def compare(
         listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind="frf"))
         if listed:
             (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind="frf", oldest_first=True)
-            first, second = first or oldest.id, second or listed[0].id
+            first = first or oldest.id
+            second = second or next((row.id for row in listed if row.id != first), first)
         both = [campaigns.find(connection, one) for one in (first, second) if one]
     listed += [row for row in both if row.id not in {one.id for one in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]

@@ -105,6 +105,9 @@ def test_only_what_has_frfs_is_offered_and_none_with_itself(idle: Server) -> Non
     text = idle.http.get("/compare?skin=mixed", headers=BROWSING).text
     assert text.count("<option ") == 2
     assert "a block" not in text
+    sent(idle, one_sensor(5), "another")
+    both = re.findall(r'value="([^"]*)" selected', idle.http.get(f"/compare?first={first}", headers=BROWSING).text)
+    assert both[0] == first != both[1]
     assert f"{first}" in text
     assert "There is one campaign with FRFs of this skin: nothing to compare it with." in text
     assert 'id="figure-map-first"' not in text
