@@ -11,7 +11,15 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Scope
 
-from service.problems import RETRY_LATER, Refusal, from_validation, invalid_input, is_browsing, unexpected
+from service.problems import (
+    RETRY_LATER,
+    Refusal,
+    SeveralInvalid,
+    from_validation,
+    invalid_input,
+    is_browsing,
+    unexpected,
+)
 from service.store import Conflict, Missing, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
 from underskin import InvalidInput
@@ -55,6 +63,8 @@ def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal
             return refusal
         case HTTPException(__cause__=ClientDisconnect()):
             return Refusal(499, "The client left before its body was complete.", title="Client closed request")
+        case SeveralInvalid():
+            return invalid_input(error.errors)
         case InvalidInput():
             return invalid_input([error])
         case RequestValidationError():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from service.problems import invalid_input
+from service.problems import SeveralInvalid
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
@@ -42,12 +42,12 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
 
 @contextmanager
 def _all_refused(columns: Mapping[str, Floats], units_checked: bool) -> Iterator[None]:
-    """Raises Refusal with all that is wrong where one of the columns was refused."""
+    """Raises SeveralInvalid with all that is wrong where one of the columns was refused."""
     try:
         yield
     except InvalidInput as first:
         others = [error for error in answers.refused(columns, units_checked) if error.field != first.field]
-        raise invalid_input([first, *others]) from None
+        raise SeveralInvalid([first, *others]) from None
 
 
 def _sent(request: PressedSkinColumns, *names: str) -> dict[str, Floats]:

@@ -80,7 +80,7 @@ def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server:
         (at.folder / "notes.txt").write_text("pressed the left hand first")
         at.start()
         at.wait_for("spoilt.json: 422")
-        assert "preload_n must be finite and greater than 0 (N)" in at.told
+        assert "preload_n = -1.0: must be finite and greater than 0 (N)" in at.told
         at.wait_for("notes.txt: 422")  # which no reader opens: after a further while
         at.end()
         at.start()

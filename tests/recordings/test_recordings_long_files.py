@@ -95,7 +95,7 @@ def test_an_empty_cell_in_a_long_template_is_refused_with_its_recording() -> Non
 
 
 def test_a_bad_cell_of_a_file_that_is_parsed_apart_is_named_by_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reading, "_LARGEST_TEXT", 1000)
+    monkeypatch.setattr(reading, "LARGEST_TEXT", 1000)
     lines = template(900)
     lines[717] = lines[717].rpartition(",")[0] + ",x"
     (problem,) = read_file("\n".join(lines).encode(), "a.csv").problems

@@ -19,7 +19,7 @@ from underskin.recordings.readers.sandbox import call_apart, parse_apart
 from underskin.recordings.rig_description import RigDescription
 
 _SHEET_TEXT = "underskin.recordings.readers.xlsx_file:sheet_text"
-_LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
+LARGEST_TEXT = 8_000_000  # larger tables are parsed under the limits of binary files
 _TEMPLATE = "; below lines about the skin, the first of them schema,campaign/1, it would be the CSV template"
 
 
@@ -95,7 +95,7 @@ def read_contents(source: Path | str | bytes, name: str) -> Contents | Document:
     with _opened(source, name) as stream:
         kind = formats.detect(stream, name)
         size = stream.seek(0, io.SEEK_END)
-        if formats.is_parsed_apart(kind) or (kind != "JSON" and size > _LARGEST_TEXT):
+        if formats.is_parsed_apart(kind) or (kind != "JSON" and size > LARGEST_TEXT):
             return parse_apart(kind, stream, name)
         return formats.parse(kind, stream, name)
 
