@@ -163,10 +163,14 @@ def _listed(errors: ValidationError | Sequence[Any]) -> list[InvalidInput]:
 def _guessed(error: InvalidInput, known: Collection[str]) -> InvalidInput:
     """The error; of an unknown field with the one that was probably meant."""
     unknown = error.code == ErrorCode.UNKNOWN_FIELD and error.field not in known
-    close = get_close_matches(error.field.lower(), known, n=1) if unknown else []
-    if not close:
+    close = _nearest(error.field, known) if unknown else None
+    if close is None:
         return error
-    return InvalidInput(error.field, error.value, f"{error.allowed}; did you mean {close[0]}?", code=error.code)
+    return InvalidInput(error.field, error.value, f"{error.allowed}; did you mean {close}?", code=error.code)
+
+
+def _nearest(name: str, known: Collection[str]) -> str | None:
+    return next(iter(get_close_matches(name.lower(), known, n=1)), None)
 
 
 def validated(kind: type[_Model], document: Any) -> _Model:
@@ -246,7 +250,7 @@ def unknown_name(name: str, value: str, known: Collection[str], noun: str) -> In
     if not known:
         words = ", which has none"
     else:
-        close = get_close_matches(name.lower(), known, n=1)
-        guess = f"; did you mean {close[0]}?" if close else "."
+        close = _nearest(name, known)
+        guess = f"; did you mean {close}?" if close else "."
         words = f"{guess} Known: {', '.join(known)}"
     return InvalidInput(name, value, f"is not a {noun} of this request{words}", code=ErrorCode.UNKNOWN_FIELD)

@@ -160,8 +160,7 @@ def by_time(connection: Connection, root: str, before: int | None, limit: int) -
 def current_by_time(
     connection: Connection, skin_id: str | None, limit: int, *, kind: str | None = None, oldest_first: bool = False
 ) -> Sequence[AnyRow]:
-    """Rows of current campaigns, of one skin or of all, the one recorded last first, or else the oldest first; `kind`:
-    of those with recordings of a kind."""
+    """Rows of current campaigns, of one skin or all, with recordings of a kind or any, the one recorded last first."""
     query = select(campaigns).where(CURRENT)
     if kind is not None:
         query = query.where(_has(kind))

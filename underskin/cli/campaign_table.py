@@ -13,7 +13,7 @@ from rich.text import Text
 from underskin.cli.columns import PIPED_WIDTH
 from underskin.cli.rigs import reading_notes
 from underskin.errors import InvalidInput
-from underskin.findings.alike import told_together
+from underskin.findings.alike import recordings_called, told_together
 from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion
 from underskin.recordings import plausibility
@@ -64,7 +64,7 @@ class InvertedFile:
         refused = [(problem.recording, problem.as_error(problem.field)) for problem in self.reading.problems]
         refused += [(one.recording, one.result) for one in self.moduli if isinstance(one.result, InvalidInput)]
         for names, why in told_together((recording, str(why)) for recording, why in refused):
-            notes.append(f"left out: recording{'s' if ', ' in names else ''} {names}: {why}")
+            notes.append(f"left out: {recordings_called(names)}: {why}")
         if isinstance(self.inversion, Inversion):
             notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
         return notes

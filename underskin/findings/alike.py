@@ -23,6 +23,11 @@ def told_together(problems: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return told
 
 
+def recordings_called(names: str) -> str:
+    """Names as `told_together` gives them, with the noun before them."""
+    return f"recording{'s' if ', ' in names else ''} {names}"
+
+
 def why_refused(error: Mapping[str, Any]) -> str:
     """An entry of the service's `errors`: the value where one was sent, and of a file only what is wrong."""
     if error["field"] == "file":

@@ -10,7 +10,6 @@ from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
-from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import MAGNITUDE, PHASE, SCHEMA, RigDescription, channel_fields
 from underskin.recordings.rig_mapping import MappedFile
@@ -204,20 +203,6 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     if form.get("units_checked"):
         document["units_checked"] = True
     return document, [*strange, *twice, *unsaid, *workbench.named_twice(form, CHANNELS)]
-
-
-def with_guesses(document: Mapping[str, Any], base: Mapping[str, Any], guess: Mapping[str, Any]) -> dict[str, Any]:
-    """A rig description in which what a formula of `base` was for, which is cleared now, is guessed again."""
-    channels = document["channels"]
-    cleared = set(base.get(FIELD) or {}) - set(document.get(FIELD) or {})
-    if document["kind"] != guess["kind"]:
-        return dict(document)
-    again = {
-        field: guess["channels"][field]
-        for field, how in base.get("channels", {}).items()
-        if how.get("channel") in cleared and field not in channels and field in guess["channels"]
-    }
-    return {**document, "channels": {**again, **channels}}
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:

@@ -179,7 +179,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     pending.skin = sent.get(SKIN_FIELD, pending.skin or "").strip() or None
     said, wrong = mappings.document_of(sent, base)
     guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
-    pending.draft = mappings.with_guesses(said, base, guess)
+    pending.draft = workbench.with_guesses(said, base, guess)
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:

@@ -107,6 +107,20 @@ def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mappin
     return result
 
 
+def with_guesses(document: Mapping[str, Any], base: Mapping[str, Any], guess: Mapping[str, Any]) -> dict[str, Any]:
+    """A rig description in which what a formula of `base` was for, which is cleared now, is guessed again."""
+    channels = document["channels"]
+    cleared = set(base.get(FIELD) or {}) - set(document.get(FIELD) or {})
+    if document["kind"] != guess["kind"]:
+        return dict(document)
+    again = {
+        field: guess["channels"][field]
+        for field, how in base.get("channels", {}).items()
+        if how.get("channel") in cleared and field not in channels and field in guess["channels"]
+    }
+    return {**document, "channels": {**again, **channels}}
+
+
 def tares_of(channels: Mapping[str, Any]) -> dict[str, float]:
     """Over how much of a curve [%] each quantity is 0, by its words."""
     return {words: channels[field][_TARE] for field, (words, _) in TARES.items() if _TARE in channels.get(field, {})}
