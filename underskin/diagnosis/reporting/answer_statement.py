@@ -44,11 +44,11 @@ class Around:
 class OfAnswer:
     """What is known of the leading answer beside its probability.
 
-    `group` is the most probable of the report's `presence`, `idle` are mechanisms that may as well have no effect,
+    `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
     `mechanisms` those of the report, and `told` is what their values mean together.
     """
 
-    group: Mapping[str, Any] | None = None
+    groups: Sequence[Mapping[str, Any]] = ()
     idle: Sequence[str] = ()
     mechanisms: Sequence[Mapping[str, Any]] = ()
     told: Sequence[str] = ()
@@ -101,23 +101,48 @@ def _answer(
         return f"{agree}, but they do not rule out: {listed}", _law(tuple(mentioned))
     if verdict == "unexplained":
         return (f"something is missing that none of the known mechanisms describes (probability {percent})",)
+    by_sets = f"by sets: {_each([leader, *rivals])}" if rivals else ""
     if verdict == "explained":
+        lacking, by_mechanism = _lacking(leader, of_answer)
         means = _law(leader.names) or _strengths(of_answer.mechanisms)
-        return f"{model} lacks {in_words(leader.names)} (probability {percent})", means
-    group, idle = of_answer.group, of_answer.idle
-    if group is not None and len(group["mechanisms"]) > 1 and group["probability"] >= EXPLAINED and not idle:
-        named = " or ".join(in_words([name]) for name in group["mechanisms"])
-        first = f"{named} ({in_percent(group['probability'])}): these recordings cannot tell which"
-        return first, f"by sets: {_each([leader, *rivals])}"
+        return f"{model} lacks {lacking}", *([by_sets] if by_mechanism else []), means
+    idle = of_answer.idle
+    certain = [group for group in of_answer.groups if group["probability"] >= EXPLAINED]
+    if certain and not idle:
+        named = " and ".join(_group_in_words(group) for group in certain)
+        if any(len(group["mechanisms"]) > 1 for group in certain):
+            return f"{named}: these recordings cannot tell which", by_sets
+        return f"{model} lacks {named}, but these recordings cannot tell what else", by_sets, _law(tuple(mentioned))
     but = [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
     but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
-    certain = f"what is certain is that {model} does not describe the recordings" if idle else ""
+    misfit = f"what is certain is that {model} does not describe the recordings" if idle else ""
     return (
         f"best explained by {in_words(leader.names)} ({percent}), but {', and '.join(but)}",
-        certain,
+        misfit,
         _law(tuple(mentioned)),
     )
+
+
+def _lacking(leader: Answer, of_answer: OfAnswer) -> tuple[str, bool]:
+    """The mechanisms of the leading set with their probability, and whether that is each mechanism's own.
+
+    It is where a mechanism is in other sets too, or these have its twin in its place.
+    """
+    group, least = next(iter(of_answer.groups), None), leader.probability + _WORTH_NAMING
+    twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
+    if group is not None and twins and group["probability"] > least:
+        return f"{_group_in_words(group)}, rather {in_words(leader.names)} ({in_percent(leader.probability)})", True
+    present = {entry["name"]: entry["probability"] for entry in of_answer.mechanisms}
+    if not any(present.get(name, 0.0) > least for name in leader.names):
+        return f"{in_words(leader.names)} (probability {in_percent(leader.probability)})", False
+    own = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
+    return " and ".join(map(_group_in_words, own)), True
+
+
+def _group_in_words(group: Mapping[str, Any]) -> str:
+    named = " or ".join(in_words([name]) for name in group["mechanisms"])
+    return f"{named} ({in_percent(group['probability'])})"
 
 
 def _each(answers: Sequence[Answer]) -> str:

@@ -193,7 +193,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         statement = law_statement(leader.probability, leading, law, floor, around, left, outweighed=ahead)
     else:
         of_answer = OfAnswer(
-            group=present[0] if present else None,
+            groups=present,
             idle=_idle(diagnosis, named) if named is not None else (),
             mechanisms=mechanisms,
             told=_told(problem, mechanisms) if named is not None else (),
