@@ -14,6 +14,7 @@ from underskin.units import Floats
 
 _FEW = 16  # rows that are not worth being taken at once
 _LOOSE = 4096  # rows that are kept as lists
+_APART = 1 << 16  # rows that are kept in parts
 _LEAST = 2  # rows of a group
 _MOST_GROUPS = 1000
 Lines = list[tuple[int, str]]  # with their numbers, from 0
@@ -30,7 +31,9 @@ class Section:
     _starts: list[int] = field(default_factory=list)
     _count: int = 0
     _loose: list[Sequence[float]] = field(default_factory=list)
-    _parts: list[list[Floats]] = field(default_factory=list)
+    _parts: list[Sequence[Floats]] = field(default_factory=list)
+    _in_parts: int = 0
+    _whole: list[Floats] = field(default_factory=list)
 
     @property
     def group_starts(self) -> tuple[int, ...]:
@@ -56,22 +59,33 @@ class Section:
         self._gather()
         self.last = last
         self._count += len(columns[0])
-        self._parts.append(list(columns))
+        self._add_part(columns)
+
+    def columns(self) -> list[Floats]:
+        """The columns of numbers."""
+        self._gather()
+        if self._parts:
+            self._join()
+        return self._whole
 
     def _gather(self) -> None:
         if self._loose:
-            self._parts.append([column.copy() for column in np.array(self._loose, dtype=np.float64).T])
+            self._add_part(np.array(self._loose, dtype=np.float64).T)
             self._loose = []
 
-    def columns(self) -> list[Floats]:
-        """The columns of numbers; the section is empty afterwards, so that they are not in memory twice."""
-        self._gather()
-        whole = []
-        for place in range(len(self._parts[0])):
-            whole.append(np.concatenate([part[place] for part in self._parts]))
-            for part in self._parts:
-                part[place] = np.empty(0)
-        return whole
+    def _add_part(self, columns: Sequence[Floats]) -> None:
+        self._parts.append(columns)
+        self._in_parts += len(columns[0])
+        if self._in_parts >= _APART:
+            self._join()
+
+    def _join(self) -> None:
+        """Lengthen the columns in their place by the parts, so that a long file is not in memory twice."""
+        self._whole = self._whole or [np.empty(0) for _ in self._parts[0]]
+        for place, column in enumerate(self._whole):
+            column.resize(self._count, refcheck=False)
+            np.concatenate([part[place] for part in self._parts], out=column[-self._in_parts :])
+        self._parts, self._in_parts = [], 0
 
 
 @dataclass
