@@ -6,6 +6,7 @@ import pytest
 from rig.description import parse as experiment
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
+from tests.support.cases import first
 from tests.support.kinds_campaigns import BLOCK, LINES, SKIN, SPHERE, Effects, curves, lines, modulus_of, named, report
 from underskin.diagnosis.data.dataset import lines as frf_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
@@ -42,7 +43,7 @@ def test_relaxation_that_short_curves_tell_as_a_rate_alone_is_the_skins(table: S
 
 @pytest.mark.parametrize(
     ("fraction", "time_s", "dwells", "preloads", "hold"),
-    [(0.3, 20.0, [5.0, 8.0], [1, 2], 10.0), (0.22, 6.0, [30.0, 60.0], [0.5, 1, 2, 3, 5], 4.0)],
+    first(1, [(0.22, 6.0, [30.0, 60.0], [0.5, 1, 2, 3, 5], 4.0), (0.3, 20.0, [5.0, 8.0], [1, 2], 10.0)]),
 )
 def test_relaxation_that_curves_tell_better_than_frfs_is_theirs(
     fraction: float, time_s: float, dwells: list[float], preloads: list[float], hold: float, table: SigmaTable

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bench.soak import SOAK
 from rig.commands import rig as command
 from rig.description import parse
 from rig.draw_elastomer import block_description, indentation_description
@@ -161,7 +162,7 @@ def test_what_is_declared_is_off_in_half_and_within_the_ranges(what: str) -> Non
 @pytest.mark.slow
 def test_truths_are_json_and_documents_are_campaigns() -> None:
     for what in WHAT:
-        for number in range(3):
+        for number in range(3 if SOAK else 1):
             documents, truth = drawn_joint(9, number, what)
             json.dumps([documents, truth], allow_nan=False)
             for document, said in zip(documents, truth["documents"], strict=True):

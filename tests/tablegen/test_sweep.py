@@ -55,7 +55,7 @@ def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, 
     path = tmp_path / "sigma.h5"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     generator = np.random.default_rng(1)
-    for _ in range(8 if SOAK else 2):
+    for _ in range(8 if SOAK else 1):
         seen = len(list(tmp_path.glob(PIECES)))
         sweep = subprocess.Popen(
             [sys.executable, script, path], env=environment, start_new_session=True, stdout=subprocess.DEVNULL

@@ -38,7 +38,7 @@ def own_place(tmp_path: Path) -> Place:
 
 def warmed() -> dict[str, object]:
     """A campaign whose gain rises by 2 % a degree, the temperature in a column of its own."""
-    quiet = made_campaign(Made(sensors=2, repeats=3, gain=0.005, seed=3), load_table())
+    quiet = made_campaign(Made(sensors=1, repeats=3, gain=0.005, seed=3), load_table())
     temperatures = np.random.default_rng(5).uniform(20, 30, len(quiet.recordings))
     recordings = []
     for entry, temperature in zip(quiet.recordings, temperatures.tolist(), strict=True):
