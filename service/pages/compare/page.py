@@ -1,4 +1,5 @@
-"""Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference."""
+"""Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference; of
+curves, these and Young's modulus."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
@@ -7,12 +8,14 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
+from service.pages.compare import curves
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, sensors_of
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
 from service.usecases import d33_cache
+from underskin.mechanisms.base import Kind
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/compare")
@@ -23,37 +26,75 @@ _COLUMNS = (
     "difference_pc_per_n", "difference_uncertainty_pc_per_n",
 )  # fmt: skip
 
+KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")
+WORDS = {"frf": "FRFs", "indentation": "indentations", "compression": "compressions"}
 Chosen = Annotated[str, Query(max_length=200)]
+ChosenKind = Annotated[Kind | None, Query()]
 
 
 @router.get("")
 def compare(
-    request: Request, store: Store, table: Table, first: Chosen = "", second: Chosen = "", skin: Chosen = ""
+    request: Request,
+    store: Store,
+    table: Table,
+    first: Chosen = "",
+    second: Chosen = "",
+    skin: Chosen = "",
+    kind: ChosenKind = None,
 ) -> Response:
-    """Of the campaigns `first` and `second`; where one is not named, the one with FRFs in use of `skin` that was
-    recorded first or last."""
+    """Of the campaigns `first` and `second`; where one is not named, the one with recordings of a `kind` in use, of
+    `skin` or of all, that was recorded first or last. Without a kind, the first of `KINDS` that the first campaign has,
+    or any."""
+    kind = kind or _kind(store, table, skin, first)
     with store.reading() as connection:
-        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind="frf"))
+        offered = [one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)]
+        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind=kind))
         if listed:
-            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind="frf", oldest_first=True)
+            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind=kind, oldest_first=True)
             first = first or oldest.id
             second = second or next((row.id for row in listed if row.id != first), first)
         both = [campaigns.find(connection, one) for one in (first, second) if one]
     listed += [row for row in both if row.id not in {one.id for one in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]
-    rows = _rows(answers) if first != second else []
+    is_two = first != second
+    rows = _rows(answers) if is_two and kind == "frf" else []
+    of_curves = curves.rows(kind, both, answers) if is_two and kind != "frf" else []
+    beside = drawn_maps(both, answers, rows)
     return page(
         request,
         "compare.html",
         skin=skin,
+        kind=kind,
+        offered=offered,
+        words=WORDS,
         listed=listed,
         first=first,
         second=second,
         both=both,
         rows=rows,
-        figures=drawn_maps(both, answers, rows),
+        means=curves.means(of_curves) if of_curves else [],
+        figures=curves.figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else beside,
         same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
     )
+
+
+def _kind(store: Database, table: SigmaTable, skin: str, first: str) -> Kind:
+    """The first of `KINDS` that the campaign `first` has, or else any campaign."""
+    if first:
+        answer = _answer(store, table, first)
+        has = {entry["kind"] for entry in answer["moduli"]} if not answer["sensors"] else {KINDS[0]}
+    else:
+        with store.reading() as connection:
+            has = {one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)}
+    return next((one for one in KINDS if one in has), KINDS[0])
+
+
+@router.get("/moduli.csv")
+def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: Kind) -> Response:
+    """Young's modulus of each curve of both campaigns."""
+    both = [store.read(campaigns.find, one) for one in (first, second)]
+    rows = curves.rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
+    return csv_of_rows("moduli", curves.COLUMNS, rows)
 
 
 @router.get("/difference.csv")

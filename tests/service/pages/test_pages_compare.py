@@ -3,6 +3,7 @@
 import csv
 import re
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -112,6 +113,70 @@ def test_only_what_has_frfs_is_offered_and_none_with_itself(idle: Server) -> Non
     assert "There is one campaign with FRFs of this skin: nothing to compare it with." in text
     assert 'id="figure-map-first"' not in text
     assert f"single 1, received {time.strftime('%Y', time.gmtime())}-" in text
+
+
+def pressed(name: str, moduli_mpa: Sequence[float], year: int) -> dict[str, object]:
+    """A campaign of blocks, each of another modulus."""
+    documents = [block(name, modulus_mpa=modulus) for modulus in moduli_mpa]
+    dated = {"recorded_at": f"{year}-01-01T00:00:00Z"}
+    recordings = [{**one["recordings"][0], **dated, "id": f"b{number}"} for number, one in enumerate(documents)]
+    return {**documents[0], "recordings": recordings}
+
+
+@pytest.mark.parametrize("width", [1180, 390])
+def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(reader: Visit, idle: Server, width: int) -> None:
+    skin = f"pressed{width}"
+    ids = [sent(idle, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
+    ids.append(sent(idle, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
+    page = reader.page
+    page.set_viewport_size({"width": width, "height": 800})
+    reader.go(f"/skins/{skin}")
+    page.get_by_role("link", name="Compare").click()
+    page.wait_for_url("**/compare?skin=*")
+    reader.drawn(2)
+    reader.require_accessible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert page.get_by_label("First", exact=True).input_value() == ids[0]
+    told = page.get_by_role("region", name="Young's modulus of the curves").inner_text()
+    assert re.search(r"First\s+3\s+2\.000", told)
+    interval = re.search(r"Difference\s+–\s+-0\.5000\s+(-\S+) to (-\S+)", told.replace("−", "-"))
+    assert interval is not None
+    # Welch's: t(0.975; 4) = 2.776, of two standard errors of 0.02/√3
+    half = 2.776 * 0.02 * (2 / 3) ** 0.5
+    assert [float(one) for one in interval.groups()] == pytest.approx([-0.5 - half, -0.5 + half], abs=2e-4)
+    assert page.get_by_text("the two differ beyond the scatter of their curves").is_visible()
+    legend = page.locator("#figure-curves .plot").evaluate(
+        "plot => plot.data.filter((one) => one.showlegend !== false).map((one) => one.name)"
+    )
+    assert legend == ["first", "second"]
+    query = {"first": ids[0], "second": ids[1], "kind": "compression"}
+    rows = list(csv.DictReader(idle.http.get("/compare/moduli.csv", params=query).text.splitlines()))
+    assert [row["which"] for row in rows] == ["first"] * 3 + ["second"] * 3
+    assert float(rows[3]["youngs_modulus_mpa"]) == pytest.approx(1.5, rel=1e-6)
+
+
+def test_single_curves_have_a_difference_without_an_interval(idle: Server) -> None:
+    for name, modulus, year in (("soft", 2.0, 2030), ("hard", 3.0, 2031)):
+        sent(idle, pressed(name, [modulus], year), "single")
+    text = idle.http.get("/compare?skin=single", headers=BROWSING).text
+    assert "it cannot be told how far curves scatter" in text
+    row = re.search(r"<tr><th scope=.row.>Difference</th>.*?</tr>", text, re.DOTALL)
+    assert row is not None
+    cells = [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td.*?</td>", row[0])]
+    assert (cells[0], float(cells[1]), cells[2]) == ("–", pytest.approx(1.0, rel=1e-3), "–")
+
+
+def test_kinds_of_which_there_are_campaigns_are_offered(idle: Server) -> None:
+    sent(idle, one_sensor(6), "kinds")
+    first = sent(idle, block("alone", recorded_at="2031-01-01T00:00:00Z"), "kinds")
+    text = idle.http.get("/compare?skin=kinds", headers=BROWSING).text
+    assert "<strong>FRFs</strong>" in text
+    assert "/compare?kind=compression&amp;skin=kinds" in text
+    text = idle.http.get("/compare?skin=kinds&kind=compression", headers=BROWSING).text
+    assert "There is one campaign with compressions of this skin" in text
+    chosen = idle.http.get(f"/compare?skin=kinds&first={first}", headers=BROWSING).text
+    assert "<strong>compressions</strong>" in chosen
+    assert idle.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
 
 
 def test_a_map_is_grey_where_that_of_its_campaign_is(idle: Server) -> None:

@@ -1,0 +1,86 @@
+"""Two campaigns of curves side by side: their curves, and Young's modulus as each campaign has it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from service.pages.shared.figures import Drawn, columns_of, drawn
+from service.store import AnyRow, Database, campaigns
+from underskin.recordings.campaign import FrfRecording
+from underskin.units import Floats
+
+COLUMNS = ("which", "campaign", "recording", "youngs_modulus_mpa", "youngs_modulus_uncertainty_mpa", "statement")
+_MOST_CURVES = 12  # of each campaign
+_NAMES = ("first", "second")
+_MODULUS = "youngs_modulus_mpa"
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean of moduli [MPa], or the difference of two, with its 95 % interval from how far the curves scatter; a
+    single curve has none."""
+
+    curves: int
+    value_mpa: float
+    low_mpa: float | None
+    high_mpa: float | None
+
+
+def rows(kind: str, both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Young's modulus of each curve of a kind, of the first campaign and then of the second."""
+    return [
+        {"which": name, "campaign": row.id, **entry}
+        for name, row, answer in zip(_NAMES, both, answers, strict=True)
+        for entry in answer["moduli"]
+        if entry["kind"] == kind
+    ]
+
+
+def means(of_curves: Sequence[Mapping[str, Any]]) -> list[Mean]:
+    """The mean of the first campaign and of the second, and the second less the first (Welch's interval: the campaigns
+    may scatter differently); none where one has no modulus."""
+    from scipy import stats
+
+    first, second = (np.array([row[_MODULUS] for row in of_curves if row["which"] == name]) for name in _NAMES)
+    if not (first.size and second.size):
+        return []
+    gap = float(second.mean() - first.mean())
+    found = [_mean(first), _mean(second)]
+    if min(first.size, second.size) < 2 or not (np.ptp(first) or np.ptp(second)):
+        return [*found, Mean(min(first.size, second.size), gap, None, None)]
+    interval = stats.ttest_ind(second, first, equal_var=False).confidence_interval()
+    return [*found, Mean(min(first.size, second.size), gap, float(interval.low), float(interval.high))]
+
+
+def _mean(moduli: Floats) -> Mean:
+    from scipy import stats
+
+    value = float(moduli.mean())
+    if moduli.size < 2:
+        return Mean(1, value, None, None)
+    half = float(stats.t.ppf(0.975, moduli.size - 1) * moduli.std(ddof=1) / np.sqrt(moduli.size))
+    return Mean(moduli.size, value, value - half, value + half)
+
+
+def figures(store: Database, kind: str, both: Sequence[AnyRow], of_curves: Sequence[Mapping[str, Any]]) -> list[Drawn]:
+    """The curves of both, each campaign in a colour, and the modulus of each curve."""
+    from underskin.figures.curves import ForceCurve, curve_moduli, force_curves
+
+    curves, counts = [], []
+    for name, row in zip(_NAMES, both, strict=True):
+        recordings = store.read(campaigns.load, row, with_excluded=False).recordings
+        own = [one for one in recordings if not isinstance(one, FrfRecording) and one.kind == kind]
+        counts.append(f"{min(len(own), _MOST_CURVES)} of {len(own)} of the {name}")
+        curves += [ForceCurve(one.id, one.displacement_mm, one.force_n, of=name) for one in own[:_MOST_CURVES]]
+    about = f"Curves as they were recorded: {' and '.join(counts)}."
+    which, names, modulus, uncertainty = columns_of(
+        of_curves, "which", "recording", _MODULUS, "youngs_modulus_uncertainty_mpa"
+    )
+    place = f"/compare/moduli.csv?first={both[0].id}&second={both[1].id}&kind={kind}"
+    told = "Young's modulus of each curve, with its 95 % interval by the noise of that curve alone."
+    return [
+        drawn("curves", force_curves(curves), about),
+        *([drawn("moduli", curve_moduli(which, names, modulus, uncertainty), told, place)] if of_curves else []),
+    ]
