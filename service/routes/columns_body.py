@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -34,27 +35,36 @@ _WORKBOOK = "the workbook of the body"
 _Kind = TypeVar("_Kind", bound=ColumnsRequest)
 
 
+@dataclass(frozen=True)
+class Told:
+    """What a CSV or workbook says beside the fields: columns of words (`labels`), which only say what a row is; and in
+    `notes` what was left out or read otherwise than its heading says."""
+
+    labels: Mapping[str, Sequence[str]]
+    notes: Sequence[str]
+
+
 def parse(
     kind: type[_Kind], body: bytes, content_type: str, most_bytes: int, sheet: str | None = None
-) -> tuple[_Kind, Mapping[str, Sequence[str]]]:
-    """The request in `body`, and the columns of words in a CSV or workbook, which only say what a row is; an .npz may
-    have `most_bytes` when it is expanded; `sheet`: of a workbook, which is read in a process of its own, as files are.
+) -> tuple[_Kind, Told]:
+    """The request in `body`, and what else a CSV or workbook says; an .npz may have `most_bytes` when it is expanded;
+    `sheet`: of a workbook, which is read in a process of its own, as files are.
 
     Raises Refusal 400 (unreadable), 413 (too large), 415 (another type) or 422 (a field is wrong), and InvalidInput.
     """
-    labels: Mapping[str, Sequence[str]] = {}
+    told = Told({}, ())
     if sheet is not None and not is_workbook(content_type):
         raise conflicting("sheet", sheet, f"must be left out: the body is no workbook ({XLSX})")
     match media_type_of(content_type):
         case "text/csv":
             fields: Any
-            fields, labels = _from_csv(kind, body, "The CSV of the body")
+            fields, told = _from_csv(kind, body, "The CSV of the body")
         case _ if is_workbook(content_type):
             try:
                 text = sheet_text(body, _WORKBOOK, sheet)
             except FileError as error:
                 raise Refusal(400, f"{error}.") from None
-            fields, labels = _from_csv(kind, text.encode(), "The workbook of the body")
+            fields, told = _from_csv(kind, text.encode(), "The workbook of the body")
         case "application/x-npz":
             fields = fields_of_npz(kind, body, most_bytes)
         case "" | "application/json" if (
@@ -65,7 +75,7 @@ def parse(
             fields = _long_json(kind, body)
         case _:
             fields = json_document(body, content_type, f", {CSV}, {NPZ} or {XLSX}")
-    return validated(kind, fields), labels
+    return validated(kind, fields), told
 
 
 def json_document(body: bytes, content_type: str, also: str = "") -> Any:
@@ -152,7 +162,7 @@ def _comes_more_often(mark: bytes, times: int, body: bytes) -> bool:
     return True
 
 
-def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], dict[str, list[str]]]:
+def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[str, Any], Told]:
     cells = sum(map(body.count, (b",", b";", b"\t", b"\n", b"\r")))  # or fewer, where numbers have decimal commas
     if cells > _MOST_CSV_CELLS:
         most = f"{_MOST_CSV_CELLS:,} may be in one; send less at once, or JSON or {NPZ}."
@@ -165,7 +175,7 @@ def _from_csv(kind: type[ColumnsRequest], body: bytes, what: str) -> tuple[dict[
     return {
         **{name: cells[0] for name, cells in found.unknown.items()},
         **{name: _cells(kind, name, column) for name, column in found.fields.items()},
-    }, found.labels
+    }, Told(found.labels, found.notes)
 
 
 def _cells(kind: type[ColumnsRequest], name: str, column: CsvColumn | RealPart) -> Any:

@@ -1,7 +1,8 @@
 """Endpoints that take and answer columns as JSON, CSV or .npz, and what OpenAPI says of them; bodies of JSON."""
 
 import asyncio
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
@@ -32,6 +33,14 @@ _BINARY = {"schema": {"type": "string", "format": "binary"}}
 # Beside JSON, what an answer in columns may be, for OpenAPI.
 OTHER_ANSWERS: dict[str, Any] = {CSV: {}, NPZ: _BINARY}
 
+NOTES = "Underskin-Notes"
+_MOST_NOTES, _LONGEST_NOTE = 10, 120
+_NOTES_SAID = (
+    "Of a CSV or workbook, what was read otherwise than its headings say, such as a diameter that was halved, and what "
+    "was left out: a JSON list of sentences. Without it, nothing was."
+)
+_HEADERS = {NOTES: {"description": _NOTES_SAID, "schema": {"type": "string"}}}
+
 # A body up to this size is answered on the event loop (a few ms at most); a larger one in a thread, a few at a time.
 _INLINE_BYTES = 1024
 
@@ -60,11 +69,14 @@ def add_columns_route(
 
         def work() -> Response:
             with np.errstate(all="ignore"):  # what overflows is answered as out of the domain
-                asked, labels = parse(kind, body, content_type, most_bytes, sheet)
+                asked, told = parse(kind, body, content_type, most_bytes, sheet)
                 found = answer(table, store, asked)
                 if preferred(accept) == CSV:  # the rows go back to where they came from, with what they are called
-                    found = replace(found, names={**labels, **found.names})
-                return respond(found, accept)
+                    found = replace(found, names={**told.labels, **found.names})
+                answered = respond(found, accept)
+                if told.notes:
+                    answered.headers[NOTES] = json.dumps(_few(told.notes))
+                return answered
 
         if is_workbook(content_type):
             async with READING_SLOTS:
@@ -80,9 +92,15 @@ def add_columns_route(
         operation_id=f"{path[1:]}_columns",
         tags=[path[1:]],
         summary=summary,
-        responses={200: {"model": answer_kind, "content": OTHER_ANSWERS}},
+        responses={200: {"model": answer_kind, "content": OTHER_ANSWERS, "headers": _HEADERS}},
         openapi_extra=described_body(kind.__name__, example, **others),
     )(endpoint)
+
+
+def _few(notes: Sequence[str]) -> list[str]:
+    """As many notes as a header has room for, and how many more there are."""
+    shown = [note[:_LONGEST_NOTE] for note in notes[:_MOST_NOTES]]
+    return [*shown, f"and {len(notes) - _MOST_NOTES} more"] if len(notes) > _MOST_NOTES else shown
 
 
 async def answer_json(request: Request, answer: Callable[[Any], Response]) -> Response:

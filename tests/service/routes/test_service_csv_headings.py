@@ -1,5 +1,6 @@
 """Headings of CSV columns over HTTP are those of the CSV template; what is wrong is told at once."""
 
+import json
 from typing import Any
 
 import httpx
@@ -57,3 +58,20 @@ def test_all_wrong_fields_are_told_at_once(http: httpx.Client, path: str, result
         ("youngs_modulus_mpa", None),
         ("preload_n", 0),
     ]
+
+
+def test_what_was_read_otherwise_than_its_heading_says_is_told(http: httpx.Client) -> None:
+    """In a header of the answer, since columns have no room for it."""
+    columns = {**SKIN, "preload_n": 1, "d33_pc_per_n": 14}
+    plain = sent(http, "/v1/frf", columns)
+    assert "Underskin-Notes" not in plain.headers
+    radius = columns.pop("indenter_radius_mm")
+    halved = sent(http, "/v1/frf", {**columns, "Indenter diameter [mm]": 2 * radius})
+    assert halved.json() == plain.json()
+    assert json.loads(halved.headers["Underskin-Notes"]) == ["'Indenter diameter [mm]' is halved"]
+    body = "a_over_h,rt_over_h\n0.3,0.6\n\n" + "".join(f"µ {number}\n" for number in range(14))
+    notes = json.loads(
+        http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"}).headers["Underskin-Notes"]
+    )
+    assert "µ 0" in notes[0]
+    assert (len(notes), notes[-1]) == (11, "and 4 more")
