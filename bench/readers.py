@@ -40,7 +40,7 @@ def measure() -> list[Figure]:
             _write(file, above, rows)
             figures.append(Figure(f"100 MB of CSV, {name}", _seconds(file), "s", _MOST_S, "lower"))
     most = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3
-    return [*figures, Figure("Memory of the process that reads them, at most", most, "MB")]
+    return [*figures, Figure("Memory of the process that reads them, at most", most, "MB", 500, "lower")]
 
 
 def _write(file: Path, above: str, rows: Callable[[Floats, int], Iterator[str]]) -> None:

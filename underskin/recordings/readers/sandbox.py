@@ -32,6 +32,7 @@ _LAST_WORDS = 500
 _WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to refuse a file
 _CELL = 2  # entries of a cell in an answer: its text and its place
 _LENGTH = struct.Struct("<Q")
+_LONG_BYTES = 4 << 20  # arrays of more lie apart from each other (glibc), so that they grow without being copied
 
 
 def parse_apart(name: str, stream: BinaryIO, file: str, limits: ParsingLimits | None = None) -> Contents | Document:
@@ -62,6 +63,7 @@ def call_apart(
     stream.seek(0)
     environment = {key: os.environ[key] for key in _INHERITED if key in os.environ}
     environment |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "HDF5_PLUGIN_PATH": os.devnull}
+    environment["MALLOC_MMAP_THRESHOLD_"] = str(_LONG_BYTES)
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))  # the packages of this process
     bounds = [str(limits.memory_bytes), str(limits.seconds), str(longest)]
     command = [sys.executable, "-P", "-m", __name__, function, *bounds, *given]
