@@ -70,7 +70,7 @@ class Section:
 
     def _gather(self) -> None:
         if self._loose:
-            self._add_part(np.array(self._loose, dtype=np.float64).T)
+            self._add_part(list(np.array(self._loose, dtype=np.float64).T))
             self._loose = []
 
     def _add_part(self, columns: Sequence[Floats]) -> None:
