@@ -85,7 +85,7 @@ def response_per_sensor(
     if array_pc_per_n is not None:
         low_end, high_end = array_pc_per_n
         figure.add_hrect(
-            y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.35, line_width=0, annotation_text="array, 95 %"
+            y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.22, line_width=0, annotation_text="array, 95 %"
         )
     plain = np.array([not reason for reason in reasons])
     for name, own, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):

@@ -1,4 +1,6 @@
-"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve."""
+"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve; in the reader's
+colours.
+"""
 
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
@@ -15,6 +17,13 @@ _DASHES = ("7 4", "", "2 3")  # weak, usual, strong
 _BASE = "#6b7680"
 _FONT = 'font-family="system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif" font-size="12"'
 _QUIET = "#55626f"
+_GROUND = "#ffffff"
+# What each colour is where the reader prefers a dark scheme; the other ones stay.
+_DARK = {
+    INK: "#e4e9ee", _QUIET: "#a9b5c0", _BASE: "#a9b5c0", GRID: "#38434e", _GROUND: "#14191f", COLOURS[0]: "#56a7dc",
+}  # fmt: skip
+_RULES = "".join(f'[fill="{one}"]{{fill:{dark}}}[stroke="{one}"]{{stroke:{dark}}}' for one, dark in _DARK.items())
+STYLE = f"@media (prefers-color-scheme:dark){{{_RULES}}}"
 
 
 def picture(name: str, effect: LawEffect) -> str:
@@ -22,7 +31,8 @@ def picture(name: str, effect: LawEffect) -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" {_FONT} fill="{INK}">',
         f"<title>{escape(name)}</title>",
-        f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="#fff"/>',
+        f"<style>{STYLE}</style>",
+        f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="{_GROUND}"/>',
     ]
     along = _scaled(_axis(effect.x, effect), _LEFT, WIDTH - _RIGHT)
     for number, panel in enumerate(effect.panels):

@@ -17,6 +17,7 @@ from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.answer_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.figures import explanations
+from underskin.diagnosis.reporting.scheme import SCHEME
 from underskin.diagnosis.reporting.several_figures import several_figures
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
@@ -78,7 +79,8 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    return str(_macros("file.html").page(report, drawn, get_plotlyjs() if drawn else ""))
+    scripts = (get_plotlyjs(), SCHEME.read_text("utf-8")) if drawn else ()
+    return str(_macros("file.html").page(report, drawn, scripts))
 
 
 def body_of(report: Report, drawn: FigureHtml) -> str:
