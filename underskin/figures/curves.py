@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.figures.style import label, line, styled
+from underskin.figures.style import label, one_of_many, styled
 from underskin.units import Floats, readable_unit
 
 _MOST_SAMPLES = 400  # of one curve
@@ -33,9 +33,8 @@ def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
         figure.add_scatter(
             x=(per_mm * curve.displacement_mm[chosen]).astype(np.float32),
             y=(per_n * curve.force_n[chosen]).astype(np.float32),
-            mode="lines",
             name=label(curve.name),
-            line=line(number, 1.4),
+            **one_of_many(number, 1.4),
             hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} {length}: %{{y:.4g}} {force}<extra></extra>",
         )
     figure.update_xaxes(title=f"displacement [{length}]")
