@@ -83,9 +83,10 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     return str(_macros("file.html").page(report, drawn, scripts))
 
 
-def body_of(report: Report, drawn: FigureHtml) -> str:
-    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
-    return str(_macros("report.html").body(report, drawn))
+def body_of(report: Report, drawn: FigureHtml, plan: str | None = None) -> str:
+    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next; `plan`:
+    address of the planned recordings, without the .csv or .xlsx at its end."""
+    return str(_macros("report.html").body(report, drawn, plan))
 
 
 def provenance(report: Report) -> str:
