@@ -59,7 +59,8 @@ def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
 def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
     if not report:
-        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at, row.name)
+        beside = "open it to see why and what to do" if row.state == "failed" else ""
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", beside, at, row.name)
     law = report["verdict"] == "unexplained" and report.get("unnamed")
     tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
@@ -73,7 +74,8 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
 
 
 def _beside(report: Mapping[str, Any]) -> str:
-    """The explanations with their probabilities, or the law; of no mismatch, what is not ruled out."""
+    """What the model lacks, each mechanism with its own probability; of several answers each with its probability; or
+    the law; of no mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
     law = report.get("unnamed")
     if verdict == "unexplained" and law:
@@ -84,6 +86,9 @@ def _beside(report: Mapping[str, Any]) -> str:
         for entry in report.get("alternatives", ())[:_MOST_RIVALS]
         if entry["probability"] > _WORTH_NAMING
     ]
+    if report["mechanisms"] and verdict == "explained":
+        said = [f"{in_words([one['name']])} ({in_percent(one['probability'])})" for one in report["mechanisms"]]
+        return f"lacks {' and '.join(said)}"
     if probability >= EXPLAINED or verdict == "unexplained":
         return " ".join(leader)
     if verdict == "no_mismatch":

@@ -184,7 +184,7 @@ WARMTH = {
         ("no_mismatch", 0.6, [], [("strain_stiffening", 0.38)], "no mismatch found, 60 %",
          "not ruled out: strain stiffening 38 %", "look"),
         ("explained", 0.97, ["contact_resonance"], [("timing_delay", 0.03)], "mismatch, explained",
-         "contact resonance 97 %", "look"),
+         "lacks contact resonance (98.5 %)", "look"),
         ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
          "mismatch, several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
         ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch, no explanation, 99.9 %", "", "look"),

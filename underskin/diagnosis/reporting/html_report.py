@@ -47,9 +47,9 @@ plot.before(label, " ", steps[0], " ", steps[1]);
 """  # stands in for a figure's own menu, which only a pointer can open
 
 _FILTERS = (
-    *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
-    *(wording.quantity, wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
-    *(first_and_rest, in_percent, lacking_part),
+    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group, wording.interval, wording.number),
+    *(wording.plain, wording.quantity, wording.readable, wording.unit, wording.words, wording.law_range),
+    *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
