@@ -103,7 +103,8 @@ def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -
     assert tags.text.index(first) < tags.text.index("Where")
     headings = re.findall(r"<h2>(.*?)</h2>", text)
     assert headings == [
-        "Where", "What", "How much better", "Look at these recordings", "What to measure next", "Made with",
+        "Where the model and the recordings differ", "What the model lacks, and the values found",
+        "How well the models describe the recordings", "Look at these recordings", "What to measure next", "Made with",
     ]  # fmt: skip
     wanted = [document["location"]["statement"], *(readable(entry["statement"]) for entry in document["findings"])]
     wanted += [entry["why_not"] for entry in document["alternatives"]]

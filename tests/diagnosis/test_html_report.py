@@ -25,6 +25,9 @@ EMPTY: dict[str, Any] = {
 }
 
 
+WHERE = "Where the model and the recordings differ"
+
+
 def texts(html: str) -> str:
     return " ".join(unescape(re.sub(r"<[^>]+>", " ", html)).split())
 
@@ -52,9 +55,9 @@ def test_every_text_of_a_campaign_is_escaped() -> None:
 
 def test_a_report_without_an_answer_says_what_is_lacking() -> None:
     shown = body_of(EMPTY, {})
-    assert re.findall("<h2>(.*?)</h2>", shown) == ["Where", "What to measure next"]
+    assert re.findall("<h2>(.*?)</h2>", shown) == [WHERE, "What to measure next"]
     assert texts(shown) == (
-        "The recordings cannot tell anything: no recording can be used. too little data Where Nothing was located. "
+        f"The recordings cannot tell anything: no recording can be used. too little data {WHERE} Nothing was located. "
         "What to measure next What is lacking: no recording can be used."
     )
     assert texts(provenance(EMPTY)) == "Made with underskin 1 tables sigma ab"
@@ -65,7 +68,7 @@ def test_figures_stand_where_they_belong_and_are_not_escaped() -> None:
     shown = body_of(EMPTY, {name: f'<div id="{name}"></div>' for name in names})
     places = [shown.index(f'<div id="{name}"></div>') for name in names]
     assert places == sorted(places)
-    assert places[2] < shown.index("<h2>Where</h2>") < shown.index("<h2>What</h2>") < places[3]
+    assert places[2] < shown.index(f"<h2>{WHERE}</h2>") < shown.index("<h2>What the model lacks") < places[3]
 
 
 def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:

@@ -4,6 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from underskin.diagnosis.reporting.line_styles import PAPER
 from underskin.errors import InvalidInput
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.curves import ForceCurve, force_curves
@@ -28,7 +29,8 @@ def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
     assert list(points["4 mm, model"].x) == [0.5, 1.0]
     assert points["4 mm, measured"].marker.symbol != points["10 mm, measured"].marker.symbol
     assert points["4 mm, measured"].marker.color != points["10 mm, measured"].marker.color
-    assert points["4 mm, model"].line.dash != points["10 mm, model"].line.dash
+    assert {points[f"{size} mm, model"].line.dash for size in (4, 10)} == {PAPER}
+    assert points["4 mm, model"].line.color == points["4 mm, measured"].marker.color
     np.testing.assert_allclose(points["4 mm, measured"].error_y.array, 1.96 * 0.1 * points["4 mm, measured"].y)
 
 
@@ -130,6 +132,17 @@ def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_sta
     few = d33_history(sensors[:5])
     assert [trace.name for trace in few.data] == [f"s0{number}" for number in range(5)]
     assert few.layout.showlegend is True
+
+
+def test_measured_lines_are_solid_and_differ_however_many_they_are() -> None:
+    count, lines = 12, np.array([1.0, 10.0])
+    history = d33_history([SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(count)])
+    recordings = frf_recordings([FrfLines(f"r{n}", lines, lines, 0 * lines, lines) for n in range(count)], None)
+    curves = force_curves([ForceCurve(f"c{n}", lines, lines) for n in range(count)])
+    for figure in (history, recordings, curves):
+        drawn = [trace for trace in figure.data if trace.showlegend is not False]
+        assert {trace.line.dash for trace in drawn} <= {None, "solid"}
+        assert len({(trace.line.color, trace.mode, trace.marker.symbol) for trace in drawn}) == count
 
 
 def test_frfs_of_many_recordings_have_no_legend() -> None:

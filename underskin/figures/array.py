@@ -9,7 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.style import COLOURS, DASHES, INK, MARKERS, SDS_OF_95, as_columns, label, styled
+from underskin.diagnosis.reporting.line_styles import PAPER
+from underskin.figures.style import COLOURS, INK, MARKERS, SDS_OF_95, as_columns, label, styled
 
 _HOVER_INTERVAL = "%{text}<br>d33 %{y:.5g} pC/N<br>%{customdata[0]:.5g} to %{customdata[1]:.5g} (95 %)<extra></extra>"
 
@@ -22,8 +23,8 @@ def frf_versus_preload(
     frf_uncertainty_pc_per_n: ArrayLike,
     model_frf_pc_per_n: ArrayLike,
 ) -> go.Figure:
-    """The measured FRF of each recording with its 95 % interval, and the model's line, per indenter; uncertainties are
-    standard ones.
+    """The measured FRF of each recording with its 95 % interval, and the paper's model as a dashed line, per indenter;
+    uncertainties are standard ones.
 
     Raises InvalidInput where a column's length differs from that of `recordings`.
     """
@@ -57,7 +58,7 @@ def frf_versus_preload(
             mode="lines",
             name=f"{size:.3g} mm, model",
             hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} pC/N<extra></extra>",
-            line={"color": colour, "dash": DASHES[number % len(DASHES)]},
+            line={"color": colour, "dash": PAPER},
         )
     figure.update_xaxes(title="preload [N]", rangemode="tozero")
     figure.update_yaxes(title="FRF in the flat zone, 95 % [pC/N]", rangemode="tozero")
@@ -85,7 +86,7 @@ def response_per_sensor(
     if array_pc_per_n is not None:
         low_end, high_end = array_pc_per_n
         figure.add_hrect(
-            y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.35, line_width=0, annotation_text="array, 95 %"
+            y0=low_end, y1=high_end, fillcolor=COLOURS[5], opacity=0.22, line_width=0, annotation_text="array, 95 %"
         )
     plain = np.array([not reason for reason in reasons])
     for name, own, style in (("sensor", plain, 0), ("stands out", ~plain, 1)):

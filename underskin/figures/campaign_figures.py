@@ -4,6 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from underskin.diagnosis.reporting.scheme import SCHEME
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.array_map import array_map
 from underskin.inversion.invert import Inversion
@@ -56,6 +57,7 @@ def page(campaign: Campaign, inversion: Inversion) -> str:
         band=f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz" if zone.chosen_by_user else zone.reason,
         notes=[*inversion.findings, *inversion.left_out],
         figures=parts,
+        scheme=SCHEME.read_text("utf-8"),
     )
 
 

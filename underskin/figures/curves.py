@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, as_columns, label, line, styled
+from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, as_columns, label, one_of_many, styled
 from underskin.units import Floats, readable_unit
 
 _MOST_SAMPLES = 400  # of one curve
@@ -41,11 +41,10 @@ def force_curves(curves: Sequence[ForceCurve]) -> go.Figure:
         figure.add_scatter(
             x=(per_mm * curve.displacement_mm[chosen]).astype(np.float32),
             y=(per_n * curve.force_n[chosen]).astype(np.float32),
-            mode="lines",
             name=label(group),
             legendgroup=label(group) if curve.of else None,
             showlegend=is_new,
-            line=line(groups.index(group) if curve.of else len(groups) - 1, 1.4),
+            **one_of_many(groups.index(group) if curve.of else len(groups) - 1, 1.4),
             hovertemplate=f"{label(curve.name)}<br>%{{x:.4g}} {length}: %{{y:.4g}} {force}<extra></extra>",
         )
     figure.update_xaxes(title=f"displacement [{length}]")

@@ -6,7 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from underskin.figures.style import COLOURS, DASHES, styled
+from underskin.diagnosis.reporting.line_styles import BOUND
+from underskin.figures.style import COLOURS, styled
 from underskin.prediction.skin_design import Design
 from underskin.units import Floats, to_lab
 
@@ -29,13 +30,10 @@ def design_overview(design: Design, beside: Pinned | None) -> go.Figure:
     marks.append((Pinned("this design", design), "circle", COLOURS[0]))
     for column, sweep in enumerate(design.sweeps, start=1):
         first = column == 1
-        for name, values, colour, dash in (
-            ("σ, this sphere", sweep.sigma, COLOURS[0], DASHES[0]),
-            ("γ, a point load", sweep.gamma, COLOURS[1], DASHES[1]),
-        ):
+        for number, (name, values) in enumerate((("σ, this sphere", sweep.sigma), ("γ, a point load", sweep.gamma))):
             figure.add_scatter(
                 x=sweep.values, y=values, mode="lines", name=name, legendgroup=name, showlegend=first,
-                line={"color": colour, "dash": dash, "width": 1.8},
+                line={"color": COLOURS[number], "width": (2.4, 1.2)[number]},
                 hovertemplate=f"{_TITLES[sweep.axis]} %{{x:.4g}}<br>{name[0]} %{{y:.4g}}<extra></extra>",
                 row=1, col=column,
             )  # fmt: skip
@@ -64,7 +62,7 @@ def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None
         figure.add_scatter(
             x=(places + number * pitch_mm)[near], y=mirrored[near], mode="lines",
             name=f"sensor at {number * pitch_mm:g} mm",
-            line={"color": COLOURS[abs(number)], "dash": DASHES[(number + _SENSORS) % len(DASHES)], "width": 1.8},
+            line={"color": COLOURS[number + _SENSORS], "width": 1.8},
             showlegend=False, hovertemplate="contact at %{x:.3g} mm<br>sensor reads %{y:.3g} %<extra></extra>",
         )  # fmt: skip
     if beside is not None:
@@ -72,7 +70,7 @@ def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None
         near = np.abs(other) <= half_width
         figure.add_scatter(
             x=other[near], y=reading[near], mode="lines", name=beside.name,
-            line={"color": "#6b7680", "dash": "dot", "width": 2.5},
+            line={"color": "#6b7680", "dash": BOUND, "width": 2.5},
             hovertemplate=f"{beside.name}<br>contact at %{{x:.3g}} mm<br>sensor reads %{{y:.3g}} %<extra></extra>",
         )  # fmt: skip
     half = 1e3 * design.resolution.width / 2

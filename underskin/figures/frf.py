@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.figures.style import DASHES, ZONE, label, line, styled
+from underskin.figures.style import ZONE, label, marked, one_of_many, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
@@ -27,7 +27,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
     """Median magnitude and phase and lowest coherence of each condition, with the range of its magnitudes as a band."""
     traces: list[PlotlyTrace] = []
     for number, spread in enumerate(spreads):
-        colour, dash = _look(spread, spreads)
+        colour, look = _look(spread, spreads)
         name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
         low, middle, high = spread.magnitude_pc_per_n
         band = {
@@ -42,7 +42,6 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
             "legendgroup": str(number),
         }
         parts = (middle, spread.phase_deg[1], spread.coherence[0])
-        look = {"color": colour, "width": 1.5, "dash": dash}
         traces += [band, *_lines(name, str(number), spread.frequency_hz, parts, look)]
     return _finished(traces, zone_hz, "FRF: median and range of the recordings alike")
 
@@ -52,7 +51,7 @@ def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] 
     traces: list[PlotlyTrace] = []
     for number, entry in enumerate(recordings):
         parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
-        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, line(number, 1.2))
+        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, one_of_many(number, 1.2))
     figure = _finished(traces, zone_hz, "FRF of each recording")
     return figure.update_layout(showlegend=len(recordings) <= _MOST_IN_LEGEND)
 
@@ -72,11 +71,10 @@ def _lines(
                 "y": _short(values),
                 "xaxis": f"x{axis}",
                 "yaxis": f"y{axis}",
-                "mode": "lines",
                 "name": name,
                 "legendgroup": group,
                 "showlegend": axis == "",
-                "line": look,
+                **look,
                 "hovertemplate": f"{name}<br>%{{x:.4g}} Hz: %{{y:.5g}}{unit}<extra></extra>",
             }
 
@@ -118,12 +116,14 @@ def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:
     return np.concatenate([np.zeros(0), *(trace["y"] for trace in traces if trace.get("yaxis") == axis)])
 
 
-def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, str]:
-    """Colour by preload, from dark to bright; dash by indenter."""
+def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, dict[str, Any]]:
+    """Colour by preload, from dark to bright, and the whole look: with marks by indenter, if there are several."""
     preloads = sorted({entry.preload_n for entry in spreads})
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
     place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
-    return (sample_colorscale("Viridis", [place])[0], DASHES[radii.index(spread.indenter_radius_mm) % len(DASHES)])
+    colour = sample_colorscale("Viridis", [place])[0]
+    marks = marked(radii.index(spread.indenter_radius_mm)) if len(radii) > 1 else {"mode": "lines"}
+    return colour, {"line": {"color": colour, "width": 1.5}, **marks}
 
 
 def _short(values: Floats) -> "np.ndarray[Any, np.dtype[np.float32]]":

@@ -7,7 +7,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, line, styled
+from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
 _MOST_POINTS = 600  # of a history that shows each sensor
@@ -54,8 +54,8 @@ def _one(number: int, entry: SensorPoints) -> go.Scatter:
         error_y={"type": "data", "array": bars, "thickness": 1, "width": 3},
         mode="lines+markers",
         name=label(entry.sensor),
-        line=line(number, 1.5),
-        marker={"symbol": MARKERS[number % len(MARKERS)], "size": 8},
+        line={"color": COLOURS[number % len(COLOURS)], "width": 1.5},
+        marker={"symbol": MARKERS[(number + number // len(COLOURS)) % len(MARKERS)], "size": 8},
         hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
         f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(entry.trend)}<extra></extra>",
     )

@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.array_stress.answer import BaseStress
+from underskin.diagnosis.reporting.line_styles import BOUND
 from underskin.figures.array_map import Quantity, array_map
 from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats
@@ -102,7 +103,7 @@ def stress_on_base(
     )
     contacts = [_circle(place, radius) for place, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)]
     for name, outlines, line in (
-        ("contact", contacts, {"color": COLOURS[3], "width": 2, "dash": "dash"}),
+        ("contact", contacts, {"color": COLOURS[3], "width": 2, "dash": BOUND}),
         ("sensor", [_circle(place, sensor_radius_mm) for place in sensors_mm], {"color": COLOURS[1], "width": 2}),
     ):
         figure.add_scatter(

@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 
+from underskin.diagnosis.reporting.line_styles import BOUND
 from underskin.figures.style import COLOURS, styled
 from underskin.prediction.stress_field import StressField
 from underskin.units import Floats, to_lab
@@ -43,7 +44,7 @@ def stress_on_base(field: StressField, row: int) -> go.Figure:
     half = _half_width(field)
     figure = go.Figure(_heatmap(heat, float(np.nanmin(to_lab("sigma_zz_mpa", field.sigma_zz[:, -1]))), power=1.0))
     figure.update_traces(y=heat["x"], hovertemplate="x %{x:.3g} mm, y %{y:.3g} mm<br>σ<sub>zz</sub> %{z:.4g} MPa")
-    figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 2, "dash": "dash"})
+    figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 2, "dash": BOUND})
     figure.add_scatter(**_circle(_sensor(field)), name="sensor", line={"color": SENSOR, "width": 3})
     figure.update_traces(mode="lines", hoverinfo="skip", selector={"type": "scatter"})
     figure.update_xaxes(title="x [mm]", range=[-half, half], constrain="domain", showgrid=False, zeroline=False)

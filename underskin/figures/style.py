@@ -14,10 +14,10 @@ from underskin.units import Floats
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
-DASHES = ("solid", "dash", "dot", "dashdot")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
 SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows
 _LONGEST_LABEL = 60
+_MARKS = 8  # at most, along a line that its colour alone does not tell apart
 PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
 _AXIS = {
     "gridcolor": GRID,
@@ -57,12 +57,19 @@ def styled(figure: go.Figure, title: str, height: int = 420) -> go.Figure:
     return figure.update_layout(template=_TEMPLATE, title=title, height=height)
 
 
-def line(number: int, width: float) -> dict[str, Any]:
-    """How one of many lines is drawn: its dash changes where the colours are used up."""
+def one_of_many(number: int, width: float) -> dict[str, Any]:
+    """How one of many lines is drawn: with marks along it where the colours are used up."""
+    line = {"color": COLOURS[number % len(COLOURS)], "width": width}
+    if number < len(COLOURS):
+        return {"mode": "lines", "line": line}
+    return {"line": line, **marked(number // len(COLOURS) - 1)}
+
+
+def marked(number: int) -> dict[str, Any]:
+    """Marks along a line, the `number`th sort of them."""
     return {
-        "color": COLOURS[number % len(COLOURS)],
-        "width": width,
-        "dash": DASHES[number // len(COLOURS) % len(DASHES)],
+        "mode": "lines+markers",
+        "marker": {"symbol": MARKERS[number % len(MARKERS)], "size": 6, "maxdisplayed": _MARKS},
     }
 
 

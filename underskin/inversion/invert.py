@@ -127,7 +127,7 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     """
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
-        raise NoD33("recordings", campaign.name, "there is no recording of kind frf in it")
+        raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     measured, recorded, left_out = _measured(recorded)
     if not recorded:
         raise _none_usable(campaign, left_out)

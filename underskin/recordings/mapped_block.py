@@ -19,6 +19,7 @@ from underskin.units import LAB, Floats
 
 _DEGREES = {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": math.degrees(1), "radians": math.degrees(1)}
 _PERCENT = 100.0
+_LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
 _SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
 
 
@@ -230,8 +231,22 @@ class MappedBlock:
             return {name: column[1:] for name, column in columns.items()}
         if "force_n" in columns and "sample_rate_hz" not in self.rig.recording:
             rate = self.block.sample_rate_hz if time is None else self._rate(time)
-            return columns if rate is None else {**columns, "sample_rate_hz": rate}
-        return columns
+            columns |= {} if rate is None else {"sample_rate_hz": rate}
+        return {**columns, **self._measured_force(columns)}
+
+    def _measured_force(self, columns: Mapping[str, Any]) -> dict[str, float]:
+        """The dynamic force of a time series whose rig description tells none: the amplitude of the sine that shakes as
+        strongly as the recorded force does about its drift."""
+        force = columns.get("force_n", np.zeros(0))
+        if "dynamic_force_n" in self.rig.recording or len(force) < _LEAST_SAMPLES or not np.isfinite(force).all():
+            return {}
+        place = np.linspace(-1.0, 1.0, len(force))
+        shaken = force - force.mean() - place * (place @ force) / (place @ place)
+        amplitude = float(np.sqrt(2) * shaken.std())
+        if amplitude <= _STILL * float(np.abs(force).max()):
+            return {}
+        self.taken["dynamic_force_n"] = f"measured: √2 times the rms of the force about its drift, {amplitude:.4g} N"
+        return {"dynamic_force_n": amplitude}
 
     def _rate(self, time: Floats) -> float:
         with np.errstate(all="ignore"):

@@ -4,13 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from threading import Lock
 from typing import Any
-from urllib.parse import quote
 
 from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, drawn_curves, sensors_of
+from service.pages.shared.frf import drawn_frf
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
-from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
-from underskin.recordings.campaign import Campaign, FrfRecording
 
 _AGAINST_PRELOAD = (
     "indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n", "model_frf_pc_per_n",
@@ -35,7 +33,7 @@ def figures(
 
     makers: dict[str, Callable[[], list[Drawn]]] = {
         **({"curves": draw_curves} if curves else {}),
-        f"lines {show}": lambda: _frf(row, loaded, answer, numbers, show),
+        f"lines {show}": lambda: drawn_frf(row, loaded, answer, numbers["spreads"], show),
         f"d33 {show}": lambda: _d33(row, answer, numbers, show),
     }
     all_figures = []
@@ -64,39 +62,6 @@ def _chosen(answer: Mapping[str, Any]) -> str:
     return band_query((band["low_hz"], band["high_hz"])) if band is not None and band["chosen_by_user"] else ""
 
 
-def _frf(
-    row: AnyRow, loaded: Callable[[], Campaign], answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str
-) -> list[Drawn]:
-    from underskin.figures.frf import frf_overview, frf_recordings
-    from underskin.recordings.frf import summary
-
-    band = answer["band"]
-    zone = None if band is None else (band["low_hz"], band["high_hz"])
-    place = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
-    if show or numbers["spreads"] is None:
-        chosen = measured(loaded(), show)
-        if not chosen:
-            return []
-        if len(chosen) <= MOST_SINGLE:
-            lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
-            about = "Magnitude, phase and coherence of each recording."
-            return [drawn("frf", frf_recordings(lines, zone), about, place)]
-        summaries = spreads_of(chosen)
-    else:
-        summaries = spreads(numbers["spreads"])
-    count = sum(spread.recordings for spread in summaries)
-    about = (
-        f"{count} recordings: for each sphere and preload the median magnitude "
-        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
-    )
-    return [drawn("frf", frf_overview(summaries, zone), about, place)]
-
-
-def _title(recording: FrfRecording, show: str) -> str:
-    where = "" if show == recording.sensor else f"{recording.sensor}, "
-    return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
-
-
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
     """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
@@ -120,7 +85,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
             "preload",
             frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
             f"FRF in the flat zone against preload{'' if sensor is None else f' of {sensor}'}, for each sphere, with "
-            "95 % intervals; lines are the model with the array's d33, their dash the sphere's.",
+            "95 % intervals; dashed lines are the paper's model with the array's d33, in the sphere's colour.",
             f"{place}/preload.csv{chosen}",
         ),
         drawn(

@@ -15,7 +15,7 @@ from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
+from service.pages.shared.figures import Drawn, attachment, csv_answer, csv_of_rows, drawn, drawn_before, in_a_cell
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
@@ -128,6 +128,17 @@ def one_file(diagnosis_id: DiagnosisId, store: Store) -> Response:
     return attachment(f"{row.id}.html", content, "text/html; charset=utf-8", **policy)
 
 
+@router.get("/diagnoses/{diagnosis_id}/planned.csv")
+def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
+    """The recordings that the report plans, a row each."""
+    row, report, _ = _done(store, diagnosis_id)
+    planned = (report["next_experiment"] or {}).get("recordings", [])
+    if not planned:
+        raise Refusal(404, f"Diagnosis {diagnosis_id!r} plans no recordings.")
+    names = list(dict.fromkeys(name for one in planned for name in one))
+    return csv_of_rows(f"{row.id}-plan", names, [{name: in_a_cell(one.get(name)) for name in names} for one in planned])
+
+
 @router.get("/diagnoses/{diagnosis_id}/{figure}.csv")
 def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Response:
     """The numbers of a figure."""
@@ -207,7 +218,8 @@ def _shown(row: AnyRow, report: Mapping[str, Any], texts: Mapping[str, str]) -> 
 
     try:
         figures = _drawn(row, report, texts)
-        body = file.body_of(report, {name: render("figure.html", drawn=figure) for name, figure in figures.items()})
+        html = {name: render("figure.html", drawn=figure) for name, figure in figures.items()}
+        body = file.body_of(report, html, f"/diagnoses/{row.id}/planned")
         provenance = file.provenance(report)
     except _ODD:
         _cannot_be_shown(row)

@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_of_rows
+from service.pages.shared.figures import attachment, csv_of_rows, in_a_cell
 from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
@@ -96,8 +96,10 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
     """The planned recordings, a row each, and how many of each have arrived."""
     rows = _planned_rows(request, diagnosis_id, planner, store)
     names = list(dict.fromkeys(name for one in rows for name in one.values))
-    told = [{**one.values, "repeats": one.repeats, "arrived": one.arrived} for one in rows]
-    return csv_of_rows("plan", [*names, "repeats", "arrived"], [{**one, **_place(one)} for one in told])
+    told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
+    counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
+    joined = [own | count for own, count in zip(told, counts, strict=True)]
+    return csv_of_rows("plan", [*names, "repeats", "arrived"], joined)
 
 
 @router.get("/{number}/rig.yaml")
@@ -147,11 +149,6 @@ def _rows(store: Database, row: AnyRow, plan: Mapping[str, Any]) -> list[Planned
         )
         for entry, count in zip(entries, counts, strict=True)
     ]
-
-
-def _place(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A position as a cell has it."""
-    return {"position_mm": " ".join(map(str, row["position_mm"]))} if "position_mm" in row else {}
 
 
 @router.get("/progress")

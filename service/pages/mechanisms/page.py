@@ -2,13 +2,14 @@
 found; and the lab's own, which are kept from a diagnosis and can be discarded.
 """
 
+import base64
 import hashlib
 from collections.abc import Mapping
 
 from fastapi import APIRouter, Request, Response
 
 from service.dependencies import WRITE, Store, Table
-from service.pages.mechanisms.picture import picture
+from service.pages.mechanisms.picture import STYLE, picture
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
 from service.pages.shared.forms import OWN_FORM, Form, see
@@ -23,6 +24,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/mechanisms")
 
+_STYLE_HASH = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
 _SHOWN = 8  # diagnoses of each mechanism; the file of numbers has all
 
 
@@ -51,7 +53,7 @@ def drawn(name: str, request: Request, table: Table) -> Response:
         "ETag": tag,
         "Cache-Control": "no-cache",
         "X-Content-Type-Options": "nosniff",
-        "Content-Security-Policy": "default-src 'none'",
+        "Content-Security-Policy": f"default-src 'none'; style-src 'sha256-{_STYLE_HASH}'",
     }
     if tag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)

@@ -1,4 +1,6 @@
-"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve."""
+"""The picture of a mechanism as SVG: what it does to the FRF of the reference rig, or to a force curve; in the reader's
+colours.
+"""
 
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
@@ -11,10 +13,18 @@ from underskin.units import Floats
 
 WIDTH, HEIGHT = 440, 400
 _LEFT, _RIGHT, _PANEL, _GAP, _TOP = 62, 22, 122, 30, 18
-_DASHES = ("7 4", "", "2 3")  # weak, usual, strong
+_WIDTHS = (1.2, 2.0, 3.0)  # weak, usual, strong
 _BASE = "#6b7680"
+_PAPER = (_BASE, 1.8, "7 4")  # colour, width and dashes of the paper's model, which is dashed in every figure
 _FONT = 'font-family="system-ui, -apple-system, Segoe UI, Helvetica, Arial, sans-serif" font-size="12"'
 _QUIET = "#55626f"
+_GROUND = "#ffffff"
+# What each colour is where the reader prefers a dark scheme; the other ones stay.
+_DARK = {
+    INK: "#e4e9ee", _QUIET: "#a9b5c0", _BASE: "#a9b5c0", GRID: "#38434e", _GROUND: "#14191f", COLOURS[0]: "#56a7dc",
+}  # fmt: skip
+_RULES = "".join(f'[fill="{one}"]{{fill:{dark}}}[stroke="{one}"]{{stroke:{dark}}}' for one, dark in _DARK.items())
+STYLE = f"@media (prefers-color-scheme:dark){{{_RULES}}}"
 
 
 def picture(name: str, effect: LawEffect) -> str:
@@ -22,28 +32,35 @@ def picture(name: str, effect: LawEffect) -> str:
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" {_FONT} fill="{INK}">',
         f"<title>{escape(name)}</title>",
-        f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="#fff"/>',
+        f"<style>{STYLE}</style>",
+        f'<rect width="{WIDTH}" height="{HEIGHT}" rx="8" fill="{_GROUND}"/>',
     ]
     along = _scaled(_axis(effect.x, effect), _LEFT, WIDTH - _RIGHT)
     for number, panel in enumerate(effect.panels):
         parts += _panel(effect, panel, along, _TOP + number * (_PANEL + _GAP), last=number == len(effect.panels) - 1)
-    rows = [("without it", "", _BASE, "1 3")]
+    rows = [("without it", "", _PAPER)]
     rows += [
-        (f"{words}:", change, colour, dash)
-        for words, change, (colour, dash) in zip(effect.strengths, effect.changes, _lines(effect), strict=True)
+        (f"{words}:", change, look)
+        for words, change, look in zip(effect.strengths, effect.changes, _looks(effect), strict=True)
     ]
-    for number, (words, change, colour, dash) in enumerate(rows):
+    for number, (words, change, look) in enumerate(rows):
         y = _TOP + 2 * (_PANEL + _GAP) + 20 + 17 * number
-        parts.append(f'<path d="M8 {y - 4}h34" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>')
+        parts.append(f'<path d="M8 {y - 4}h34" {_stroke(*look)}/>')
         parts.append(f'<text x="50" y="{y}">{escape(words)} <tspan fill="{_QUIET}">{escape(change)}</tspan></text>')
     return "\n".join([*parts, "</svg>\n"])
 
 
-def _lines(effect: LawEffect) -> list[tuple[str, str]]:
-    """Colour and dashes of each strength; of a single one, those of the usual one."""
+def _looks(effect: LawEffect) -> list[tuple[str, float, str]]:
+    """Colour, width and dashes of each strength, of a single one those of the usual one: solid, the wider the
+    stronger."""
     count = len(effect.strengths)
     places = range(count) if count > 1 else (1,)
-    return [(COLOURS[place], _DASHES[place]) for place in places]
+    return [(COLOURS[place], _WIDTHS[place], "") for place in places]
+
+
+def _stroke(colour: str, width: float, dashes: str) -> str:
+    """As attributes."""
+    return f'stroke="{colour}" stroke-width="{width}"' + (f' stroke-dasharray="{dashes}"' if dashes else "")
 
 
 def _panel(effect: LawEffect, panel: EffectPanel, along: Floats, top: float, *, last: bool) -> list[str]:
@@ -67,12 +84,10 @@ def _panel(effect: LawEffect, panel: EffectPanel, along: Floats, top: float, *, 
     if last:
         middle = (_LEFT + WIDTH - _RIGHT) / 2
         parts.append(f'<text x="{middle}" y="{bottom + 29}" text-anchor="middle">{escape(effect.axis)}</text>')
-    drawn = [(panel.base, _BASE, "1 3"), *((c, *line) for c, line in zip(panel.curves, _lines(effect), strict=True))]
-    for values, colour, dash in drawn:
+    for values, look in [*zip(panel.curves, _looks(effect), strict=True), (panel.base, _PAPER)]:
         down = bottom - (values - low) / (high - low) * _PANEL
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(along.tolist(), down.tolist(), strict=True))
-        dashes = f' stroke-dasharray="{dash}"' if dash else ""
-        parts.append(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.8"{dashes}/>')
+        parts.append(f'<polyline points="{points}" fill="none" {_stroke(*look)}/>')
     return parts
 
 

@@ -1,5 +1,5 @@
-"""What pages load: style, scripts, and plotly's own script from its package. A version in the address lets browsers
-keep them for good.
+"""What pages load: style, scripts, that of the figures' colours, which files without a server have too, and plotly's
+own from its package. A version in the address lets browsers keep them for good.
 """
 
 import base64
@@ -14,11 +14,13 @@ import plotly
 from fastapi import APIRouter, Header, Response
 
 from service.problems import Refusal
+from underskin.diagnosis.reporting.scheme import SCHEME
 
 router = APIRouter()
 
 LIBRARY = "plotly.min.js"
 _FOLDER = Path(__file__).parents[1] / "static"
+_ELSEWHERE = {LIBRARY: Path(plotly.__file__).parent / "package_data", SCHEME.name: SCHEME.parent}
 _TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".csv": "text/csv"}
 _FOR_GOOD = "public, max-age=31536000, immutable"
 
@@ -39,7 +41,7 @@ def asset(name: str, if_none_match: Annotated[str, Header()] = "") -> Response:
 @cache
 def names() -> frozenset[str]:
     """All files there are."""
-    return frozenset(file.name for file in _FOLDER.iterdir()) | {LIBRARY}
+    return frozenset(file.name for file in _FOLDER.iterdir()) | _ELSEWHERE.keys()
 
 
 def address(name: str) -> str:
@@ -71,5 +73,4 @@ def gzipped(name: str) -> bytes:
 
 
 def _content(name: str) -> bytes:
-    folder = Path(plotly.__file__).parent / "package_data" if name == LIBRARY else _FOLDER
-    return (folder / name).read_bytes()
+    return (_ELSEWHERE.get(name, _FOLDER) / name).read_bytes()

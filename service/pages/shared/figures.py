@@ -114,6 +114,11 @@ def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any
     return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
 
 
+def in_a_cell(value: Any) -> Any:
+    """A value of a planned recording; a position, which has two, with a blank between them."""
+    return " ".join(map(str, value)) if isinstance(value, list) else value
+
+
 def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]]:
     """Columns of rows; None where a row lacks it."""
     return [[row.get(name) for row in rows] for name in names]

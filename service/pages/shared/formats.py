@@ -1,7 +1,7 @@
 """Numbers, times and words as pages show them: short, with the exact value under the pointer."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -111,8 +111,16 @@ def capitalize_first(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+_RECORDINGS = {"frf": "FRFs", "indentation": "indentation curves", "compression": "compression curves"}
+
+
+def recordings(kinds: Sequence[str]) -> str:
+    """Kinds of recordings in words."""
+    return ", ".join(_RECORDINGS.get(kind, kind) for kind in kinds)
+
+
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
-    "capitalize_first": capitalize_first, "limit": limit,
+    "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings,
 }  # fmt: skip

@@ -3,6 +3,7 @@
 And the model adopted from one, as pages head it: what it adds, since when and until when, d33 by it beside the paper's.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -28,6 +29,7 @@ _SAYS = {
     "no_mismatch": "no mismatch found",
     "insufficient_data": "too little data",
 }
+_NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 _BY_A_LAW = "mismatch, a law that nobody listed"
 
 
@@ -57,7 +59,8 @@ def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
 def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
     if not report:
-        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", "", at, row.name)
+        beside = "open it to see why and what to do" if row.state == "failed" else ""
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", beside, at, row.name)
     law = report["verdict"] == "unexplained" and report.get("unnamed")
     tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
@@ -71,7 +74,8 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
 
 
 def _beside(report: Mapping[str, Any]) -> str:
-    """The explanations with their probabilities, or the law; of no mismatch, what is not ruled out."""
+    """What the model lacks, each mechanism with its own probability; of several answers each with its probability; or
+    the law; of no mismatch, what is not ruled out."""
     verdict, probability = report["verdict"], report["probability"]
     law = report.get("unnamed")
     if verdict == "unexplained" and law:
@@ -82,6 +86,9 @@ def _beside(report: Mapping[str, Any]) -> str:
         for entry in report.get("alternatives", ())[:_MOST_RIVALS]
         if entry["probability"] > _WORTH_NAMING
     ]
+    if report["mechanisms"] and verdict == "explained":
+        said = [f"{in_words([one['name']])} ({in_percent(one['probability'])})" for one in report["mechanisms"]]
+        return f"lacks {' and '.join(said)}"
     if probability >= EXPLAINED or verdict == "unexplained":
         return " ".join(leader)
     if verdict == "no_mismatch":
@@ -90,9 +97,12 @@ def _beside(report: Mapping[str, Any]) -> str:
 
 
 class AdoptedVersion(ModelVersion):
-    """A model that was adopted; `outdated`: why it serves no figures, None where it does."""
+    """A model that was adopted; `quotable`: whether its report's d33 may be quoted, `quoted`: that d33, or in words
+    where it lies and why it may not; `outdated`: why it serves no figures, None where it does."""
 
     mechanisms: str
+    quotable: bool
+    quoted: str
     outdated: str | None
 
 
@@ -103,10 +113,23 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
         AdoptedVersion(
             **adopted_models.version(row).model_dump(),
             mechanisms=in_words(mechanisms_of(reports[row.number])),
+            quotable=reports[row.number]["d33"].get("quotable", True),
+            quoted=_quoted(reports[row.number]),
             outdated=diagnoses.outdated(row),
         )
         for row in rows
     ]
+
+
+def _quoted(report: Mapping[str, Any]) -> str:
+    """Of a report with a d33; why it may not be quoted is what the report states."""
+    from underskin.diagnosis.reporting.wording import interval, number, readable  # with what draws, which takes long
+
+    d33 = report["d33"]
+    if d33.get("quotable", True):
+        return f"{number(d33['value'])} {d33['unit']} (95 %: {interval(d33)})"
+    said = _NOT_QUOTED.search(report["statement"])
+    return readable(said[1]) if said else f"it lies from {number(d33['low'])} to {number(d33['high'])} {d33['unit']}"
 
 
 def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mapping[str, Any] | None, str | None]:

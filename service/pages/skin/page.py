@@ -1,7 +1,9 @@
-"""A skin: its array as a map, its sensors over time, its campaigns."""
+"""A skin: its array as a map, its sensors over time, its campaigns; of a sensor that is chosen its FRFs too."""
 
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, Any
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
@@ -10,8 +12,9 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import csv_of_rows
+from service.pages.shared.figures import Drawn, csv_of_rows
 from service.pages.shared.forms import RefusedForm
+from service.pages.shared.frf import drawn_frf
 from service.pages.shared.history import By, drawn_history
 from service.pages.shared.html import page
 from service.pages.shared.verdicts import adopted_versions, answer_by_it, change_percent
@@ -64,8 +67,8 @@ def skin(
     before: str | None = None,
     by: Annotated[By | None, Query(alias="model")] = None,
 ) -> Response:
-    """All at a glance; `sensor` picks the one whose history is drawn, `by` the model that it rests on: without it the
-    one in force, or the paper's where that tells nothing of the latest campaign with FRFs."""
+    """All at a glance; `sensor` picks the one whose FRFs and history are drawn, `by` the model that d33 rests on: the
+    one in force where none is given, or the paper's where that tells nothing of the latest campaign with FRFs."""
     return shown(request, skin_id, store, table, show, sensor, before, by)
 
 
@@ -114,6 +117,7 @@ def shown(
         figures.append(drawn_map(root, last, map_rows(last, mapped, history), show, by, sensor))
     if history.sensors:
         figures.append(drawn_history(root, history, sensor, by))
+    frfs = [] if sensor is None or last is None or answer is None else _frfs(store, last, answer, sensor)
     path = f"/v1/skins/{quote(root, safe='')}"
     made = page(
         request,
@@ -144,6 +148,7 @@ def shown(
         by=by,
         of_sensor=_of_sensor(history, sensor),
         figures=figures,
+        frfs=frfs,
         show=show,
         sensor=sensor,
         waiting=waiting,
@@ -157,6 +162,15 @@ def shown(
     if waiting:
         made.background = BackgroundTask(d33_cache.complete, store, table, root)
     return made
+
+
+def _frfs(store: Database, last: AnyRow, answer: Mapping[str, Any], sensor: str) -> list[Drawn]:
+    """Those of a sensor in the campaign that describes the skin, unless it has none."""
+    loaded = partial(store.read, campaigns.load, last, with_excluded=False)
+    return [
+        replace(one, title=f"FRF of {sensor} in {last.name[:80]}")
+        for one in drawn_frf(last, loaded, answer, None, sensor)
+    ]
 
 
 def _of_sensor(history: History, sensor: str | None) -> dict[str, float]:

@@ -78,9 +78,10 @@ function in_legend(data, layout) {
   return data.filter((trace) => trace.showlegend !== false && trace.visible !== false).length;
 }
 
-// With the JSON as it is now.
+// With the JSON as it is now, in the reader's colours.
 async function redraw(plot) {
   const { data, layout } = document_of(plot);
+  paint(colours_of({ data, layout }));
   const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
   const height = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout) : 0);
   // The caption above says the title.
@@ -107,6 +108,7 @@ const seen = new IntersectionObserver(
 // On paper a figure is as wide as the sheet, whatever the window's width is; those of a report's summary share a sheet
 // with its text, and what is folded below it is unfolded.
 const SHEET = 680;
+DARK.addEventListener("change", () => document.querySelectorAll(".plot[data-drawn]").forEach(redraw));
 let unfolded = [];
 function on_sheet(plot, place) {
   const long = document.querySelector(".report .summary.long") !== null;
@@ -121,7 +123,8 @@ addEventListener("beforeprint", () => {
   for (const part of unfolded) part.open = true;
   const summary = [...document.querySelectorAll(".three .plot")];
   for (const plot of document.querySelectorAll(".plot")) {
-    draw(plot);
+    if (DARK.matches && plot.dataset.drawn) redraw(plot);
+    else draw(plot);
     const place = summary.indexOf(plot);
     const size = place < 0 ? { width: Math.min(SHEET, plot.clientWidth) } : on_sheet(plot, place);
     Plotly.relayout(plot, { autosize: false, ...size });
@@ -130,7 +133,7 @@ addEventListener("beforeprint", () => {
 addEventListener("afterprint", () => {
   for (const part of unfolded) part.open = false;
   for (const plot of document.querySelectorAll(".plot")) {
-    if (plot.closest(".three")) redraw(plot);
+    if (DARK.matches || plot.closest(".three")) redraw(plot);
     else Plotly.relayout(plot, { autosize: true, width: null });
   }
 });

@@ -11,6 +11,7 @@ from service.pages.shared.figures import Drawn, drawn
 from service.pages.upload import turned_curves
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
+from underskin.diagnosis.reporting.line_styles import BOUND, SHOWN
 from underskin.recordings.rig_description import RigDescription, Trim
 from underskin.units import LAB, Floats, Indices, Mask, readable_unit
 
@@ -72,7 +73,7 @@ def _figure(columns: Mapping[str, Floats], trim: Trim) -> "go.Figure":
                     name=name,
                     legendgroup=name,
                     showlegend=row == 1,
-                    line={"color": colour, "width": 1.4, "dash": "dot" if name == _LEFT_OUT else "solid"},
+                    line={"color": colour, "width": 1.4, "dash": BOUND if name == _LEFT_OUT else SHOWN},
                     hovertemplate=f"{name}, sample %{{x}}: %{{y:.4g}} {unit}<extra></extra>",
                     row=row,
                     col=1,

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import Locator
 
-from tests.service.pages.conftest import Visit
+from tests.service.pages.conftest import EXAMPLE, Visit
 from tests.support.diagnosed import sent, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.store_server import Server
@@ -40,7 +40,7 @@ def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visi
     page = lab.page
     page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))
     page.wait_for_url("**sensor=s03*")
-    lab.drawn(2)
+    lab.drawn(3)
     lab.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= page.evaluate("innerWidth")
     assert page.get_by_label("Sensor", exact=True).input_value() == "s03"
@@ -50,6 +50,14 @@ def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visi
     rings = page.locator("#figure-map .plot").evaluate("plot => plot.layout.shapes.map((disc) => disc.line.width)")
     assert [number for number, width in enumerate(rings) if width == max(rings)] == [2]
     assert page.get_by_role("columnheader", name="d33 of s03").count() == 1
+    assert "FRF of s03 in example, after six months" in page.locator("#figure-frf figcaption").inner_text()
+    assert page.locator("#figure-frf .legend .traces").count() == 8
+    page.mouse.click(*place_of(page.locator("#figure-map"), "s05"))
+    page.wait_for_url("**sensor=s05*")
+    lab.drawn(3)
+    assert "FRF of s05" in page.locator("#figure-frf figcaption").inner_text()
+    assert page.get_by_role("columnheader", name="d33 of s05").count() == 1
+    lab.go(f"{EXAMPLE}?sensor=s03")
     page.get_by_role("link", name="example, after six months").click()
     page.wait_for_url("**show=s03*")
     lab.drawn(4)

@@ -163,7 +163,8 @@ def test_single_curves_have_a_difference_without_an_interval(idle: Server) -> No
     row = re.search(r"<tr><th scope=.row.>Difference</th>.*?</tr>", text, re.DOTALL)
     assert row is not None
     cells = [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td.*?</td>", row[0])]
-    assert (cells[0], float(cells[1]), cells[2]) == ("–", pytest.approx(1.0, rel=1e-3), "–")
+    assert float(cells[1]) == pytest.approx(1.0, rel=1e-3)
+    assert (cells[0], cells[2]) == ("–", "–")
 
 
 def test_kinds_of_which_there_are_campaigns_are_offered(idle: Server) -> None:

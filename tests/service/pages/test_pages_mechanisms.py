@@ -102,6 +102,8 @@ def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> 
     tree = ElementTree.fromstring(answer.text)
     lines = tree.findall("{http://www.w3.org/2000/svg}polyline")
     assert len(lines) == 2 * 4  # without it and at three strengths, magnitude and phase
+    assert sum("stroke-dasharray" in line.attrib for line in lines) == 2  # the paper's model, without it
+    assert len({line.get("stroke-width") for line in lines if "stroke-dasharray" not in line.attrib}) == 3
     tag = {"If-None-Match": answer.headers["etag"]}
     assert server.http.get("/mechanisms/adhesion/picture.svg", headers=tag).status_code == 304
     header = server.http.get("/mechanisms/adhesion/effect.csv").text.splitlines()[0]

@@ -7,11 +7,12 @@ from typing import Any
 
 import httpx
 import pytest
+from openpyxl import load_workbook
 
 from tests.diagnosis.test_diagnosis_plan import NARROW
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
-from tests.support.diagnosed import asked, awaited, sent, table
+from tests.support.diagnosed import asked, awaited, diagnosed, report, resonant, sent, table
 from tests.support.diagnosis_campaigns import campaign
 from tests.support.store_server import Server
 from underskin.diagnosis.pipeline import diagnose
@@ -106,3 +107,36 @@ def test_limits_that_no_rig_has_are_refused(
     place = f"{server.http.base_url}/diagnoses/{diagnosis_id}/plan"
     shown = httpx.get(place, params=query, headers=BROWSING, timeout=60).text
     assert re.search(told, shown) is not None, shown
+
+
+def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, idle: Server) -> None:
+    first = {"sensor": "s1", "indenter_radius_mm": 4.0, "preload_n": 3.0, "position_mm": [0.0, 2.5], "repeats": 2}
+    recordings = [first, {**first, "sensor": "=s2", "dwell_s": 60.0, "repeats": 1}]
+    planned = {
+        "recordings": recordings, "separates": [], "probability_of_deciding": 0.8, "without_it": 0.5, "minutes": 12.0,
+        "statement": "2 recordings should tell.",
+    }  # fmt: skip
+    found = {**report(), "verdict": "ambiguous", "next_experiment": planned}
+    _, diagnosis_id = diagnosed(idle, resonant("planned"), found, "planned")
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    reader.page.get_by_text("What to measure next").click()
+    tables: dict[str, list[tuple[object, ...]]] = {}
+    for kind in ("CSV", "XLSX"):
+        with reader.page.expect_download() as saving:
+            reader.page.locator("details", has_text="What to measure next").get_by_role("link", name=kind).click()
+        assert saving.value.suggested_filename == f"{diagnosis_id}-plan.{kind.lower()}"
+        content = saving.value.path().read_bytes()
+        if kind == "CSV":
+            tables[kind] = [tuple(row) for row in csv.reader(io.StringIO(content.decode()))]
+        else:
+            tables[kind] = list(load_workbook(io.BytesIO(content)).active.iter_rows(values_only=True))
+    heads = ("sensor", "indenter_radius_mm", "preload_n", "position_mm", "repeats", "dwell_s")
+    assert tables["CSV"][0] == tables["XLSX"][0] == heads
+    assert tables["CSV"][1:] == [
+        ("s1", "4.0", "3.0", "0.0 2.5", "2", "NaN"),
+        ("'=s2", "4.0", "3.0", "0.0 2.5", "1", "60.0"),
+    ]
+    assert tables["XLSX"][1:] == [("s1", 4, 3, "0.0 2.5", 2, None), ("=s2", 4, 3, "0.0 2.5", 1, 60)]
+    reader.require_accessible()
+    without = diagnosed(idle, resonant("unplanned"), {**report(), "next_experiment": None}, "planned")[1]
+    assert idle.http.get(f"/diagnoses/{without}/planned.csv").status_code == 404

@@ -90,7 +90,7 @@ def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server
     assert "These recordings cannot tell whether there is also" in summary.inner_text()
     reader.require_accessible()
     assert page.evaluate(_WIDE)
-    better = page.locator("details.part > summary", has_text="How much better")
+    better = page.locator("details.part > summary", has_text="How well the models describe the recordings")
     better.focus()
     page.keyboard.press("Enter")
     figure = page.locator("#figure-before_after .main-svg").first

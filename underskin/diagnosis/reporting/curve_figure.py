@@ -16,6 +16,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.curve_data import CurvePrediction, Mark, ShownCurve
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
+from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.mechanisms.base import Kind
 from underskin.units import Floats, readable_unit
@@ -49,9 +50,9 @@ class _Drawing:
 
 def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: str) -> go.Figure:
     """Of the first curves; `before` and `after` are what the models are called, `before` empty where they are one."""
-    models = [_Model("after", after, AFTER, "solid", {"symbol": "circle", "size": 8})]
+    models = [_Model("after", after, AFTER, SHOWN, {"symbol": "circle", "size": 8})]
     if before:
-        models.insert(0, _Model("before", before, BEFORE, "dash", {"symbol": "square-open", "size": 13}))
+        models.insert(0, _Model("before", before, BEFORE, PAPER, {"symbol": "square-open", "size": 13}))
     drawings = [_Curve(curve, kind, models).drawing() for curve in curves[:_MOST_CURVES]]
     panels = len(models)
     height = _HEIGHT + _PANEL * panels

@@ -20,6 +20,7 @@ from underskin.diagnosis.reporting.figure_data import Levels, Points, Thinned
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, styled
 from underskin.diagnosis.reporting.frf_data import shown_frfs
 from underskin.diagnosis.reporting.frf_figure import frf_figure
+from underskin.diagnosis.reporting.line_styles import BOUND
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.parameter_figure import parameter_intervals
 from underskin.diagnosis.reporting.report import DiagnosisResult
@@ -207,8 +208,8 @@ def before_and_after(
             col=place,
         )
         figure.add_scatter(
-            x=along, y=along, mode="lines", line={"color": MEASURED, "width": 1}, name="measured = predicted",
-            hoverinfo="skip", showlegend=place == 1, row=1, col=place,
+            x=along, y=along, mode="lines", name="measured = predicted", hoverinfo="skip",
+            line={"color": MEASURED, "width": 1, "dash": BOUND}, showlegend=place == 1, row=1, col=place,
         )  # fmt: skip
         figure.add_scatter(
             x=predicted,

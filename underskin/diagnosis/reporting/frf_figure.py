@@ -15,6 +15,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.frf_data import ShownFrf
+from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
 
@@ -53,9 +54,9 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
     are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them,
     and what each trace shows."""
-    models = [_Model("after", after, AFTER, "solid", "circle")]
+    models = [_Model("after", after, AFTER, SHOWN, "circle")]
     if before:
-        models.insert(0, _Model("before", before, BEFORE, "dash", "square-open"))
+        models.insert(0, _Model("before", before, BEFORE, PAPER, "square-open"))
     few = min(len(one.frequency_hz) for one in recordings) <= _FEW
     traces = _traces(models, few)
     figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=_ROWS)

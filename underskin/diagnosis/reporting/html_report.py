@@ -17,6 +17,7 @@ from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
 from underskin.diagnosis.reporting.answer_statement import first_and_rest, lacking_part
 from underskin.diagnosis.reporting.figures import explanations
+from underskin.diagnosis.reporting.scheme import SCHEME
 from underskin.diagnosis.reporting.several_figures import several_figures
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
@@ -46,9 +47,9 @@ plot.before(label, " ", steps[0], " ", steps[1]);
 """  # stands in for a figure's own menu, which only a pointer can open
 
 _FILTERS = (
-    *(wording.axis, wording.columns, wording.error, wording.group, wording.interval, wording.number, wording.plain),
-    *(wording.quantity, wording.readable, wording.unit, wording.words, acted_on, followed, wording.law_range),
-    *(first_and_rest, in_percent, lacking_part),
+    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group, wording.interval, wording.number),
+    *(wording.plain, wording.quantity, wording.readable, wording.unit, wording.words, wording.law_range),
+    *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
@@ -78,12 +79,14 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    return str(_macros("file.html").page(report, drawn, get_plotlyjs() if drawn else ""))
+    scripts = (get_plotlyjs(), SCHEME.read_text("utf-8")) if drawn else ()
+    return str(_macros("file.html").page(report, drawn, scripts))
 
 
-def body_of(report: Report, drawn: FigureHtml) -> str:
-    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next."""
-    return str(_macros("report.html").body(report, drawn))
+def body_of(report: Report, drawn: FigureHtml, plan: str | None = None) -> str:
+    """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next; `plan`:
+    address of the planned recordings, without the .csv or .xlsx at its end."""
+    return str(_macros("report.html").body(report, drawn, plan))
 
 
 def provenance(report: Report) -> str:

@@ -14,6 +14,35 @@ from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unnamed.vocabulary import followed
 
+_FINDINGS = {
+    "bent": "not proportional to the force",
+    "conjugated": "sign of the phase reversed",
+    "constant_axis": "never varied",
+    "contacts_kept": "contacts beyond the tables kept",
+    "curve_not_usable": "curve cannot be used",
+    "damaged_samples": "samples damaged",
+    "duplicated_recording": "came twice",
+    "force_acts_once": "a single sweep or blow",
+    "force_contradicts_preload": "force and preload disagree",
+    "gain_steps": "amplitude off by a factor",
+    "held_out_no_better": "no better on other recordings",
+    "imitated": "another cause looks the same",
+    "line_noise_level": "noise differs from line to line",
+    "lines_not_finite": "lines without a number",
+    "no_finite_line": "no usable line",
+    "no_line_in_band": "no line in the band",
+    "no_simple_law": "no simple law found",
+    "one_line": "one frequency only",
+    "out_of_domain": "beyond the tables",
+    "outlier": "unlike the others",
+    "parameter_at_bound": "value at the end of what is possible",
+    "remainder": "something is left unexplained",
+    "seating": "seating of the sample",
+    "series_not_usable": "samples cannot be used",
+    "sign_flipped": "sign reversed",
+    "units_off_by_1000": "unit off by a factor of 1000",
+    "unusual_magnitude": "unusual size",
+}  # by code; the other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
 
 
@@ -36,6 +65,11 @@ def _names() -> tuple[re.Pattern[str], dict[str, str]]:
 def words(name: str) -> str:
     """A name of the code as words."""
     return name.replace("_", " ")
+
+
+def finding(code: str) -> str:
+    """What a finding is about, in short."""
+    return _FINDINGS.get(code) or words(code)
 
 
 def axis(name: str) -> str:

@@ -25,6 +25,7 @@ _BINS_PER_DECADE = 12
 _BEYOND_NOISE = 3.0
 _OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
 _NEIGHBOURS = 11
+_LEAST_COHERENCE = 0.5  # of lines that count as excited
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
@@ -117,8 +118,18 @@ def flat_zone(
     low = frequencies[frequencies >= edges[filled[first]] * (1 - 1e-12)][0]
     high = frequencies[frequencies <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
     left_out = tuple(line for line in mains if low <= line <= high)
-    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out)
+    below = (edges[filled[first - 1]], edges[filled[first - 1] + 1]) if first > 0 else (low, low)
+    excited = _is_excited(stacks, *below)
+    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, excited_below=excited)
     return FlatZone(float(low), float(high), reason, left_out)
+
+
+def _is_excited(stacks: Sequence[Stack], low_hz: float, high_hz: float) -> bool:
+    """Whether the charge follows the force at the lines in a range; where no coherence is known it is taken so."""
+    inside = [stack.coherence[:, (stack.frequency >= low_hz) & (stack.frequency < high_hz)] for stack in stacks]
+    coherence = np.concatenate([part.ravel() for part in inside])
+    coherence = coherence[np.isfinite(coherence)]
+    return len(coherence) == 0 or float(np.median(coherence)) >= _LEAST_COHERENCE
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:

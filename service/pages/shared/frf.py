@@ -1,0 +1,49 @@
+"""The figure of a campaign's FRFs: of all its recordings, of a sensor's, or of one."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+from urllib.parse import quote
+
+from service.pages.shared.figures import Drawn, drawn
+from service.store import AnyRow
+from service.usecases.figure_data import MOST_SINGLE, measured, spreads, spreads_of
+from underskin.recordings.campaign import Campaign, FrfRecording
+
+
+def drawn_frf(
+    row: AnyRow,
+    loaded: Callable[[], Campaign],
+    answer: Mapping[str, Any],
+    kept_spreads: Sequence[Mapping[str, Any]] | None,
+    show: str,
+) -> list[Drawn]:
+    """None where no recording is shown; `loaded`: the campaign with all numbers, `answer`: its d33, `kept_spreads`: of
+    its conditions, where they are kept, `show`: a sensor or a recording, all where it is empty."""
+    from underskin.figures.frf import frf_overview, frf_recordings
+    from underskin.recordings.frf import summary
+
+    band = answer["band"]
+    zone = None if band is None else (band["low_hz"], band["high_hz"])
+    place = f"/campaigns/{row.id}/frf.csv?show={quote(show, safe='')}"
+    if show or kept_spreads is None:
+        chosen = measured(loaded(), show)
+        if not chosen:
+            return []
+        if len(chosen) <= MOST_SINGLE:
+            lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            about = "Magnitude, phase and coherence of each recording."
+            return [drawn("frf", frf_recordings(lines, zone), about, place)]
+        summaries = spreads_of(chosen)
+    else:
+        summaries = spreads(kept_spreads)
+    count = sum(spread.recordings for spread in summaries)
+    about = (
+        f"{count} recordings: for each sphere and preload the median magnitude "
+        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
+    )
+    return [drawn("frf", frf_overview(summaries, zone), about, place)]
+
+
+def _title(recording: FrfRecording, show: str) -> str:
+    where = "" if show == recording.sensor else f"{recording.sensor}, "
+    return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
