@@ -53,7 +53,7 @@ def _from_click_to_verdict() -> list[float]:
             time.sleep(_READY_S)
             start = time.perf_counter()
             page.get_by_role("button", name="Diagnose").click()
-            page.get_by_role("heading", name="Where", exact=True).wait_for(timeout=60_000)
+            page.get_by_role("heading", name="Where the model and the recordings differ").wait_for(timeout=60_000)
             waits.append(time.perf_counter() - start)
         browser.close()
     return waits

@@ -45,7 +45,7 @@ def _response(page: Page) -> None:
 
 def _diagnosis(page: Page) -> None:
     page.get_by_role("button", name="Diagnose").click()
-    page.get_by_role("heading", name="Where", exact=True).wait_for(timeout=_DIAGNOSIS_MS)
+    page.get_by_role("heading", name="Where the model and the recordings differ").wait_for(timeout=_DIAGNOSIS_MS)
     drawn(page, "where")
     page.evaluate("scrollTo(0, 0)")
 

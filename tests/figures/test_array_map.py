@@ -95,3 +95,14 @@ def test_an_uncertainty_is_coloured_from_0_and_an_unknown_value_is_white() -> No
     (known,) = [trace for trace in figure.data if trace.name == "uncertainty of d33"]
     assert (known.marker.cmin, known.marker.cmax) == (0.0, 0.2)
     assert fills(figure)[5] == "#ffffff"
+
+
+def test_the_chosen_sensor_has_a_ring_on_the_ground_that_touches_no_other() -> None:
+    values = np.full(64, 13.1)
+    figure = array_map(SENSORS, X, Y, values, 0.01 * values, [""] * 64, chosen="s09")
+    *discs, ring = figure.layout.shapes
+    assert len(discs) == 64
+    own, beside = discs[9], discs[10]
+    assert ring.fillcolor is None
+    assert (ring.x0 + ring.x1, ring.y0 + ring.y1) == pytest.approx((own.x0 + own.x1, own.y0 + own.y1))
+    assert own.x1 < ring.x1 < beside.x0

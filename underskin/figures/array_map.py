@@ -15,6 +15,7 @@ from underskin.inversion.beyond_chance import differ_from_others, differ_from_ze
 from underskin.units import Floats, Mask
 
 _SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
+_AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
 _ALONE_MM = 1.0  # radius where there is no other
 _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
@@ -110,6 +111,8 @@ def array_map(
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
         line = ring or {"color": "#5b6670", "width": 1}
         discs.append({"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", **disc})
+    if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
+        discs.append(_ring(x[sensors.index(chosen)], y[sensors.index(chosen)], _AROUND * radius))
     figure.update_layout(shapes=discs, showlegend=len(figure.data) > 1)
     for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
         update(range=[float(along.min()) - 1.3 * radius, float(along.max()) + 1.3 * radius])
@@ -118,6 +121,11 @@ def array_map(
         title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
     )
     return styled(figure, f"{quantity.name} over the array")
+
+
+def _ring(x: float, y: float, radius: float) -> dict[str, Any]:
+    ends = {"x0": x - radius, "x1": x + radius, "y0": y - radius, "y1": y + radius}
+    return {"type": "circle", "line": {"color": INK, "width": 2}, "layer": "below", **ends}
 
 
 def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity = D33) -> str:

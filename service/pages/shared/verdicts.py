@@ -43,6 +43,7 @@ class VerdictSummary:
     beside: str
     at: str  # when it ended, or was asked for
     name: str | None  # of one of several campaigns
+    modulus: str | None = None  # of curves, under an answer that is settled
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, VerdictSummary]:
@@ -70,7 +71,17 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
         tag = f"{tag}, {in_percent(probability)}"
     sure = report["verdict"] == "no_mismatch" and probability >= EXPLAINED
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
-    return VerdictSummary(row.id, f"{tag}, adopted" if adopted else tag, mood, _beside(report), at, row.name)
+    tag = f"{tag}, adopted" if adopted else tag
+    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report))
+
+
+def _modulus(report: Mapping[str, Any]) -> str | None:
+    """Young's modulus of curves under the answer, in words."""
+    after = (report["fit"] or {}).get("after", {}).get("youngs_modulus")
+    if after is None or report["verdict"] not in ("explained", "no_mismatch"):
+        return None
+    value, low, high = (f"{after[name]:.4g}" for name in ("value", "low", "high"))
+    return f"{value} {after['unit']} (95 %: {low} to {high})"
 
 
 def _beside(report: Mapping[str, Any]) -> str:

@@ -1,0 +1,71 @@
+"""Several Young's moduli of one curve: each says what it is, and the one to quote stands first."""
+
+from typing import Any
+
+import pytest
+
+from tests.service.pages.conftest import Visit
+from tests.support.diagnosed import diagnosed, report, sent
+from tests.support.pressed_curves import pressed
+from tests.support.store_server import Server
+from underskin.recordings.campaign import to_dict
+
+
+def of_curves(verdict: str) -> dict[str, Any]:
+    """A report of curves with moduli of its own."""
+    after, before = (
+        {"name": "youngs_modulus", "unit": "MPa", "value": value, "low": value - 0.1, "high": value + 0.1}
+        for value in (1.75, 2.25)
+    )
+    fit = report()["fit"]
+    errors = {
+        "before": {**fit["before"], "youngs_modulus": before, "least_squares_modulus_mpa": 2.375},
+        "after": {**fit["after"], "youngs_modulus": after},
+    }
+    return {**report(), "verdict": verdict, "d33": None, "fit": {**fit, **errors}}
+
+
+def declared(name: str) -> dict[str, Any]:
+    document = to_dict(pressed(1e5, [2.0]))
+    return {**document, "name": name, "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_modulus_under_the_answer_is_the_first_to_quote(reader: Visit, idle: Server, width: int) -> None:
+    page = reader.page
+    page.set_viewport_size({"width": width, "height": 844})
+    skin = f"moduli{width}"
+    campaign_id, diagnosis_id = diagnosed(idle, declared(skin), of_curves("explained"), skin)
+    reader.go(f"/campaigns/{campaign_id}")
+    said = page.locator("main").inner_text()
+    assert "Young's modulus, declared" in said
+    first = said.index("Quote this one first: 1.75 MPa (95 %: 1.65 to 1.85), under the answer of the latest diagnosis")
+    assert first < said.index("Each recording alone, by least squares of the plain law")
+    assert "The declared 2.5 MPa is what was entered with the skin; it was not measured here." in said.replace(
+        "\xa0", " "
+    )
+    reader.require_accessible()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    assert "Young's modulus under this answer 1.75 MPa" in page.locator(".summary").inner_text()
+    page.get_by_text("How well the models describe").click()
+    rows = page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr").all_inner_texts()
+    assert [row.split("\t")[0].partition(":")[0] for row in rows] == [
+        "Quote this one first", "With the plain law alone, weighed by the noise",
+        "With the plain law alone, by least squares",
+    ]  # fmt: skip
+    assert [row.split("\t")[1] for row in rows] == ["1.75", "2.25", "2.375"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    reader.require_accessible()
+
+
+def test_no_modulus_is_quoted_before_an_answer_is_settled(reader: Visit, idle: Server) -> None:
+    campaign_id, diagnosis_id = diagnosed(idle, declared("open"), of_curves("ambiguous"), "open")
+    bare = sent(idle, declared("bare"), "bare")
+    for one in (campaign_id, bare):
+        reader.go(f"/campaigns/{one}")
+        assert "Quote none of these yet" in reader.page.locator("main").inner_text()
+    reader.go(f"/diagnoses/{diagnosis_id}")
+    assert "No Young's modulus yet" in reader.page.locator(".summary").inner_text()
+    reader.page.get_by_text("How well the models describe").click()
+    rows = reader.page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr")
+    assert rows.first.inner_text().startswith("Do not quote it yet")
