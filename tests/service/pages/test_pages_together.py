@@ -28,7 +28,7 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     assert page.get_by_role("heading", level=1).inner_text() == "Diagnosis of several"
     page.get_by_text("It waits for its turn.").wait_for()
     finished(idle)
-    page.get_by_role("heading", name="What the model lacks, and the values found").wait_for(timeout=240_000)  # without reloading by hand
+    page.get_by_role("heading", name="What the model lacks, and").wait_for(timeout=240_000)  # without reloading by hand
     reader.require_accessible()
     assert "to quote, take a campaign's own diagnosis" in page.get_by_role("main").inner_text()
     for name, campaign_id in (("one", first), ("two", second)):
