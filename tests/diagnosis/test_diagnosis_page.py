@@ -137,7 +137,7 @@ def test_markup_in_a_campaign_stays_text(text: str, found: DiagnosisResult, docu
     assert f"Diagnosis of palm {HOSTILE}" in tags.text
     assert f"{HOSTILE}3" in tags.text
     assert tags.count("img") == tags.count("a") == 0
-    assert tags.count("script") == 1 + 5 + 1  # plotly's own, one a figure, and the page's
+    assert tags.count("script") == 2 + 5 + 1  # plotly's own, the colours', one a figure, and the page's
     assert "<script>alert" not in text
     # In the figures, too, texts reach plotly escaped: it would show <a> and <b> as such.
     texts = [one for figure in figures(found, document).values() for one in drawn_texts(json.loads(figure.to_json()))]
@@ -251,6 +251,8 @@ def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict
     assert ("Young's modulus [MPa]" in tags.text) == (fitted is not None) == ("curve" in names)
     if fitted is not None:
         stated = f"{wording.number(fitted['value'])}{wording.interval(fitted)}".replace(" ", "")
-        assert f"after{stated}" in tags.text.replace(" ", "")
+        settled = document["verdict"] in ("explained", "no_mismatch")
+        label = "addstothelaw." if settled else "donotsettleit."
+        assert f"{label}{stated}" in tags.text.replace(" ", "")
     for figure in drawn.values():
         json.loads(figure.to_json())
