@@ -72,6 +72,34 @@ def test_a_flat_campaign_is_flat_throughout() -> None:
     assert "whole recorded range" in zone.reason
 
 
+@pytest.mark.parametrize(("excited_hz", "told"), [((20.0, 1e4), "below"), ((0.0, 9.0), "above")])
+def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
+    """Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere."""
+    frequency = np.geomspace(0.2, 300.0, 400)
+    follows = (frequency >= excited_hz[0]) & (frequency <= excited_hz[1])
+    frfs, conditions = recorded(frequency, "")
+    noise = 1e-3 * np.random.default_rng(9).normal(size=len(frequency))
+    idle = [
+        Frf(frequency, np.where(follows, one.values, 0.3e-12 * (1 + noise)), np.where(follows, 0.99, 0.1))
+        for one in frfs
+    ]
+    zone = flat_zone(stacked(idle), conditions)
+    assert zone.low_hz == pytest.approx(frequency[follows][0], rel=0.2)
+    assert zone.high_hz == pytest.approx(frequency[follows][-1], rel=0.2)
+    mean, _, _ = band_average(stacked(idle), zone)
+    assert mean == pytest.approx(7e-12, rel=0.15)
+    assert f"{told} " in zone.reason
+    assert "it was not excited" in zone.reason
+    assert "whole recorded range" not in zone.reason
+
+
+def test_where_the_charge_follows_the_force_nowhere_all_lines_count() -> None:
+    """As of a dead sensor."""
+    frfs, conditions = recorded(LOG_GRID, "")
+    dead = [Frf(LOG_GRID, one.values, np.full(len(LOG_GRID), 0.05)) for one in frfs]
+    assert flat_zone(stacked(dead), conditions).high_hz == LOG_GRID[-1]
+
+
 def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
     zone = zone_of("resonance")
     assert 40 < zone.high_hz < 110  # 1/(1 − (f/400)²) has risen by 1 % to 8 %

@@ -4,7 +4,8 @@ Re FRF of each recording, over its own level, is gathered in bins of equal width
 recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
 bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
 slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
-stand out of their neighbours are left out.
+stand out of their neighbours are left out, and so are bins in which the charge does not follow the force: noise that
+was not excited there may be flat, too.
 """
 
 from collections.abc import Sequence
@@ -106,7 +107,9 @@ def flat_zone(
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     decades = float(np.log10(frequencies[-1] / frequencies[0]))
     edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
-    ratio = _binned(stacks, edges, mains)
+    excited = _excited(stacks, edges)
+    followed = [_lines_of(stack, excited[_bin_of(stack.frequency, edges)]) for stack in stacks]
+    ratio = _binned(followed, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
     if len(filled) < 2:
@@ -118,18 +121,31 @@ def flat_zone(
     low = frequencies[frequencies >= edges[filled[first]] * (1 - 1e-12)][0]
     high = frequencies[frequencies <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
     left_out = tuple(line for line in mains if low <= line <= high)
-    below = (edges[filled[first - 1]], edges[filled[first - 1] + 1]) if first > 0 else (low, low)
-    excited = _is_excited(stacks, *below)
-    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, excited_below=excited)
+    idle = (not excited[: filled[0]].all(), not excited[filled[-1] + 1 :].all())
+    reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, idle)
     return FlatZone(float(low), float(high), reason, left_out)
 
 
-def _is_excited(stacks: Sequence[Stack], low_hz: float, high_hz: float) -> bool:
-    """Whether the charge follows the force at the lines in a range; where no coherence is known it is taken so."""
-    inside = [stack.coherence[:, (stack.frequency >= low_hz) & (stack.frequency < high_hz)] for stack in stacks]
-    coherence = np.concatenate([part.ravel() for part in inside])
-    coherence = coherence[np.isfinite(coherence)]
-    return len(coherence) == 0 or float(np.median(coherence)) >= _LEAST_COHERENCE
+def _bin_of(frequency: Floats, edges: Floats) -> Indices:
+    return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
+
+
+def _lines_of(stack: Stack, kept: Mask) -> Stack:
+    return Stack(stack.rows, stack.frequency[kept], stack.values[:, kept], stack.coherence[:, kept])
+
+
+def _excited(stacks: Sequence[Stack], edges: Floats) -> Mask:
+    """In which bins (bins,) the charge follows the force, by the median coherence; also where none is known, and in all
+    where it follows in none."""
+    bins = np.concatenate(
+        [np.broadcast_to(_bin_of(one.frequency, edges), one.coherence.shape).ravel() for one in stacks]
+    )
+    coherence = np.concatenate([one.coherence.ravel() for one in stacks])
+    known = np.isfinite(coherence)
+    follows = np.ones(len(edges) - 1, bool)
+    for number in np.unique(bins[known]):
+        follows[number] = np.median(coherence[known & (bins == number)]) >= _LEAST_COHERENCE
+    return follows if follows[np.unique(bins)].any() else np.ones_like(follows)
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
@@ -211,12 +227,14 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
     """Median of Re FRF over each recording's level in each bin (recordings, bins); NaN without a line or a level."""
     ratio = np.full((sum(len(stack.rows) for stack in stacks), len(edges) - 1), np.nan)
     for stack in stacks:
+        if not len(stack.frequency):
+            continue
         real = stack.values.real
         level = np.median(real, axis=1)
         noise = np.median(np.abs(np.diff(real, axis=1)), axis=1) if real.shape[1] > 1 else np.zeros(len(real))
         plain = np.abs(level) > 2 * noise  # a dead sensor has no level
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
-        bins = np.clip(np.searchsorted(edges, stack.frequency, side="right") - 1, 0, len(edges) - 2)
+        bins = _bin_of(stack.frequency, edges)
         for number in np.unique(bins[kept]):
             lines = real[np.ix_(plain, kept & (bins == number))]
             ratio[stack.rows[plain], number] = np.median(lines / level[plain, None], axis=1)

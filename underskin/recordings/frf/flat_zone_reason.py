@@ -7,6 +7,7 @@ import numpy as np
 from underskin.units import Floats
 
 _PEAK = 1.3  # over the level: a resonance to be named
+_NOT_EXCITED = "it was not excited: the charge hardly follows the force (low coherence)"
 
 
 def reason_of(
@@ -18,19 +19,22 @@ def reason_of(
     bins: tuple[int, int],
     slope: float,
     left_out_hz: Sequence[float],
-    *,
-    excited_below: bool,
+    idle: tuple[bool, bool],
 ) -> str:
     """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`;
-    `excited_below`: whether the charge follows the force in the bin below it."""
+    `idle`: whether lines below all bins, and above them, were not excited."""
     first, last = bins
     departure = curves / levels_of(curves[:, first : last + 1]) - 1
     parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
     if last + 1 < len(middle_hz):
         parts.append(_above(high_hz, middle_hz, departure, conditions, last))
+    elif idle[1]:
+        parts.append(f"above {high_hz:.4g} Hz {_NOT_EXCITED}")
     if first > 0:
-        parts.append(_below(low_hz, float(departure[-1, first - 1]), excited=excited_below))
-    if first == 0 and last + 1 == len(middle_hz):
+        parts.append(_below(low_hz, float(departure[-1, first - 1])))
+    elif idle[0]:
+        parts.append(f"below {low_hz:.4g} Hz {_NOT_EXCITED}")
+    if first == 0 and last + 1 == len(middle_hz) and not any(idle):
         parts.append("it is the whole recorded range")
     if abs(slope) > 0.005:
         parts.append(f"inside, all recordings fall alike, by {100 * (1 - 10**slope):.1f} % a decade")
@@ -68,9 +72,7 @@ def _above(
     return f"above {high_hz:.4g} Hz the response {side} or scatters by more than 2 %, without a peak in range"
 
 
-def _below(low_hz: float, departure: float, *, excited: bool) -> str:
-    if not excited:
-        return f"below {low_hz:.4g} Hz it was not excited: the charge hardly follows the force (low coherence)"
+def _below(low_hz: float, departure: float) -> str:
     if departure < 0:
         return f"below {low_hz:.4g} Hz the response falls off, as behind a high-pass"
     return f"below {low_hz:.4g} Hz the response rises"
