@@ -142,7 +142,7 @@ def test_a_campaign_without_a_charge_that_can_be_is_refused(table: SigmaTable, f
 def test_the_users_band_is_used_and_a_campaign_without_frf_is_refused(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(8))
     assert invert(campaign, table, (10.0, 50.0)).zone.chosen_by_user
-    with pytest.raises(InvalidInput, match="frf"):
+    with pytest.raises(InvalidInput, match="FRFs"):
         invert(replace(campaign, recordings=()), table)
 
 
