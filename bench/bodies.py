@@ -31,13 +31,13 @@ def _columns() -> bytes:
     return f'{{"a_over_h": {column}, "rt_over_h": {column}}}'.encode()
 
 
-def _campaign(bytes_: int = _BYTES) -> bytes:
-    """Recordings of 60 lines."""
+def _campaign(size: int = _BYTES) -> bytes:
+    """Recordings of 60 lines, of `size` bytes in all."""
     made = document({}, columns=4, preloads_n=(0.5, 1.0), lines=60)
     recordings = made["recordings"]
     assert isinstance(recordings, list)
     entry = json.dumps(recordings[0])
-    entries = (entry.replace(f'"{recordings[0]["id"]}"', f'"r{number}"', 1) for number in range(bytes_ // len(entry)))
+    entries = (entry.replace(f'"{recordings[0]["id"]}"', f'"r{number}"', 1) for number in range(size // len(entry)))
     return (
         json.dumps({**made, "recordings": []})
         .replace('"recordings": []', f'"recordings": [{",".join(entries)}]')

@@ -152,15 +152,15 @@ def _light(description: dict[str, Any]) -> bool:
 def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Path) -> None:
     command = typer.Typer()
     command.command()(prove)
-    options = ["--count=1", "--workers=1", f"--work-dir={tmp_path / 'work'}", f"--docs-dir={tmp_path / 'docs'}"]
+    options = ["--count=2", "--workers=1", f"--work-dir={tmp_path / 'work'}", f"--docs-dir={tmp_path / 'docs'}"]
     first = CliRunner().invoke(command, ["mixture", *options])
     assert first.exit_code == 0, first.output
     page = (tmp_path / "docs/proof.md").read_text(encoding="utf-8")
-    assert "1 of 300 campaigns" in page
+    assert "2 of 300 campaigns" in page
     drawings = sorted(file.name for file in (tmp_path / "docs/figures").iterdir())
     assert drawings == ["proof-calibration.svg", "proof-confusion.svg"]
     reports = {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()}
-    assert len(reports) == 1
+    assert len(reports) == 2
     assert CliRunner().invoke(command, ["mixture", *options]).exit_code == 0
     assert {file: file.stat().st_mtime_ns for file in (tmp_path / "work/reports").iterdir()} == reports
     assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page

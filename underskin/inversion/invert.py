@@ -28,7 +28,8 @@ from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone, stacked
+from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
+from underskin.recordings.frf.stacks import stacked
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable

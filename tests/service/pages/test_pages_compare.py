@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
+from playwright.sync_api import Page
 
 from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
@@ -34,19 +35,25 @@ def weakened(made: Campaign, sensor: str, factor: float) -> Campaign:
     return replace(made, name="after", recordings=tuple(entries))
 
 
-@pytest.mark.parametrize("width", [1180, 390])
-def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle: Server, width: int) -> None:
-    skin = f"aged{width}"
-    first = sent(idle, to_dict(campaign(BEFORE, table())), skin)
-    second = sent(idle, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
+def compared(reader: Visit, skin: str, width: int, figures: int) -> Page:
+    """The page that a skin's page leads to, once so many figures are drawn."""
     page = reader.page
     page.set_viewport_size({"width": width, "height": 800})
     reader.go(f"/skins/{skin}")
     page.get_by_role("link", name="Compare").click()
     page.wait_for_url("**/compare?skin=*")
-    reader.drawn(3)
+    reader.drawn(figures)
     reader.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
+    return page
+
+
+@pytest.mark.parametrize("width", [1180, 390])
+def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle: Server, width: int) -> None:
+    skin = f"aged{width}"
+    first = sent(idle, to_dict(campaign(BEFORE, table())), skin)
+    second = sent(idle, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
+    page = compared(reader, skin, width, 3)
     assert page.get_by_label("First", exact=True).input_value() == first
     ends = [
         page.locator(f"#figure-map-{name} .plot").evaluate(
@@ -128,14 +135,7 @@ def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(reader: Visi
     skin = f"pressed{width}"
     ids = [sent(idle, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
     ids.append(sent(idle, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
-    page = reader.page
-    page.set_viewport_size({"width": width, "height": 800})
-    reader.go(f"/skins/{skin}")
-    page.get_by_role("link", name="Compare").click()
-    page.wait_for_url("**/compare?skin=*")
-    reader.drawn(2)
-    reader.require_accessible()
-    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page = compared(reader, skin, width, 2)
     assert page.get_by_label("First", exact=True).input_value() == ids[0]
     told = page.get_by_role("region", name="Young's modulus of the curves").inner_text()
     assert re.search(r"First\s+3\s+2\.000", told)

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.recordings.frf.flat_zone import FlatZone, Stack, band_average
+from underskin.recordings.frf.flat_zone import FlatZone, band_average
+from underskin.recordings.frf.stacks import Stack
 from underskin.units import Floats
 
 _BEYOND_NOISE = 3.0

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
-from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.units import Complexes, Floats, Indices, Mask
+from underskin.recordings.frf.stacks import Stack
+from underskin.units import Floats, Indices, Mask
 
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
@@ -45,28 +45,6 @@ class FlatZone:
         """Which lines are averaged."""
         inside = (frequency >= self.low_hz) & (frequency <= self.high_hz)
         return inside & ~np.isin(np.round(frequency, 6), self.left_out_hz)
-
-
-@dataclass(frozen=True)
-class Stack:
-    """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN."""
-
-    rows: Indices
-    frequency: Floats
-    values: Complexes
-    coherence: Floats
-
-
-def stacked(frfs: Sequence[Frf]) -> list[Stack]:
-    """The recordings, put together where they share the same lines."""
-    members: dict[bytes, list[int]] = {}
-    for row, frf in enumerate(frfs):
-        members.setdefault(frf.frequency.tobytes(), []).append(row)
-    stacks = []
-    for rows in members.values():
-        values, coherence = ([frfs[row].values for row in rows], [frfs[row].coherence_or_nan for row in rows])
-        stacks.append(Stack(np.array(rows), frfs[rows[0]].frequency, np.array(values), np.array(coherence)))
-    return stacks
 
 
 def flat_zone(
@@ -108,7 +86,7 @@ def flat_zone(
     decades = float(np.log10(frequencies[-1] / frequencies[0]))
     edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
     excited = _excited(stacks, edges)
-    followed = [_lines_of(stack, excited[_bin_of(stack.frequency, edges)]) for stack in stacks]
+    followed = [stack.at(excited[_bin_of(stack.frequency, edges)]) for stack in stacks]
     ratio = _binned(followed, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
@@ -128,10 +106,6 @@ def flat_zone(
 
 def _bin_of(frequency: Floats, edges: Floats) -> Indices:
     return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
-
-
-def _lines_of(stack: Stack, kept: Mask) -> Stack:
-    return Stack(stack.rows, stack.frequency[kept], stack.values[:, kept], stack.coherence[:, kept])
 
 
 def _excited(stacks: Sequence[Stack], edges: Floats) -> Mask:

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.recordings.frf.estimation import Frf
-from underskin.recordings.frf.flat_zone import Condition, Stack, stacked
+from underskin.recordings.frf.flat_zone import Condition
+from underskin.recordings.frf.stacks import Stack, stacked
 from underskin.units import Complexes, Floats, Indices, Mask, to_lab
 
 MOST_LINES = 240  # of one recording
