@@ -8,6 +8,7 @@ from typing import Any
 from sqlalchemy import Connection, case, func, select
 
 from service.store import campaigns as kept
+from service.store import diagnoses as kept_diagnoses
 from service.store import inversions
 from service.store import models as adopted_models
 from service.store import skins as kept_skins
@@ -15,7 +16,6 @@ from service.store.tables import AnyRow, campaigns, diagnosed_campaigns, diagnos
 from service.store.tables import inversions as derived
 
 _OF_CAMPAIGNS = ("id", "number", "name", "recordings", "excluded", "revision", "recorded_at")
-_OF_DIAGNOSES = ("number", "id", "campaign", "state", "verdict", "probability", "asked_at", "ended_at", "name")
 _LATELY = 12  # campaigns of a trend
 
 
@@ -117,7 +117,7 @@ def of_array(answer: Mapping[str, Any] | None) -> float | None:
 def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
     """The latest diagnosis of each of these campaigns that has one of it alone."""
     query = (
-        select(*(diagnoses.c[name] for name in _OF_DIAGNOSES))
+        kept_diagnoses.rows()
         .where(diagnoses.c.campaign.in_(numbers), diagnoses.c.kind == "campaign")
         .order_by(diagnoses.c.number)
     )
@@ -127,7 +127,8 @@ def latest_diagnoses(connection: Connection, numbers: Sequence[int]) -> dict[int
 def _latest_together(connection: Connection, numbers: Sequence[int]) -> dict[int, AnyRow]:
     """The latest diagnosis of each of these campaigns together with others, of one skin or of a fleet."""
     query = (
-        select(diagnosed_campaigns.c.campaign.label("member"), *(diagnoses.c[name] for name in _OF_DIAGNOSES))
+        kept_diagnoses.rows()
+        .add_columns(diagnosed_campaigns.c.campaign.label("member"))
         .join(diagnosed_campaigns, diagnosed_campaigns.c.diagnosis == diagnoses.c.number)
         .where(diagnosed_campaigns.c.campaign.in_(numbers))
         .order_by(diagnoses.c.number)

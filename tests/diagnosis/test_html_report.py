@@ -3,8 +3,9 @@
 import re
 from html import unescape
 from typing import Any
+from urllib.parse import unquote
 
-from underskin.diagnosis.reporting.html_report import body_of, page, plan_of, provenance
+from underskin.diagnosis.reporting.html_report import body_of, page, provenance
 
 HOSTILE = "<script>alert(\"x\")</script> & 'y'"
 EMPTY: dict[str, Any] = {
@@ -73,16 +74,18 @@ def test_figures_stand_where_they_belong_and_are_not_escaped() -> None:
 
 def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:
     planned = {
-        "recordings": [{"sensor": "s1", "preload_n": 2.0, "position_mm": [1.0, 2.5]}],
+        "recordings": [{"sensor": "=s1", "preload_n": 2.0, "position_mm": [1.0, 2.5]}],
         "statement": "One recording.",
         "probability_of_deciding": 0.9,
         "without_it": 0.5,
         "minutes": 15.0,
     }
-    shown = plan_of(planned)
+    shown = body_of({**EMPTY, "next_experiment": planned}, {})
     assert "preload [N]" in re.findall(r'<th scope="col">(.*?)</th>', shown)
     assert "<td>1, 2.5</td>" in shown
     assert "about 15 minutes" in texts(shown)
+    address = re.findall(r'<a href="data:text/csv;charset=utf-8,(.*?)" download="plan.csv">', shown)
+    assert unquote(unescape(address[0])) == "sensor,preload_n,position_mm\r\n'=s1,2.0,1.0 2.5\r\n"
 
 
 def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_range() -> None:

@@ -10,6 +10,8 @@ import numpy as np
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.units import Floats, Mask
 
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
 
 def rows(columns: Mapping[str, Floats]) -> int:
     """Number of rows that columns have together; a single number (shape `()`) holds for all of them.
@@ -45,6 +47,17 @@ def to_csv(columns: Mapping[str, Floats | Sequence[Any]], line_end: str) -> str:
     writer.writerow(columns)
     writer.writerows(zip(*map(_cells, columns.values()), strict=True))
     return text.getvalue()
+
+
+def to_spreadsheet(columns: Mapping[str, Sequence[Any]]) -> str:
+    """Columns as CSV for a spreadsheet: `NaN` where there is no value, and what it would take for a formula as text."""
+    return to_csv({name: [_as_text(value) for value in column] for name, column in columns.items()}, "\r\n")
+
+
+def _as_text(value: Any) -> Any:
+    if value is None:
+        return "NaN"
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 def _cells(column: Floats | Sequence[Any]) -> Sequence[Any]:

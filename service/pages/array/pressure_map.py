@@ -17,13 +17,14 @@ from service.ingest.reading import READING_SLOTS
 from service.ingest.uploads import received
 from service.pages.array import description
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, csv_text, drawn
+from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
 from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
 from underskin.errors import UnderskinError, out_of_range
+from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.readers import text
 
 router = APIRouter(prefix="/loads/map")
@@ -98,7 +99,7 @@ def _figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
 
 
 def _csv(columns: Mapping[str, Any]) -> str:
-    return _inside("text/csv", csv_text(columns).encode())
+    return _inside("text/csv", to_spreadsheet(columns).encode())
 
 
 def _inside(media_type: str, content: bytes) -> str:

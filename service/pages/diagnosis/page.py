@@ -15,7 +15,7 @@ from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import Drawn, attachment, csv_answer, csv_of_rows, drawn, drawn_before, in_a_cell
+from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
@@ -24,6 +24,7 @@ from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
@@ -135,8 +136,7 @@ def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
     planned = (report["next_experiment"] or {}).get("recordings", [])
     if not planned:
         raise Refusal(404, f"Diagnosis {diagnosis_id!r} plans no recordings.")
-    names = list(dict.fromkeys(name for one in planned for name in one))
-    return csv_of_rows(f"{row.id}-plan", names, [{name: in_a_cell(one.get(name)) for name in names} for one in planned])
+    return csv_answer(f"{row.id}-plan", planned_columns(planned))
 
 
 @router.get("/diagnoses/{diagnosis_id}/{figure}.csv")

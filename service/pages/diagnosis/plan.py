@@ -11,13 +11,13 @@ from fastapi.responses import JSONResponse
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_of_rows, in_a_cell
+from service.pages.shared.figures import attachment, csv_of_rows
 from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
 from service.usecases import planned_recordings
-from underskin.diagnosis.reporting.wording import axis, readable
+from underskin.diagnosis.reporting.wording import axis, in_a_cell, readable
 from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from service.pages.shared.assets import LIBRARY, gzipped
 from service.pages.shared.formats import json_inside
 from service.store import AnyRow
-from underskin.prediction.columns import to_csv
+from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.campaign import CurveRecording, FrfRecording, Recording
 from underskin.units import Floats
 
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 CLICK = "Click a sensor to choose it."
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 @dataclass(frozen=True)
@@ -91,7 +90,7 @@ class CsvAnswer(Response):
     """Columns as a CSV file to be saved; the columns themselves too, as numbers and texts are one in its text."""
 
     def __init__(self, name: str, columns: Mapping[str, Sequence[Any]]) -> None:
-        super().__init__(csv_text(columns), headers=_saved(f"{name}.csv"), media_type="text/csv; charset=utf-8")
+        super().__init__(to_spreadsheet(columns), headers=_saved(f"{name}.csv"), media_type="text/csv; charset=utf-8")
         self.name, self.columns = name, columns
 
 
@@ -114,11 +113,6 @@ def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any
     return csv_answer(name, dict(zip(names, columns_of(rows, *names), strict=True)))
 
 
-def in_a_cell(value: Any) -> Any:
-    """A value of a planned recording; a position, which has two, with a blank between them."""
-    return " ".join(map(str, value)) if isinstance(value, list) else value
-
-
 def columns_of(rows: Sequence[Mapping[str, Any]], *names: str) -> list[list[Any]]:
     """Columns of rows; None where a row lacks it."""
     return [[row.get(name) for row in rows] for name in names]
@@ -131,15 +125,3 @@ def sensors_of(row: AnyRow, answer: Mapping[str, Any]) -> list[dict[str, Any]]:
         {**entry, **places[entry["sensor"]], "reasons": "; ".join(flag["reason"] for flag in entry["flags"])}
         for entry in answer["sensors"]
     ]
-
-
-def csv_text(columns: Mapping[str, Sequence[Any]]) -> str:
-    """Columns as CSV."""
-    return to_csv({name: [_cell(value) for value in column] for name, column in columns.items()}, "\r\n")
-
-
-def _cell(value: Any) -> Any:
-    """A text that a spreadsheet would take for a formula is marked as text."""
-    if value is None:
-        return "NaN"
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value

@@ -23,14 +23,14 @@ from underskin.surrogate.sigma_table import SigmaTable
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report
 _MOST_RIVALS = 3
 _SAYS = {
-    "explained": "mismatch, explained",
-    "ambiguous": "mismatch, several explanations",
-    "unexplained": "mismatch, no explanation",
+    "explained": "mismatch explained",
+    "ambiguous": "mismatch with several explanations",
+    "unexplained": "mismatch without explanation",
     "no_mismatch": "no mismatch found",
     "insufficient_data": "too little data",
 }
 _NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
-_BY_A_LAW = "mismatch, a law that nobody listed"
+_BY_A_LAW = "mismatch by a law that nobody listed"
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class VerdictSummary:
     at: str  # when it ended, or was asked for
     name: str | None  # of one of several campaigns
     modulus: str | None = None  # of curves, under an answer that is settled
+    outdated: bool = False  # not of its campaigns as they are now
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, VerdictSummary]:
@@ -59,20 +60,21 @@ def mechanisms_of(report: Mapping[str, Any]) -> list[str]:
 
 def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSummary:
     at = row.ended_at or row.asked_at
+    outdated = diagnoses.outdated(row) is not None
     if not report:
         beside = "open it to see why and what to do" if row.state == "failed" else ""
-        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", beside, at, row.name)
+        return VerdictSummary(row.id, f"diagnosis {row.state}", "quiet", beside, at, row.name, outdated=outdated)
     law = report["verdict"] == "unexplained" and report.get("unnamed")
     tag = _BY_A_LAW if law else _SAYS[report["verdict"]]
     if report["verdict"] == "insufficient_data":
-        return VerdictSummary(row.id, tag, "quiet", "", at, row.name)
+        return VerdictSummary(row.id, tag, "quiet", "", at, row.name, outdated=outdated)
     probability = report["probability"]
     if report["verdict"] in ("no_mismatch", "unexplained"):
         tag = f"{tag}, {in_percent(probability)}"
     sure = report["verdict"] == "no_mismatch" and probability >= EXPLAINED
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
     tag = f"{tag}, adopted" if adopted else tag
-    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report))
+    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report), outdated)
 
 
 def _modulus(report: Mapping[str, Any]) -> str | None:
@@ -99,7 +101,7 @@ def _beside(report: Mapping[str, Any]) -> str:
     ]
     if report["mechanisms"] and verdict == "explained":
         said = [f"{in_words([one['name']])} ({in_percent(one['probability'])})" for one in report["mechanisms"]]
-        return f"lacks {' and '.join(said)}"
+        return f"the model lacks {' and '.join(said)}"
     if probability >= EXPLAINED or verdict == "unexplained":
         return " ".join(leader)
     if verdict == "no_mismatch":

@@ -152,7 +152,7 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
         today = datetime.now(UTC).strftime("%Y-%m-%d")
         assert today in str(said.locator("time").last.get_attribute("datetime"))
         assert "by the paper's model" in page.locator("#figure-map figcaption").inner_text()
-        assert page.get_by_role("row", name="friday").locator("a.tag").inner_text() == "mismatch, explained"
+        assert page.get_by_role("row", name="friday").locator("a.tag").inner_text() == "mismatch explained"
         reader.require_accessible()
     reader.go("/")
     assert "adopted" not in page.get_by_role("row", name="palm-d").inner_text()
@@ -183,12 +183,12 @@ WARMTH = {
         ("no_mismatch", 0.99, [], [("strain_stiffening", 0.006)], "no mismatch found, 99 %", "", "good"),
         ("no_mismatch", 0.6, [], [("strain_stiffening", 0.38)], "no mismatch found, 60 %",
          "not ruled out: strain stiffening 38 %", "look"),
-        ("explained", 0.97, ["contact_resonance"], [("timing_delay", 0.03)], "mismatch, explained",
-         "lacks contact resonance (98.5 %)", "look"),
+        ("explained", 0.97, ["contact_resonance"], [("timing_delay", 0.03)], "mismatch explained",
+         "the model lacks contact resonance (98.5 %)", "look"),
         ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
-         "mismatch, several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
-        ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch, no explanation, 99.9 %", "", "look"),
-        ("unexplained", 0.998, [], [], "mismatch, a law that nobody listed, 99.8 %", "modulus over the time of day",
+         "mismatch with several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
+        ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch without explanation, 99.9 %", "", "look"),
+        ("unexplained", 0.998, [], [], "mismatch by a law that nobody listed, 99.8 %", "modulus over the time of day",
          "look"),
         ("insufficient_data", 0.5, [], [], "too little data", "", "quiet"),
     ],

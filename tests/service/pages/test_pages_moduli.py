@@ -69,3 +69,16 @@ def test_no_modulus_is_quoted_before_an_answer_is_settled(reader: Visit, idle: S
     reader.page.get_by_text("How well the models describe").click()
     rows = reader.page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr")
     assert rows.first.inner_text().startswith("Do not quote it yet")
+
+
+def test_a_modulus_of_recordings_that_are_no_longer_in_use_is_not_quoted(reader: Visit, idle: Server) -> None:
+    document = to_dict(pressed(1e5, [2.0, 3.0]))
+    document = {**document, "name": "changed", "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
+    campaign_id, _ = diagnosed(idle, document, of_curves("explained"), "changed")
+    left_out = {"recording": document["recordings"][0]["id"], "reason": "the sample slid"}
+    idle.http.post(f"/v1/campaigns/{campaign_id}/exclusions", json=left_out).raise_for_status()
+    reader.go(f"/campaigns/{campaign_id}")
+    said = reader.page.locator("main").inner_text()
+    assert "mismatch explained" in said
+    assert "(outdated)" in said
+    assert "Quote none of these yet" in said

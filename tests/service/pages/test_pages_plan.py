@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -109,7 +110,7 @@ def test_limits_that_no_rig_has_are_refused(
     assert re.search(told, shown) is not None, shown
 
 
-def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, idle: Server) -> None:
+def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, idle: Server, tmp_path: Path) -> None:
     first = {"sensor": "s1", "indenter_radius_mm": 4.0, "preload_n": 3.0, "position_mm": [0.0, 2.5], "repeats": 2}
     recordings = [first, {**first, "sensor": "=s2", "dwell_s": 60.0, "repeats": 1}]
     planned = {
@@ -138,5 +139,17 @@ def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, 
     ]
     assert tables["XLSX"][1:] == [("s1", 4, 3, "0.0 2.5", 2, None), ("=s2", 4, 3, "0.0 2.5", 1, 60)]
     reader.require_accessible()
+    with reader.page.expect_download() as saving:
+        reader.page.get_by_role("link", name="Save as one HTML file").click()
+    saving.value.save_as(tmp_path / "report.html")
+    reader.page.goto((tmp_path / "report.html").as_uri())
+    section = reader.page.locator("details", has_text="What to measure next")
+    section.locator("summary").click()
+    with reader.page.expect_download() as saving:
+        section.get_by_role("link", name="CSV").click()
+    assert saving.value.suggested_filename == "plan.csv"
+    saved = csv.reader(io.StringIO(saving.value.path().read_text("utf-8")))
+    assert [tuple(row) for row in saved] == tables["CSV"]
+    reader.wrong.clear()  # the file itself is not of the server
     without = diagnosed(idle, resonant("unplanned"), {**report(), "next_experiment": None}, "planned")[1]
     assert idle.http.get(f"/diagnoses/{without}/planned.csv").status_code == 404

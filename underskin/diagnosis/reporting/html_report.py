@@ -4,9 +4,10 @@ The template says what the page shows; names and numbers of the report are worde
 a campaign is escaped; the page's policy forbids whatever is not in it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
+from urllib.parse import quote
 
 import plotly.graph_objects as go
 import plotly.io
@@ -22,6 +23,7 @@ from underskin.diagnosis.reporting.several_figures import several_figures
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
+from underskin.prediction.columns import to_spreadsheet
 
 _LIST = """
 const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updatemenus[0];
@@ -61,7 +63,7 @@ FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
 def _templates() -> Environment:
     loader = PackageLoader("underskin.diagnosis.reporting")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined)
-    environment.filters |= {function.__name__: function for function in (*_FILTERS, of_summary)}
+    environment.filters |= {function.__name__: function for function in (*_FILTERS, csv_address, of_summary)}
     environment.globals |= {"catalogue": CATALOGUE, "EXPLAINED": EXPLAINED}
     return environment
 
@@ -85,18 +87,18 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
 
 def body_of(report: Report, drawn: FigureHtml, plan: str | None = None) -> str:
     """What stands below the title, as HTML: one sentence, where, what, how much better, what to measure next; `plan`:
-    address of the planned recordings, without the .csv or .xlsx at its end."""
+    address of the planned recordings, without the .csv or .xlsx at its end; without it, the CSV is in the page."""
     return str(_macros("report.html").body(report, drawn, plan))
+
+
+def csv_address(recordings: Sequence[Mapping[str, Any]]) -> str:
+    """The planned recordings as CSV, in the address itself: a file has no server to ask."""
+    return f"data:text/csv;charset=utf-8,{quote(to_spreadsheet(wording.planned_columns(recordings)))}"
 
 
 def provenance(report: Report) -> str:
     """With what it was made, as HTML."""
     return str(_macros("report.html").provenance(report["provenance"]))
-
-
-def plan_of(planned: Mapping[str, Any]) -> str:
-    """A report's `next_experiment` that is not empty, as HTML."""
-    return str(_macros("report.html").plan(planned))
 
 
 def of_report(report: Report) -> dict[str, go.Figure]:

@@ -124,6 +124,16 @@ def columns(entries: Sequence[Mapping[str, Any]]) -> list[str]:
     return list(dict.fromkeys(name for entry in entries for name in entry))
 
 
+def planned_columns(recordings: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
+    """Planned recordings as columns, None where a recording lacks the field; a position, two numbers, is one text."""
+    return {name: [in_a_cell(entry.get(name)) for entry in recordings] for name in columns(recordings)}
+
+
+def in_a_cell(value: Any) -> Any:
+    """A value of a planned recording; a position, which has two, with a blank between them."""
+    return " ".join(map(str, value)) if isinstance(value, list) else value
+
+
 def plain(value: Any) -> str:
     """A value of a planned recording."""
     if isinstance(value, list):
