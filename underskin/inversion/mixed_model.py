@@ -59,9 +59,22 @@ class LevelRows:
         """Some of the rows."""
         return LevelRows(*(column[..., chosen] for column in vars(self).values()))
 
-    def moments(self) -> tuple[Floats, Floats]:
-        """E z over its sensor's d33, and 1/variance about it, each (positions, gains, rows)."""
-        mean, variance = self.position_mean[:, None, :], np.maximum(self.position_variance, 0)[:, None, :]
+    def sums(self, group: Indices, count: int) -> tuple[Floats, Floats, Floats, Floats]:
+        """With x = E z over the group's d33 and w the inverse variance about it: Σ w x² and Σ w x z of each group
+        (positions, gains, groups), Σ w z² and Σ ln w of all rows (positions, gains)."""
+        sums = []
+        for position in range(len(POSITIONS)):  # one at a time: all at once would take 2 kB a row for each product
+            design, weight = self._moments(position)
+            of_groups = (
+                _sum_by_group(product, group, count) for product in (weight * design**2, weight * design * self.z)
+            )
+            sums.append((*of_groups, (weight * self.z**2).sum(-1), np.log(weight).sum(-1)))
+        information, moment, squares, log_weight = (np.array(part) for part in zip(*sums, strict=True))
+        return information, moment, squares, log_weight
+
+    def _moments(self, position: int) -> tuple[Floats, Floats]:
+        """E z over its sensor's d33, and 1/variance about it, each (gains, rows)."""
+        mean, variance = self.position_mean[position], np.maximum(self.position_variance[position], 0)
         gain = GAINS[:, None] ** 2
         scatter = mean**2 * np.expm1(gain) * np.exp(gain) + variance
         return mean * np.exp(gain / 2), 1 / (np.square(self.pilot) * scatter + self.line**2)
@@ -90,9 +103,7 @@ class ScatterPosterior:
         Estimate
             d33 with standard uncertainty and 95 % interval [C/N], (count,) each; NaN for a group without recordings.
         """
-        design, weight = rows.moments()
-        information = _sum_by_group(weight * design**2, group, count)
-        moment = _sum_by_group(weight * design * rows.z, group, count)
+        information, moment, _, _ = rows.sums(group, count)
         with np.errstate(divide="ignore", invalid="ignore"):
             values, variances = moment / information, 1 / information
             posterior = self.weights[..., None]
@@ -139,17 +150,14 @@ def fit(rows: LevelRows, sensor: Indices) -> MixedModel:
     """
     count = int(sensor.max()) + 1
     spreads = SPREADS if count > 1 else SPREADS[:1]
-    design, weight = rows.moments()
-    information = _sum_by_group(weight * design**2, sensor, count)[:, :, None, :]
-    moment = _sum_by_group(weight * design * rows.z, sensor, count)[:, :, None, :]
+    information, moment, squares, log_weight = rows.sums(sensor, count)
+    information, moment = information[:, :, None, :], moment[:, :, None, :]
     between = (spreads[:, None] * float(np.median(np.abs(rows.pilot)))) ** 2
     inflation = 1 + between * information
     total, first = (information / inflation).sum(-1), (moment / inflation).sum(-1)
     means = first / total
-    residual = (weight * rows.z**2).sum(-1)[..., None] - (between * moment**2 / inflation).sum(-1)
-    log_density = 0.5 * (
-        np.log(weight).sum(-1)[..., None] - np.log(inflation).sum(-1) - residual + means * first - np.log(total)
-    )
+    residual = squares[..., None] - (between * moment**2 / inflation).sum(-1)
+    log_density = 0.5 * (log_weight[..., None] - np.log(inflation).sum(-1) - residual + means * first - np.log(total))
     posterior = np.exp(log_density - log_density.max()) * _prior(spreads)
     posterior /= posterior.sum()
     return MixedModel(
