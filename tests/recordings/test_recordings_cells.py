@@ -106,6 +106,15 @@ def test_three_decimals_after_a_decimal_comma_are_no_thousands() -> None:
     assert read(changed("\t16\n", "\t16,000\n", commas)).campaign.skin.youngs_modulus_mpa == 16
 
 
+def test_a_decimal_point_among_decimal_commas_is_refused_with_what_is_written() -> None:
+    semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
+    found = read(semicolons + "r2;s01;4;1.5;0,09;10;7,1;-0,5\n")
+    assert [recording.id for recording in found.campaign.recordings] == ["r1"]
+    (problem,) = found.problems
+    assert (problem.recording, problem.field, problem.value) == ("r2", "preload_n", "1.5")
+    assert "line 12, column 4; decimals of this file are written with a comma" in problem.allowed
+
+
 def test_a_recording_that_begins_twice_is_refused() -> None:
     other = "r2,s01,4,2.0,0.09,10,7.1,-0.5\n"
     apart = refusal(PLAIN + other + "r1,,,,,40,7.1,-0.5\n")

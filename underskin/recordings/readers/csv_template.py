@@ -234,7 +234,10 @@ class _Template:
             return number * factor
         if text.is_grouped(cell):
             raise self.error(place[0], f"{field} = {cell!r} {text.ungrouped(cell)}", place[1])
-        return CellText(cell, f"{self.sheet and f'{self.sheet}, '}line {place[0] + 1}, column {place[1] + 1}")
+        where = f"{self.sheet and f'{self.sheet}, '}line {place[0] + 1}, column {place[1] + 1}"
+        if self.decimal == "," and text.number(cell, ".") is not None:
+            where += "; decimals of this file are written with a comma"
+        return CellText(cell, where)
 
     def _time(self, cell: str, place: tuple[int, int]) -> str:
         zone = time_zone()
