@@ -63,8 +63,8 @@ def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) ->
 
 @pytest.mark.slow
 def test_length_and_width_can_be_exchanged() -> None:
-    along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=4)
-    across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=4)
+    along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=3)
+    across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=3)
     np.testing.assert_allclose(along.sigma, across.sigma, rtol=1e-8)
 
 

@@ -70,9 +70,14 @@ def test_the_page_says_what_is_computed(table: SigmaTable, run: ArrayRun) -> Non
     assert table.sha256 in (DOCS / "paper.md").read_text(encoding="utf-8")
 
 
+@pytest.fixture(scope="module")
+def drawn(table: SigmaTable, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """The figures, drawn once."""
+    return figures.draw(table, tmp_path_factory.mktemp("drawn"))
+
+
 @pytest.mark.slow
-def test_the_figures_are_those_that_are_drawn(table: SigmaTable, tmp_path: Path) -> None:
-    drawn = figures.draw(table, tmp_path)
+def test_the_figures_are_those_that_are_drawn(drawn: list[Path]) -> None:
     assert [path.name for path in drawn] == [f"paper-fig{number}.svg" for number in FIGURES]
     for path in drawn:
         made, committed = (
@@ -82,13 +87,12 @@ def test_the_figures_are_those_that_are_drawn(table: SigmaTable, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_drawing_twice_gives_the_same_bytes(table: SigmaTable, tmp_path: Path) -> None:
-    for name in ("first", "second"):
-        (tmp_path / name).mkdir()
-        figures.draw(table, tmp_path / name)
-    for number in FIGURES:
-        file = f"paper-fig{number}.svg"
-        assert (tmp_path / "first" / file).read_bytes() == (tmp_path / "second" / file).read_bytes()
+def test_drawing_twice_gives_the_same_bytes(drawn: list[Path], table: SigmaTable, tmp_path: Path) -> None:
+    again = figures.draw(table, tmp_path)
+    assert [path.name for path in again] == [path.name for path in drawn]
+    for path, other in zip(drawn, again, strict=True):
+        assert path != other
+        assert path.read_bytes() == other.read_bytes()
 
 
 @pytest.mark.soak

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import tomllib
 import zipfile
@@ -26,6 +27,8 @@ SKIN = [
     "--preload-n=1",
 ]
 
+COMPILED_THERE = "hertz_kernel"  # within half a second
+
 # Every module of the library, but for the cluster's `distributed`, which is imported when it is asked for.
 IMPORT_ALL = """
 import importlib, pkgutil, sys, underskin
@@ -47,7 +50,17 @@ def fresh(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Environment:
     """An environment with the wheel and the library's own dependencies."""
     environment = new_environment(tmp_path_factory.mktemp("fresh") / "venv", PROJECT["dependencies"])
     environment.install(str(wheel))
+    bring_compiled(environment)
     return environment
+
+
+def bring_compiled(environment: Environment) -> None:
+    """Copy the machine code of this checkout to the same functions there, but for one module's, which it compiles."""
+    for file in (ROOT / "underskin").rglob("__pycache__/*.nb[ic]"):
+        if file.name.partition(".")[0] != COMPILED_THERE:
+            target = environment.site_packages / file.relative_to(ROOT)
+            target.parent.mkdir(exist_ok=True)
+            shutil.copy(file, target)
 
 
 def run(environment: Environment, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -81,6 +94,7 @@ def test_the_environment_has_what_the_wheel_requires_and_no_more(fresh: Environm
 def test_every_module_is_imported_without_the_packages_of_the_server(fresh: Environment) -> None:
     done = fresh.python(IMPORT_ALL)
     assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
+    assert list(fresh.site_packages.glob(f"underskin/**/{COMPILED_THERE}.*.nbc"))
 
 
 def test_sigma(fresh: Environment, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ RHO = [0.2, 0.6, 1.0]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("radius", "load"), first(2, [(4.0, 0.05), (1.6, 0.01), (1.6, 0.1), (0.5, 0.1)]))
+@pytest.mark.parametrize(("radius", "load"), first(1, [(1.6, 0.1), (4.0, 0.05), (1.6, 0.01), (0.5, 0.1)]))
 def test_an_independent_code_finds_the_same_contact(radius: float, load: float) -> None:
     """FElupe at the table's indentation: the force (3 G = E), the contact radius to its mesh, and the stress."""
     contact = TABLE.contact(radius, load)

@@ -1,10 +1,12 @@
 """The sweep survives being killed, distrusts damaged pieces, and gives the same table on a cluster."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import h5py
@@ -12,15 +14,15 @@ import numpy as np
 import pytest
 
 from tablegen.sigma import Nodes
-from tablegen.sigma_table import make_sigma_table
-from tablegen.sweep import run_pieces
+from tablegen.sigma_table import ORDER, SOURCES, make_sigma_table, nodes_hash, solve_piece
+from tablegen.sweep import run_pieces, sources_hash
 from tests.support.repository import ROOT
 from underskin import SolverError
 
 SOAK = "UNDERSKIN_SOAK" in os.environ
 PIECES = "sigma.h5.parts/*/*.npz"
 SMALL = Nodes(
-    a=np.linspace(0, 3.0, 7), rho=np.linspace(0, 3, 7), cbrt_load=np.linspace(0, 0.1, 7), r=np.linspace(0, 8, 9)
+    a=np.linspace(0, 3.0, 7), rho=np.linspace(0, 3, 7), cbrt_load=np.linspace(0, 0.03, 7), r=np.linspace(0, 8, 9)
 )
 SCRIPT = """
 from pathlib import Path
@@ -41,15 +43,42 @@ def datasets(path: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def solved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All pieces of the table, in the folder in which a sweep looks for them."""
+    parts = tmp_path_factory.mktemp("pieces") / "sigma.h5.parts"
+    pieces = {
+        f"order{order}-{number:03d}": partial(solve_piece, float(a), SMALL, order)
+        for order in (ORDER, ORDER - 1)
+        for number, a in enumerate(SMALL.a)
+        if a > 0
+    }
+    run_pieces(pieces, parts / f"{sources_hash(SOURCES)[:16]}-{nodes_hash(SMALL)[:8]}")
+    return parts
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(solved: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("whole") / "sigma.h5"
+    parts = path.with_name("sigma.h5.parts")
+    shutil.copytree(solved, parts)
     make_sigma_table(path, SMALL)
-    assert not path.with_name("sigma.h5.parts").exists()
+    assert not parts.exists()
     return path
 
 
+def all_but(count: int, solved: Path, folder: Path) -> None:
+    """Put the pieces of a table but for the last few of either order into a folder; in `make soak` none of them."""
+    if SOAK:
+        return
+    shutil.copytree(solved, folder / "sigma.h5.parts")
+    for order in (ORDER, ORDER - 1):
+        for piece in sorted(folder.glob(f"sigma.h5.parts/*/order{order}-*.npz"))[-count:]:
+            piece.unlink()
+
+
 @pytest.mark.slow
-def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, tmp_path: Path) -> None:
+def test_killed_at_any_moment_it_resumes_to_the_same_table(solved: Path, uninterrupted: Path, tmp_path: Path) -> None:
+    all_but(3, solved, tmp_path)
     script = tmp_path / "make.py"
     script.write_text(SCRIPT)
     path = tmp_path / "sigma.h5"
@@ -74,8 +103,9 @@ def test_killed_at_any_moment_it_resumes_to_the_same_table(uninterrupted: Path, 
 
 
 @pytest.mark.slow
-def test_a_dask_cluster_gives_the_same_table(uninterrupted: Path, tmp_path: Path) -> None:
+def test_a_dask_cluster_gives_the_same_table(solved: Path, uninterrupted: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
+    all_but(1, solved, tmp_path)
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
@@ -101,7 +131,7 @@ def test_a_failed_piece_stops_the_sweep_and_keeps_the_others(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_no_table_is_written_when_a_point_fails(tmp_path: Path) -> None:
-    hopeless = Nodes(a=np.array([0.0, 3.0]), rho=SMALL.rho, cbrt_load=np.array([0.0, 8.0]), r=SMALL.r)
+    hopeless = Nodes(a=np.array([0.0, 3.0]), rho=SMALL.rho, cbrt_load=np.array([0.0, 1e6]), r=SMALL.r)
     with pytest.raises(SolverError, match="a/h"):
         make_sigma_table(tmp_path / "sigma.h5", hopeless)
     assert not (tmp_path / "sigma.h5").exists()

@@ -7,9 +7,11 @@ import h5py
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from tablegen import contact_table, influence_table, sigma_table
 from tablegen.contact_interpolation import ContactInterpolation
 from tablegen.sweep import sources_hash
+from tests.support.cases import first
 from underskin.surrogate.sigma_table import tables_folder
 
 MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5": contact_table}
@@ -31,7 +33,7 @@ def test_sigma_solved_anew() -> None:
     nodes = sigma_table.DEFAULT_NODES
     with h5py.File(tables_folder() / "sigma.h5") as file:
         kept, linear_error = file["sigma/sigma"][:], file["sigma/fem_linear_error"][:]
-    for number in (7, 41):
+    for number in first(1, (7, 41)):
         column = sigma_table.solve_piece(float(nodes.a[number]), nodes, sigma_table.ORDER)
         # Where nothing is added to the exact linear layer, the column's own share is the whole difference.
         change = kept[number] - kept[number][:, :1]
@@ -44,7 +46,7 @@ def test_influence_solved_anew() -> None:
     axes = influence_table.DEFAULT_AXES
     with h5py.File(tables_folder() / "influence.h5") as file:
         normal, tangential = file["influence/gamma_n"][:], file["influence/gamma_t"][:]
-    for i, j in ((0, 0), (6, 9)):
+    for i, j in first(1, ((6, 9), (0, 0))):
         solved = influence_table.solve_piece(
             float(axes[0][i]), float(axes[1][j]), axes[2], axes[3], influence_table.ORDER
         )
@@ -57,6 +59,7 @@ def test_contact_solved_anew() -> None:
     """The table holds a spline through the solved edges, at other spheres: within its own error."""
     table = ContactInterpolation(tables_folder() / "contact.h5")
     _, cbrt_load, rho = contact_table.DEFAULT_AXES
+    cbrt_load = cbrt_load if SOAK else cbrt_load[::2]
     edge = float(contact_table.DEFAULT_EDGES[len(contact_table.DEFAULT_EDGES) // 2])
     solved = contact_table.solve_piece(edge, rho, cbrt_load[1:], contact_table.ORDER)
     answer = table.contact(solved["radius"], cbrt_load[1:] ** 3)

@@ -14,6 +14,7 @@ from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError
 
 ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 
 
 @pytest.fixture
@@ -34,7 +35,7 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
 
 @on("sqlite")
 def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
-    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
+    with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         ids = [sent(server, resonant("array", seed=seed)) for seed in range(2)]
         started = client.skins.diagnose("palm", name="palm since May")
         done = client.diagnoses.wait(started["id"])

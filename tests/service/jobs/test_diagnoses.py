@@ -18,6 +18,7 @@ from underskin import Client, ServiceError, __version__
 
 NONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
 ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def is_gone(pid: int) -> bool:
 
 
 def test_a_campaign_is_diagnosed_once(file_place: Place) -> None:
-    with running(file_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+    with running(file_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         campaign_id = sent(server, resonant("array"))
         started = client.diagnoses.start(campaign_id)
         shares: list[float] = []
@@ -104,7 +105,7 @@ def test_a_killed_server_takes_up_what_it_was_at(place: Place) -> None:
         (worker,) = await_workers(server, 1)
         server.kill()
         assert is_gone(worker)
-    with running(place, **ONE) as server:
+    with running(place, **SEVERAL) as server:
         for diagnosis_id in (first, second):
             diagnosis = awaited(server, diagnosis_id)
             assert (diagnosis["state"], diagnosis["report"]) == ("done", report())
@@ -123,7 +124,7 @@ def test_a_server_that_ends_puts_back_what_it_was_at(place: Place) -> None:
 
 
 def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
-    with running(file_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+    with running(file_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
         (worker,) = await_workers(server, 1)
         assert client.diagnoses.cancel(second)["state"] == "cancelled"
@@ -138,7 +139,7 @@ def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
 
 
 def test_a_fork_server_is_kept_ready_for_the_next_job(file_place: Place) -> None:
-    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_READY="true") as server:
+    with running(file_place, **SEVERAL) as server:
         (ready,) = await_workers(server, 1, "underskin-ready")
         diagnosis_id = asked(server, sent(server, resonant("array")))
         (worker,) = await_workers(server, 1)
@@ -164,7 +165,7 @@ def test_a_worker_whose_fork_server_is_killed_goes_on(file_place: Place) -> None
 
 
 def test_a_killed_server_leaves_no_process(file_place: Place) -> None:
-    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_READY="true") as server:
+    with running(file_place, **SEVERAL) as server:
         (ready,) = await_workers(server, 1, "underskin-ready")
         asked(server, sent(server, resonant("array")))
         (worker,) = await_workers(server, 1)
@@ -174,7 +175,7 @@ def test_a_killed_server_leaves_no_process(file_place: Place) -> None:
 
 
 def test_a_worker_that_dies_is_told(file_place: Place) -> None:
-    with running(file_place, **ONE) as server:
+    with running(file_place, **SEVERAL) as server:
         campaign_id = sent(server, resonant("array"))
         diagnosis_id = asked(server, campaign_id)
         (worker,) = await_workers(server, 1)

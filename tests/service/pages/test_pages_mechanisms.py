@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from tests.service.pages.conftest import Visit, visit
-from tests.service.routes.test_mechanisms import WARM, warmed
+from tests.service.routes.test_mechanisms import SEVERAL, WARM, warmed
 from tests.support.diagnosed import diagnosed, report, resonant, sent
 from tests.support.store_server import Place, Server, running
 from underskin.mechanisms.registry import built_in
@@ -19,7 +19,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
 ) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
-    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
+    with running(Place(folder), **SEVERAL) as server:
         campaign_id = sent(server, warmed())
         for visitor in visit(browser, server):
             page = visitor.page

@@ -16,6 +16,7 @@ from underskin.recordings.campaign import FrfRecording, to_dict
 from underskin.surrogate.sigma_table import load_table
 
 ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
+SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 WARM = """\
 schema: mechanism/1
 name: warm_amplifier
@@ -58,7 +59,7 @@ def warmed() -> dict[str, object]:
 
 
 def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(own_place: Place) -> None:
-    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+    with running(own_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         campaign_id = sent(server, warmed())
         first = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
         assert (first["verdict"], first["report"]["unnamed"]["axis"]) == ("unexplained", "temperature_c")
@@ -136,7 +137,7 @@ def test_what_cannot_be_kept_is_refused_with_its_reason(own_place: Place, body: 
 
 def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(own_place: Place) -> None:
     folder = own_place.folder / "mechanisms"
-    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
+    with running(own_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
         campaign_id = sent(server, warmed())
         before = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
         folder.mkdir()
