@@ -19,8 +19,8 @@ def table() -> SigmaTable:
 
 @pytest.fixture(scope="module")
 def skins_diagnosed_once() -> Iterator[None]:
-    """A campaign that several fleets of a module have is diagnosed for the first of them: the same recordings give the
-    same diagnosis (test_diagnosis_report.py)."""
+    """A campaign that several fleets of a module have, or several dates of a skin, is diagnosed for the first of them:
+    the same recordings give the same diagnosis (test_diagnosis_report.py)."""
     made: dict[tuple[bytes, frozenset[str]], DiagnosisResult] = {}
 
     def once(campaign: Campaign, table: SigmaTable, *, without: Collection[str]) -> DiagnosisResult:
@@ -31,4 +31,5 @@ def skins_diagnosed_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("underskin.diagnosis.several.fleet.diagnose", once)
+        patch.setattr("underskin.diagnosis.several.campaigns.diagnose", once)
         yield
