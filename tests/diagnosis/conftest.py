@@ -1,6 +1,6 @@
 """What tests of the diagnosis share: the table of σ, and diagnoses of campaigns that several of them put together."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 import pytest
 
@@ -18,12 +18,12 @@ def table() -> SigmaTable:
 
 
 @pytest.fixture(scope="module")
-def skins_diagnosed_once() -> Iterator[None]:
-    """A campaign that several fleets of a module have is diagnosed for the first of them: the same recordings give the
-    same diagnosis (test_diagnosis_report.py)."""
+def skins_diagnosed_once() -> Iterator[Callable[..., DiagnosisResult]]:
+    """A campaign that several fleets of a module have, or several dates of a skin, is diagnosed for the first of them:
+    the same recordings give the same diagnosis (test_diagnosis_report.py). Tests that ask for it diagnose by it too."""
     made: dict[tuple[bytes, frozenset[str]], DiagnosisResult] = {}
 
-    def once(campaign: Campaign, table: SigmaTable, *, without: Collection[str]) -> DiagnosisResult:
+    def once(campaign: Campaign, table: SigmaTable, *, without: Collection[str] = ()) -> DiagnosisResult:
         key = json_file.write(campaign), frozenset(without)
         if key not in made:
             made[key] = diagnose(campaign, table, without=without)
@@ -31,4 +31,5 @@ def skins_diagnosed_once() -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("underskin.diagnosis.several.fleet.diagnose", once)
-        yield
+        patch.setattr("underskin.diagnosis.several.campaigns.diagnose", once)
+        yield once

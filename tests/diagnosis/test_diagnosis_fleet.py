@@ -1,6 +1,7 @@
 """Skins of one make as a fleet: which departs, and in what; what a skin of few recordings gains by its sisters."""
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +11,8 @@ import pytest
 from tests.support.kinds_campaigns import of_block
 from tests.support.skins import HEAVY_TIP, made
 from underskin.diagnosis.inference.knowledge import Knowledge
-from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting import numbers
+from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.course import Candidate
 from underskin.diagnosis.several.fleet import declared_wrongly, diagnose_fleet
@@ -64,11 +65,11 @@ def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_t
 
 @pytest.mark.slow
 def test_of_many_skins_two_that_depart_are_named(table: SigmaTable) -> None:
-    skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in range(5)}
-    skins |= {"weak": [made("c8", seed=40, d33=9.0)], "strong": [made("c9", seed=41, d33=20.0)]}
+    skins = sisters(3) | {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in (3, 4)}
+    skins |= {"weak": [made("weak", seed=40, d33=9.0)], "strong": [made("strong", seed=41, d33=20.0)]}
     fleet = diagnose_fleet(skins, table, "batch")
     assert departures(fleet) == {"weak", "strong"}
-    assert population(fleet, "d33")["mean"] == pytest.approx(14.4, rel=0.03)
+    assert population(fleet, "d33")["mean"] == pytest.approx((3 * 14.0 + 14.6 + 14.8) / 5, rel=0.03)
 
 
 @pytest.mark.slow
@@ -212,7 +213,9 @@ def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable)
 
 
 @pytest.mark.slow
-def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
+def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(
+    skins_diagnosed_once: Callable[..., DiagnosisResult], table: SigmaTable
+) -> None:
     """Alone, where what is declared may be wrong, its interval is wider than with them, and over six draws the pooled
     one holds the true d33."""
     widths, narrower, held = [], [], []
@@ -223,7 +226,7 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: Sigma
         fleet = diagnose_fleet(three | {"few": [few]}, table, "batch")
         own = next(one for one in population(fleet, "d33")["skins"] if one["skin"] == "few")
         held.append(own["low"] < 14.0 < own["high"])
-        result = diagnose(few, table)
+        result = skins_diagnosed_once(few, table)
         assert result.few is not None
         assert result.problem is not None
         fit = Candidate(result.problem, result.few).explained(frozenset(ERRORS))
@@ -237,11 +240,13 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(table: Sigma
 
 
 @pytest.mark.slow
-def test_a_skin_of_three_recordings_has_the_scatter_of_its_sisters(table: SigmaTable) -> None:
+def test_a_skin_of_three_recordings_has_the_scatter_of_its_sisters(
+    skins_diagnosed_once: Callable[..., DiagnosisResult], table: SigmaTable
+) -> None:
     """The rig scatters gains by 2 % and no position."""
     whole = made("few", seed=61)
     campaigns = [*(one for (one,) in sisters(3).values()), replace(whole, recordings=whole.recordings[:3])]
-    results = [diagnose(one, table) for one in campaigns]
+    results = [skins_diagnosed_once(one, table) for one in campaigns]
     found = benches([Candidate(one.problem, one.search) for one in results if one.problem and one.search])
     assert len(found) == 4
     assert found[3].gain.middle == pytest.approx(np.log(0.02), abs=0.3)

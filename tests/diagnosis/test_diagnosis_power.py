@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
@@ -56,7 +57,7 @@ def test_three_times_what_is_visible_is_seen_and_a_third_of_it_is_not(table: Sig
     for times, seen in ((3.0, True), (1 / 3, False)):
         strength = float(np.interp(times * least["preload_dependent_d33"], changes, coefficients))
         hidden = replace(QUIET, mechanisms=("preload_dependent_d33",), parameters=(strength, 1.0))
-        for seed in (11, 12):
+        for seed in first(1, [11, 12]):
             answer = diagnosis_report(campaign(replace(hidden, seed=seed), table), table)
             assert (answer["verdict"] != "no_mismatch") is seen
 

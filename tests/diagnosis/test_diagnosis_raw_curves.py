@@ -120,7 +120,7 @@ _RIG: dict[str, Any] = {
     "schema": "experiment/1", "name": "unlisted", "seed": 11, "kind": "indentation",
     "skin": {"thickness_mm": 0.6, "youngs_modulus_mpa": 1.8, "sensor_radius_mm": 1.0, "d33_pc_per_n": 10.0},
     "curves": {
-        "indenters_mm": [0.017, 0.012], "largest_displacement_mm": 1.6e-3, "samples": 1000,
+        "indenters_mm": first(1, [0.017, 0.012]), "largest_displacement_mm": 1.6e-3, "samples": 1000,
         "speeds_mm_per_s": [4e-4], "repeats": 1, "hold_s": 20.0, "retract": True, "approach_mm": 3e-4,
         "retreat_mm": 4e-4, "stage_stiffness_n_per_mm": 0.03, "stage_declared": False, "times": True,
         "modulus_declared": False, "units_checked": True, "contact_point_mm": 4.7e-3, "force_zero_n": 2.6e-7,

@@ -21,8 +21,10 @@ from underskin.recordings.campaign import Campaign, FrfRecording, to_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+pytestmark = pytest.mark.usefixtures("skins_diagnosed_once")
+
 SURE = [0.0, 0.0]  # of ln d33, by mechanisms
-SEPTEMBER, OCTOBER = "2017-09-12T09:00:00Z", "2017-10-20T09:00:00Z"
+SEPTEMBER = "2017-09-12T09:00:00Z"
 
 
 def scopes(report: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -41,10 +43,23 @@ def with_gain(campaign: Campaign, sensor: str, gain: float) -> Campaign:
     return replace(campaign, recordings=tuple(entries))
 
 
-def test_what_appeared_between_two_campaigns_is_named_with_its_date(table: SigmaTable) -> None:
-    """Whatever the order in which they are given."""
+@pytest.fixture(scope="module")
+def appeared(table: SigmaTable) -> dict[str, Any]:
+    """The report on a campaign with a heavy tip and an earlier one without it, given in that order."""
     before, after = made("may"), made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)
-    report = diagnose_together([after, before], table, "both")
+    return diagnose_together([after, before], table, "both")
+
+
+@pytest.fixture(scope="module")
+def block_apart(table: SigmaTable) -> dict[str, Any]:
+    """The report on two dates of a skin of 9 MPa where 16 is declared, and a block of its elastomer."""
+    dates = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
+    return diagnose_together([*dates, of_block(9.0)], table, "all")
+
+
+def test_what_appeared_between_two_campaigns_is_named_with_its_date(appeared: dict[str, Any]) -> None:
+    """Whatever the order in which they are given."""
+    report = appeared
     assert (report["campaign"], report["campaigns"]) == ("both", ["may", "september"])
     assert report["verdict"] == "explained"
     assert scopes(report) == {"contact_resonance": {"campaigns": ["september"], "since": "2017-09-12"}}
@@ -53,14 +68,12 @@ def test_what_appeared_between_two_campaigns_is_named_with_its_date(table: Sigma
     assert mass["low"] < 4.0 < mass["high"]
 
 
-def test_what_acts_in_all_is_known_better_than_from_one(table: SigmaTable) -> None:
+def test_what_acts_in_all_is_known_better_than_from_one(appeared: dict[str, Any], table: SigmaTable) -> None:
     each = [made("may", effects=HEAVY_TIP), made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)]
     report = diagnose_together(each, table, "both")
     assert scopes(report) == {"contact_resonance": {"campaigns": ["may", "september"]}}
     (mass, _) = report["mechanisms"][0]["parameters"]
-    alone = diagnose_together([each[0], made("october", OCTOBER, seed=9)], table, "one")["mechanisms"][0]["parameters"][
-        0
-    ]
+    (alone, _) = appeared["mechanisms"][0]["parameters"]
     assert np.log(mass["high"] / mass["low"]) < 0.8 * np.log(alone["high"] / alone["low"])
     assert mass["low"] < 4.0 < mass["high"]
 
@@ -169,16 +182,16 @@ def test_the_command_writes_one_report_of_several_files(tmp_path: Path) -> None:
     assert refused.exit_code != 0
 
 
-def test_a_block_measured_apart_tells_the_modulus_of_both_dates(table: SigmaTable) -> None:
+def test_a_block_measured_apart_tells_the_modulus_of_both_dates(block_apart: dict[str, Any], table: SigmaTable) -> None:
     """E is 9 where 16 is declared: FRFs leave open whether it is the thickness; the block counts for both dates."""
-    dates = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
-    report = diagnose_together([*dates, of_block(9.0)], table, "all")
+    report = block_apart
     assert report["campaigns"] == ["may", "september", "block"]
     assert scopes(report) == {"modulus_error": {"campaigns": ["may", "september"]}}
     (factor,) = report["mechanisms"][0]["parameters"]
     assert factor["low"] < 9 / 16 < factor["high"]
     assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
     assert report["contradictions"] == []
+    dates = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
     other = replace(of_block(9.0), skin=replace(of_block(9.0).skin, youngs_modulus_mpa=9.0))
     with pytest.raises(InvalidInput, match=r"block: skin\.youngs_modulus_mpa"):
         diagnose_together([*dates, other], table, "all")
@@ -205,13 +218,12 @@ def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_wi
     assert said.startswith("In may: The FRFs and the block contradict each other")
 
 
-def test_a_block_that_was_joined_to_both_dates_counts_once(table: SigmaTable) -> None:
+def test_a_block_that_was_joined_to_both_dates_counts_once(block_apart: dict[str, Any], table: SigmaTable) -> None:
     apart = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
     both = [replace(one, recordings=(*one.recordings, *of_block(9.0).recordings)) for one in apart]
     report = diagnose_together(both, table, "both")
-    once = diagnose_together([*apart, of_block(9.0)], table, "apart")
-    assert report["by_kind"] == once["by_kind"]
-    assert report["mechanisms"] == once["mechanisms"]
+    assert report["by_kind"] == block_apart["by_kind"]
+    assert report["mechanisms"] == block_apart["mechanisms"]
 
 
 def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ def together(table: SigmaTable) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def fleet(table: SigmaTable) -> dict[str, Any]:
-    skins = {f"skin-{n}": [made(f"c{n}", 15.0 + 0.2 * n, n, table)] for n in range(5)}
+    skins = {f"skin-{n}": [made(f"c{n}", 15.0 + 0.2 * n, n, table)] for n in range(3)}
     return diagnose_fleet({**skins, "<i>weak": [made("c9", 9.0, 9, table)]}, table, "batch")
 
 
@@ -58,9 +58,9 @@ def test_each_skin_stands_on_the_band_of_its_population(fleet: dict[str, Any]) -
     usual, departing = figure.data[:2]
     assert list(departing.y) == ["&lt;i&gt;weak"]
     assert departing.x[0] < band.x0
-    assert len(usual.x) == 5
+    assert len(usual.x) == 3
     told = columns("population", fleet, {})
-    assert told["skin"][:6] == [entry["skin"] for entry in d33["skins"]]
+    assert told["skin"][:4] == [entry["skin"] for entry in d33["skins"]]
     shown = page(fleet)
     assert 'id="figure-population"' in shown
     assert "<i>weak" not in shown

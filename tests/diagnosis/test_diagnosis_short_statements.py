@@ -14,6 +14,7 @@ from rig.draw import drawn, record
 from rig.drawn_campaign import documents_and_truth
 from rig.joint import drawn_joint
 from rig.recorded import campaign as rig_campaign
+from tests.support.cases import first
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.sentences import clause, of_clauses, small
@@ -24,7 +25,13 @@ from underskin.recordings.campaign import Campaign, from_dict, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 SEED = 940501
-ROUNDS = {"lines": 4, "curves": 3, "several": 2} if SOAK else {"lines": 2, "curves": 2, "several": 1}
+ROUNDS = {"curves": 3, "several": 2} if SOAK else {"curves": 2, "several": 1}
+
+# Those that make the longest statements, one of each kind, stand first.
+TELLING = [
+    "charge peak-to-peak", "sensor at a tenth", "cables exchanged", "dead sensor", "warm-up, rising",
+    "polarity at random", "force rms", "a third conjugated",
+]  # fmt: skip
 
 Report = dict[str, Any]
 Making = Callable[[SigmaTable], Iterator[Report]]
@@ -36,20 +43,21 @@ def sentences(statement: str) -> list[str]:
 
 
 def of_lines(table: SigmaTable) -> Iterator[Report]:
-    for number in range(ROUNDS["lines"]):
+    for number in first(1, [2, 0, 1, 3]):
         for hidden in ("none", "single", "pair", "unknown"):
             yield diagnosis_report(parse(rig_campaign(record(drawn(SEED, number, hidden)))), table)
 
 
 def with_slips(table: SigmaTable) -> Iterator[Report]:
-    recorded = record(drawn(SEED, 1, "single"))
-    made, _ = from_dict(rig_campaign(recorded))
-    case = Case(made, recorded, np.full(len(recorded.exact), 0.02))
-    for slip, (make, _) in SLIPS.items():
-        wrong = make(case, np.random.default_rng(3))
-        if wrong is not None:
-            report = diagnosis_report(wrong.campaign, table)
-            yield {**report, "campaign": slip}
+    for number in first(1, [2, 1]):
+        recorded = record(drawn(SEED, number, "single"))
+        made, _ = from_dict(rig_campaign(recorded))
+        case = Case(made, recorded, np.full(len(recorded.exact), 0.02))
+        for slip in first(len(TELLING), [*TELLING, *sorted(SLIPS.keys() - TELLING)]):
+            wrong = SLIPS[slip][0](case, np.random.default_rng(3))
+            if wrong is not None:
+                report = diagnosis_report(wrong.campaign, table)
+                yield {**report, "campaign": slip}
 
 
 def of_curves(table: SigmaTable) -> Iterator[Report]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from tests.support.cases import first
 from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.several.likelihoods import mixed, of_mean, of_posterior, posterior
 from underskin.diagnosis.several.population import REGULAR, Make, Populations, Spread, State, populations
@@ -43,7 +44,7 @@ def drawn(random: np.random.Generator, skins: int, departs: float) -> tuple[Floa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("skins", [3, 6])
+@pytest.mark.parametrize("skins", first(1, [3, 6]))
 def test_intervals_hold_the_true_values_and_departures_are_told(skins: int) -> None:
     """Of 150 populations, half with a skin that departs: 95 % intervals, four of five departing skins, few others."""
     random = np.random.default_rng(3)
