@@ -12,9 +12,9 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium
 PEERS = tesseract nanite
 GENERATOR = openapi-client
 
-# Two processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of them,
-# since they share servers.
-PYTEST = $(PYTHON) -m pytest --numprocesses 4 --dist loadfile
+# Four processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of
+# them, since they share servers.
+PYTEST = $(PYTHON) -m pytest --numprocesses 6 --dist loadfile
 
 # Modules stay compiled: servers, workers and commands start some hundred times in the tests.
 unexport PYTHONDONTWRITEBYTECODE
