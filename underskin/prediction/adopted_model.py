@@ -32,8 +32,8 @@ from underskin.units import Complexes, Indices, Mask, to_si
 
 _DECLARED = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 NOT_ADOPTED = {
-    "ambiguous": "several explanations remain, and only one can serve. Record what it says to "
-    "measure next, send it together with these recordings, and diagnose that",
+    "ambiguous": "several explanations remain, and only one can serve. Make the recordings that it plans, or where it "
+    "plans none, vary what these held fixed; send them together with these, and diagnose that",
     "unexplained": "none of the known mechanisms describes what is missing, and no law over one axis that holds for "
     "other recordings stands for it. Look at the rig where the report says that the misfit lies, and record it again",
     "no_mismatch": "nothing is missing, so that there is nothing to adopt; the paper's model serves",

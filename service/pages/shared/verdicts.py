@@ -45,6 +45,7 @@ class VerdictSummary:
     name: str | None  # of one of several campaigns
     modulus: str | None = None  # of curves, under an answer that is settled
     outdated: bool = False  # not of its campaigns as they are now
+    not_quoted: str | None = None  # why its d33 may not be quoted, where there is one that may not
 
 
 def of_rows(connection: Connection, rows: Sequence[AnyRow], adopted: Sequence[str] = ()) -> dict[str, VerdictSummary]:
@@ -74,7 +75,10 @@ def _verdict(row: AnyRow, report: Mapping[str, Any], adopted: bool) -> VerdictSu
     sure = report["verdict"] == "no_mismatch" and probability >= EXPLAINED
     mood: Literal["good", "look"] = "good" if sure or adopted else "look"
     tag = f"{tag}, adopted" if adopted else tag
-    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report), outdated)
+    d33 = report["d33"]
+    unsettled = d33 is not None and "low" in d33 and not d33.get("quotable", True)
+    not_quoted = _quoted(report) if unsettled else None
+    return VerdictSummary(row.id, tag, mood, _beside(report), at, row.name, _modulus(report), outdated, not_quoted)
 
 
 def _modulus(report: Mapping[str, Any]) -> str | None:

@@ -65,6 +65,8 @@ def test_an_adopted_model_heads_its_skin_and_the_start(reader: Visit, idle: Serv
         assert f"below go by {'it' if shown == 'adopted' else 'the paper'}" in head
         assert f"by the {shown}" in page.locator("#figure-map figcaption").inner_text()
         reader.require_accessible()
+    reader.go(f"/campaigns/{campaign_id}")
+    assert "By the paper's model. Not to be quoted yet, by the latest diagnosis: " in page.locator("main").inner_text()
     reader.go("/skins/palm-a?sensor=s2")
     page.get_by_label("Colour by").select_option("uncertainty")
     page.wait_for_url("**show=uncertainty*")

@@ -159,7 +159,7 @@ def test_histories_say_which_model_each_value_used(server: Server, client: Clien
     ("verdict", "what_to_do"),
     [
         ("no_mismatch", "nothing to adopt; the paper's model serves"),
-        ("ambiguous", r"several explanations remain.*measure next"),
+        ("ambiguous", r"several explanations remain.*recordings that it plans"),
         ("unexplained", "Look at the rig"),
         ("insufficient_data", r"too little was recorded.*measure next"),
     ],
