@@ -40,6 +40,7 @@ class IngestOptions:
     most_json_bytes: int
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
+    by_kept_rig: bool = True  # whether the rig description kept with the skin counts where none is sent
 
     def __post_init__(self) -> None:
         """Raises InvalidInput."""
@@ -97,6 +98,8 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
                 raise error.at(f"{label}{error.field}") from None
+    if not options.by_kept_rig:
+        return None
     with store.reading() as connection:
         names = [options.skin] if options.skin is not None else []
         if options.corrects is not None:

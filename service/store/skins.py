@@ -4,7 +4,7 @@ import secrets
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, ScalarSelect, Select, func, insert, or_, select, update
+from sqlalchemy import ColumnElement, Connection, ScalarSelect, Select, func, insert, literal, or_, select, update
 
 from service.store import changes
 from service.store.engine import upsert
@@ -123,6 +123,25 @@ def keep_rig(connection: Connection, skin_id: str, document: str) -> None:
     if rig_of(connection, skin_id) != document:
         row = {"skin_id": skin_id, "document": document, "created_at": now()}
         connection.execute(insert(rigs), row)
+
+
+def rig_origin(connection: Connection, skin_id: str) -> AnyRow | None:
+    """Of the rig description that `rig_of` gives, when it was kept (`created_at`), and the `file` of the campaign that
+    it came with; None where there is none."""
+    counted = members(root_of(skin_id))
+    row = connection.execute(
+        select(rigs.c.created_at).where(rigs.c.skin_id.in_(counted)).order_by(rigs.c.number.desc()).limit(1)
+    ).first()
+    if row is None:
+        return None
+    came_with = (
+        select(campaigns.c.source)
+        .where(campaigns.c.skin_id.in_(counted), campaigns.c.received_at <= row.created_at)
+        .order_by(campaigns.c.received_at.desc())
+        .limit(1)
+        .scalar_subquery()
+    )
+    return connection.execute(select(literal(row.created_at).label("created_at"), came_with.label("file"))).first()
 
 
 def rig_of(connection: Connection, skin_id: str) -> str | None:

@@ -15,7 +15,7 @@ from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_inversion, of_moduli
 from underskin import InvalidInput
-from underskin.recordings.campaign import Campaign
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ logger = logging.getLogger("underskin")
 
 BandHz = tuple[float, float]
 
+_MOST_NAMED = 3  # reasons for which recordings give no d33
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
 _NONE: dict[str, Any] = {
     **dict.fromkeys(("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")),
@@ -101,10 +102,34 @@ def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
-    """The findings of a campaign that is not kept yet."""
+    """The findings of a campaign that is not kept yet, after what will give no d33 of its FRFs, and why."""
     document = {"campaign_id": campaign.name, "table_sha256": table.sha256, **_PAPER}
-    findings: list[str] = _computed(document, campaign, table, None, [])[0]["findings"]
-    return findings
+    told = _computed(document, campaign, table, None, [])[0]
+    findings: list[str] = told["findings"]
+    return [*_without_d33(campaign, told, table), *findings]
+
+
+def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) -> list[str]:
+    """In a sentence, that a campaign with FRFs will give no d33, or which of it will not; and what L is."""
+    frfs = sum(isinstance(one, FrfRecording) for one in campaign.recordings)
+    left = [entry["reason"] for entry in told["left_out"] if entry["recording"] is None]
+    if not frfs or (told["status"] == "ok" and not left):
+        return []
+    if told["status"] == "ok":
+        more = f"; and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
+        said = f"these will give no d33: {'; '.join(left[:_MOST_NAMED])}{more}."
+    else:
+        said = f"no d33 will come of this: {told['reason']}."
+    if "L = " not in said:
+        return [said]
+    most = float(table.domain["load_parameter"][1])
+    depth = 100 * (9 / 16 * most) ** (2 / 3)  # % of the radius, by Hertz on an incompressible half space
+    meaning = (
+        "L = F/(R²E) measures the strain under the sphere: how deep it goes in for its radius R. The table ends at "
+        f"L = {most:g}, about {depth:.0f} % of R deep in a thick layer; a larger sphere or a smaller preload stays "
+        "within it."
+    )
+    return [said, meaning]
 
 
 def complete(store: Database, table: SigmaTable, root: str) -> None:

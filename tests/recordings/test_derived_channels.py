@@ -31,7 +31,7 @@ def test_depth_and_force_are_derived_from_height_and_deflection() -> None:
     assert reading.warnings == [
         "channel 'depth' is derived: -'Height (nm)' - 'Deflection (nm)'",
         "channel 'load' is derived: k * 'Deflection (nm)'",
-        "the force is 0 on average over the first 10 % of each curve: it was tared so",
+        "the force is 0 on average over the first 10 % of all samples of each curve: it was tared so",
     ]
     assert "its mean over the first 10 %" in reading.taken["force_n"]
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from underskin.errors import FileError, Mention, Requirement
+from underskin.recordings import tare
 from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, SignalMapping
 from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
@@ -15,7 +16,7 @@ from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
 from underskin.recordings.shown_values import shown
 from underskin.recordings.stated_values import Stated, factor, spring_constant
-from underskin.units import LAB, Floats
+from underskin.units import LAB, Floats, readable_unit
 
 _DEGREES = {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": math.degrees(1), "radians": math.degrees(1)}
 _PERCENT = 100.0
@@ -131,10 +132,21 @@ class MappedBlock:
         percent = self.rig.channels[field].tare_percent if field in self.rig.channels else None
         if percent is None:
             return column
-        zero = float(column[: max(1, round(percent / _PERCENT * len(column)))].mean())
-        self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over the first {percent:g} %"
+        tared = column[: max(1, round(percent / _PERCENT * len(column)))]
+        zero = float(tared.mean())
+        part = f"the first {percent:g} % of all samples"
+        self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over {part}"
         words = field.rpartition("_")[0]
-        self.warnings.append(f"the {words} is 0 on average over the first {percent:g} % of each curve: it was tared so")
+        self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
+        rise = tare.rise(column, len(tared)) if field == "force_n" and self.rig.kind != "frf" else None
+        if rise is not None:
+            shown_in, count = readable_unit(field, abs(rise.height))
+            self.warnings.append(
+                f"{part} of {self.block.name or 'the curve'} are not in the air alone: from about "
+                f"{_PERCENT * rise.start / len(column):.2g} % of all samples, loading and way back together, the force "
+                f"leaves its level by {rise.height * count:.3g} {shown_in}; tare over fewer: the zero is off by about "
+                f"{abs(zero - rise.level) * count:.2g} {shown_in}"
+            )
         return column - zero
 
     def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:

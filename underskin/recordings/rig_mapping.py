@@ -57,6 +57,15 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     return MappedFile({**document, "units_checked": rig.units_checked}, list(dict.fromkeys(warnings)), taken)
 
 
+def has_channels(rig: RigDescription, contents: Contents) -> bool:
+    """Whether a part of a file holds every channel that the rig names, or can derive."""
+    try:
+        derived = derived_channels.with_derived(contents, rig.derived, lambda one: _stated(contents, one, one.name), "")
+        return bool(_with_channels(rig, derived, ""))
+    except FileError:
+        return False
+
+
 def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[Block]:
     """The blocks that hold every channel that the rig names."""
     names = _channel_names(rig)

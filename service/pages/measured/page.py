@@ -20,7 +20,7 @@ from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Database
 from service.usecases.pressed_skin import d33
-from underskin.errors import InvalidInput, UnderskinError, too_few, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, conflicting, required, wrong_type
 from underskin.prediction.domain_checks import RowConditions, beyond
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -28,6 +28,7 @@ router = APIRouter(prefix="/d33")
 
 FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
+_WITHOUT_UNCERTAINTY = 3  # numbers of a row
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
 _ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n")
 _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
@@ -100,8 +101,12 @@ def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | No
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:
     """The request of `POST /v1/d33`; raises InvalidInput."""
     parts = [_row(place, line) for place, line in enumerate(rows.splitlines(), 1) if line.strip()]
+    if not parts:
+        raise required("measurements", "fill in at least one row: R F FRF, in mm, N and pC/N")
     if len({len(part) for part in parts}) != 1:
-        raise too_few("measurements", len(parts), "must be one or more, all with an uncertainty or none")
+        bare = [str(number) for number, part in enumerate(parts, 1) if len(part) == _WITHOUT_UNCERTAINTY]
+        must = f"give an uncertainty (the fourth number) in every row or in none: row {', '.join(bare[:5])} has none"
+        raise conflicting("measurements", None, must)
     document: dict[str, Any] = {name: number(name, values[name]) for name, *_ in FIELDS}
     document |= dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
     return {**document, UNITS: True} if UNITS in given else document
@@ -109,7 +114,7 @@ def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) ->
 
 def _row(place: int, line: str) -> list[float]:
     parts = numbers(f"row {place}", line)
-    if len(parts) not in (3, 4):
+    if len(parts) not in (_WITHOUT_UNCERTAINTY, len(_ORDER)):
         raise wrong_type(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
     return parts
 

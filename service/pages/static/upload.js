@@ -65,6 +65,18 @@ if (kind) {
   fit();
 }
 
+// Of a value that is typed or stated by the file, what was done last counts.
+for (const entry of document.querySelectorAll(".either")) {
+  const [typed, from] = [entry.querySelector("input"), entry.querySelector("select[name$='-from']")];
+  if (!typed || !from) continue;
+  typed.addEventListener("input", () => {
+    if (typed.value !== "") from.value = "";
+  });
+  from.addEventListener("change", () => {
+    if (from.value !== "") typed.value = "";
+  });
+}
+
 // Dragging across the figure of the samples fills in which ones are used.
 addEventListener("drawn", ({ target: plot }) => {
   if (plot.closest("figure")?.id !== "figure-course") return;

@@ -93,6 +93,12 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
     )
 
 
+def may_state(files: Sequence[FileSummary], name: str) -> bool:
+    """Whether one of the files has a property of this name, as far as their summaries tell: one that was read by its
+    mapping has what that needs, and of many properties not all are listed."""
+    return any(one.recordings or name in one.properties or len(one.properties) >= _MOST_PROPERTIES for one in files)
+
+
 def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
     """The recordings of a page of the list, from the one of that number on."""
     campaigns = [one.campaign for one in map(checked, look.campaigns) if one.campaign is not None]

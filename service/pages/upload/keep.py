@@ -15,13 +15,12 @@ from service.ingest import repeats
 from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
 from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
-from service.pages.upload.pending_uploads import PendingUpload
+from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.problems import Refusal
-from service.store import Conflict, Database, Missing, campaigns
+from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings import curve_signs
-from underskin.recordings.rig_description import RigDescription
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -48,6 +47,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 most,
                 pending.estimator,
                 turn_curves=pending.turned,
+                by_kept_rig=False,  # what the page showed is kept, and no more
             )
             answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
@@ -88,18 +88,20 @@ def skin_of(store: Database, corrects: str | None) -> str | None:
     return str(store.read(campaigns.find, corrects).skin_id)
 
 
-def rig_in_use(
-    store: Database, sent: Upload | None, skin: str | None
-) -> tuple[RigDescription | None, list[dict[str, Any]]]:
-    """The rig description that was sent, or that is kept with the skin; and what is wrong with the one sent."""
+def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> None:
+    """Read the upload by the rig description that was sent, or that is kept with its skin; what is wrong with the one
+    sent is said."""
     if sent is not None:
         try:
-            return sent_rig(sent), []
+            pending.rig, pending.rig_label = sent_rig(sent), sent.label
         except (FileError, InvalidInput) as error:
-            return None, field_errors(error)
-    if skin is None:
-        return None, []
-    return store.read(kept_rig, skin), []
+            pending.refused = field_errors(error)
+    elif pending.skin is not None:
+        pending.rig = store.read(kept_rig, pending.skin)
+        origin = store.read(skins.rig_origin, pending.skin)
+        if pending.rig is not None and origin is not None:
+            name = pending.rig.document.get("name")
+            pending.remembered = Remembered(name, origin.created_at, skin=pending.skin, file=origin.file)
 
 
 def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, corrects: str | None) -> list[str]:

@@ -15,7 +15,7 @@ from service.pages.upload.mapping import CHOICES, mapped_file
 from service.pages.upload.pending_uploads import PendingUpload
 from service.pages.upload.turned_curves import with_curves_turned
 from service.store import Missing
-from underskin.recordings.rig_mapping import MappedFile
+from underskin.recordings.rig_mapping import MappedFile, has_channels
 
 _WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
 
@@ -32,13 +32,25 @@ def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFi
 
 
 def look_at_all(request: Request, pending: PendingUpload) -> None:
-    """Read every file; the figures of the first one are drawn with it."""
+    """Read every file; the figures of the first one are drawn with it. What was said of earlier files is forgotten
+    where none of these has its channels."""
+    if not _look_at_all(request, pending) and pending.remembered is not None:
+        pending.lacking = pending.remembered
+        pending.start_afresh()
+        _look_at_all(request, pending)
+
+
+def _look_at_all(request: Request, pending: PendingUpload) -> bool:
+    """The same; whether a file has the channels of the rig description, or none has any channels."""
+    fits: list[bool] = []
     summaries: list[FileSummary] = []
     drawn: list[Drawn] = []
     recordings = 0
     pending.negative = False
     for number, upload in enumerate(pending.files):
         inspected = looked(request, pending, number)
+        if inspected.contents is not None and pending.rig is not None:
+            fits.append(has_channels(pending.rig, inspected.contents))
         recordings += sum(one.recordings for one in inspected.campaigns)
         require_few(len(summaries) + len(inspected.campaigns), recordings)
         pending.negative |= counts_pressing_negative(inspected)
@@ -48,6 +60,7 @@ def look_at_all(request: Request, pending: PendingUpload) -> None:
         if number == 0:
             drawn = _figures(pending, 0, inspected, summary)
     pending.seen, pending.drawn = summaries, {0: drawn}
+    return any(fits) or not fits
 
 
 def draw(request: Request, pending: PendingUpload, number: int) -> None:

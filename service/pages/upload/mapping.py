@@ -84,6 +84,9 @@ _BY_WORD = {
     "coherence": "coherence",
     "frequency": "frequency_hz",
     "phase": PHASE,
+    "displacement": "displacement_mm",
+    "depth": "displacement_mm",
+    "time": "time_s",
 }
 _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
 
@@ -95,8 +98,24 @@ def field_words(field: str) -> str:
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 
+def what_came(error: Mapping[str, Any]) -> Any:
+    """The value that was refused; None where the form has none, as for a channel that its kind of recording lacks."""
+    return None if _is_of_other_kind(error) else error["value"]
+
+
+def _is_of_other_kind(error: Mapping[str, Any]) -> bool:
+    """Whether a channel was refused since recordings of the chosen kind have none."""
+    place, _, field = str(error["field"]).partition(".")
+    return error["code"] == ErrorCode.NOT_ONE_OF and place == "channels" and field in CHOICES
+
+
 def what_to_do(error: Mapping[str, Any]) -> str:
     """What is allowed; for what the form asks, where to say it."""
+    if _is_of_other_kind(error):
+        words = field_words(error["field"])
+        return f"the kind of recording that is chosen has no {words}: choose another kind, or set it to “not used”"
+    if error["code"] == ErrorCode.NOT_ONE_OF and error["field"] == "sensor":
+        return "must be the name of a sensor in the layout: fill in the layout below, a line for each sensor"
     if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
         return worded(error["allowed"], field_words, UNLIKELY)
     if error["field"] == _RATE:
@@ -145,10 +164,11 @@ def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
     """The kind of recording, and of each channel the field that it may be; empty where nothing speaks for one."""
     dimensions = [known.dimension if (known := unit(one.unit)) else "" for one in channels]
     kind = "frf"
-    if "length" in dimensions and "charge" not in dimensions:
+    charged = "charge" in dimensions or any("charge" in one.name.lower() for one in channels)
+    if "length" in dimensions and not charged:
         named = any(words in one.name.lower() for one in channels for words in _OF_COMPRESSION)
         kind = "compression" if named else "indentation"
-    elif "charge" not in dimensions and any(word in one.name.lower() for one in channels for word in _OF_SPRINGS):
+    elif not charged and any(word in one.name.lower() for one in channels for word in _OF_SPRINGS):
         kind = "indentation"
     phases = any("phase" in one.name.lower() for one in channels)
     fields = []
@@ -191,7 +211,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
         channels, {**form, **travel}, _said(form, spring_mapping.SPRING), base.get("channels", {})
     )
     channels = workbench.with_derived(channels, form, CHANNELS, base)
-    document["channels"] = workbench.with_tare(channels, form, base.get("channels", {}))
+    document["channels"] = workbench.with_tare(channels, form, base)
     rest = {
         "name": form.get("name", base.get("name", "")).strip() or None,
         "derived": workbench.formulas(form, CHANNELS, base),
@@ -218,10 +238,10 @@ def _replaced(base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, A
 
 
 def _said(form: Mapping[str, str], name: str) -> Any:
-    """A value, or the property of the file that holds it."""
-    if form.get(f"{name}-from"):
-        return {"property": form[f"{name}-from"]}
+    """A value that was typed, or else the property of the file that holds it."""
     text = form.get(name, "").strip()
+    if not text and form.get(f"{name}-from"):
+        return {"property": form[f"{name}-from"]}
     return (text or None) if name in _TEXTS else number_or_text(text)
 
 

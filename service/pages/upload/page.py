@@ -17,11 +17,11 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import exported_skin, similar_errors, spring_mapping, templates, workbench
+from service.pages.upload import exported_skin, file_summary, similar_errors, spring_mapping, templates, workbench
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, listed
-from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, rig_in_use, skin_of
+from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
 from service.pages.upload.looking import channels_of, draw, is_unsaid, look_at_all, looked, used_twice
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Database, Missing, campaigns, skins
@@ -95,11 +95,9 @@ async def send(request: Request, store: Store) -> Response:
         said = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, said) if said else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
-        rig_and_errors = await run_in_threadpool(rig_in_use, store, rig, skin)
         pending = pending_uploads.put(cookie, given)
-    pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
-    pending.rig, pending.refused = rig_and_errors
-    pending.rig_label = None if rig is None or pending.rig is None else rig.label
+        pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
+        await run_in_threadpool(take_rig, store, pending, rig)
     try:
         if await run_in_threadpool(exported_skin.holds_skin, pending):
             async with skin_imports.one:
@@ -158,6 +156,7 @@ def understood(
         document=document,
         layout=mappings.sensors_text(document),
         mapping=mappings,
+        is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         spring=spring_mapping,
         workbench=workbench,
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
@@ -187,6 +186,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     pending.refused = [entry for error in wrong for entry in field_errors(error)]
     if not wrong:
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
+        pending.remembered = pending.lacking = None
         pending.turned &= not pending.is_depth_composed
         async with READING_SLOTS:
             await run_in_threadpool(look_at_all, request, pending)
@@ -197,6 +197,15 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
     """Reads the files as those of the same instrument were read before."""
     await run_in_threadpool(use_template_of, store, pending)
+    async with READING_SLOTS:
+        await run_in_threadpool(look_at_all, request, pending)
+    return see(f"/upload/{pending.id}")
+
+
+@router.post("/{upload_id}/afresh", dependencies=[*WRITE, OWN_FORM])
+async def start_afresh(request: Request, pending: Pending) -> Response:
+    """Reads the files without what was said of earlier ones."""
+    pending.start_afresh()
     async with READING_SLOTS:
         await run_in_threadpool(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")

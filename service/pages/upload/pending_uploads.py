@@ -28,6 +28,18 @@ _MOST_OF_SESSION = 5
 _MOST_DRAWN = 6  # files whose figures are kept
 
 
+@dataclass(frozen=True)
+class Remembered:
+    """Where a rig description comes from that was said of earlier files: the instrument's name, when it was kept and by
+    whom, the skin that it is kept with, and the file that it came with; None where that is not known."""
+
+    instrument: str | None
+    kept_at: str
+    kept_from: str | None = None
+    skin: str | None = None
+    file: str | None = None
+
+
 @dataclass
 class PendingUpload:
     """One upload, and what was understood of it so far."""
@@ -41,6 +53,8 @@ class PendingUpload:
     skin: str | None = None
     rig: RigDescription | None = None
     rig_label: str | None = None  # the file that a request would send it as; None where none need be sent
+    remembered: Remembered | None = None  # where `rig` comes from, unless it was sent or said in the form
+    lacking: Remembered | None = None  # what was remembered for the skin, and needs channels that these files lack
     draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
     refused: list[dict[str, Any]] = field(
         default_factory=list
@@ -64,6 +78,11 @@ class PendingUpload:
             return False
         formula = self.rig.derived.get(mapping.channel)
         return mapping.deflection is not None or (formula is not None and formula.is_sum)
+
+    def start_afresh(self) -> None:
+        """Forget what was said of channels, here or of earlier files."""
+        self.rig = self.rig_label = self.draft = self.remembered = None
+        self.turned, self.refused = False, []
 
     def draw(self, number: int, figures: list[Drawn]) -> None:
         """Keep the figures of a file."""

@@ -10,7 +10,7 @@ from service.ingest.instruments import template_of, with_skin
 from service.pages.upload import workbench
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import SKIN
-from service.pages.upload.pending_uploads import PendingUpload
+from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.store import AnyRow, Database, Missing, instrument_templates
 from underskin.recordings import rig_description
 
@@ -63,6 +63,8 @@ def use(store: Database, pending: PendingUpload, skin: Mapping[str, Any]) -> Non
     document = with_skin(row.document, {"poisson_ratio": 0.5, **known})
     pending.rig, pending.draft, pending.refused = rig_description.from_dict(document), None, []
     pending.rig_label = "rig.json"  # as the page saves it
+    pending.remembered = Remembered(document.get("name"), row.kept_at, row.kept_from)
+    pending.lacking = None
     pending.turned &= not pending.is_depth_composed
 
 

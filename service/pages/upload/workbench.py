@@ -97,12 +97,18 @@ def derived_fields(form: Mapping[str, str]) -> set[str]:
 
 
 def with_tare(channels: Mapping[str, Any], form: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, Any]:
-    """The channels with the part of the curve over which each is 0; as in `base` where the form does not say."""
+    """The channels with the part of the curve over which each is 0; as in the rig description `base` where the form
+    does not say. What was said of curves is not carried over to FRFs, of which it would take the preload, nor back.
+    """
+    before = base.get("channels", {})
+    other_kind = "kind" in base and (base["kind"] == "frf") != (form.get("kind", "frf") == "frf")
     result = {}
     for field, how in channels.items():
         others = {name: value for name, value in how.items() if name != _TARE}
         typed = form.get(f"tare-{field}", "").strip().removesuffix("%")
-        said = number_or_text(typed) if f"tare-{field}" in form else base.get(field, {}).get(_TARE)
+        known = before.get(field, {}).get(_TARE)
+        said = number_or_text(typed) if f"tare-{field}" in form else known
+        said = None if other_kind and said == known else said
         result[field] = others if said is None else {**others, _TARE: said}
     return result
 

@@ -31,7 +31,7 @@ def test_d33_from_a_few_numbers(visitor: Visit, server: Server) -> None:
     assert [float(row["d33_pc_per_n"]) for row in rows] == pytest.approx([14, 22], rel=1e-12)
     page.get_by_label("Measurements, one a line").fill("4 1 7 0.1\n4 2 7")
     page.get_by_role("button", name="Compute").click()
-    assert "all with an uncertainty or none" in page.get_by_role("alert").inner_text()
+    assert "in every row or in none: row 2 has none" in page.get_by_role("alert").inner_text()
     assert page.get_by_label("Measurements, one a line").input_value() == "4 1 7 0.1\n4 2 7"
 
 
@@ -41,7 +41,7 @@ SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16, "sensor_radius_mm": 1.5, 
 @pytest.mark.parametrize(
     ("query", "told"),
     [
-        ({"rows": ""}, "must be one or more"),
+        ({"rows": ""}, "fill in at least one row"),
         ({"rows": "4 1"}, "must be R F FRF"),
         ({"rows": "4,1 7.06 0.1"}, "not both"),
         ({"rows": "4,1,7"}, "with spaces between them"),

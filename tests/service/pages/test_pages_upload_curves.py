@@ -183,4 +183,4 @@ def test_a_workbook_has_no_separators(client: httpx.Client) -> None:
 def test_a_tare_is_told_in_words(client: httpx.Client) -> None:
     upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
     upload.say(indenter_radius_mm="0.0075", units_checked="yes", **{"tare-force_n": "10"})
-    assert "<li>the force is 0 on average over the first 10 % of each curve" in upload.page
+    assert "<li>the force is 0 on average over the first 10 % of all samples of each curve" in upload.page

@@ -46,7 +46,7 @@ def test_alike_recordings_of_a_file_are_told_once(visitor: Visit) -> None:
             recording["indenter_radius_mm"] = -float(number)
     document["recordings"][0]["sensor"] = "nowhere"
     look_at(visitor, [file("half.json", as_json(document))])
-    section = visitor.page.locator("section.findings")
+    section = visitor.page.locator("section.findings", has_text="Refused recordings")
     assert "Refused recordings: 13" in section.inner_text()
     headings = section.get_by_role("heading", level=3).all_inner_texts()
     assert headings == ["s0-1N", "12 alike, the first s0-2N"]

@@ -1,6 +1,7 @@
 """Derived channels, zero and trim as a form has them, and what of a rig description is an instrument's."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ import pytest
 
 from service.ingest.instruments import recognised, template_of, with_skin
 from service.pages.upload import page, templates
-from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.file_summary import FileSummary, may_state
 from service.pages.upload.mapping import document_of
 from service.pages.upload.pending_uploads import PendingUpload
 from service.pages.upload.workbench import rows
@@ -91,7 +92,7 @@ def test_two_derived_channels_of_one_name_or_for_one_field_are_refused_and_kept(
 def test_a_template_turns_no_depth_that_is_composed() -> None:
     rig = rig_description.from_dict(rig_of_raw_curve())
     store = create_autospec(Database)
-    store.read.return_value = SimpleNamespace(document=template_of(rig))
+    store.read.return_value = SimpleNamespace(document=template_of(rig), kept_at="2026-11-01", kept_from=None)
     file = FileSummary("a.txt", "CSV", 0, (), (), (), (), (), None, instrument="of a microscope")
     pending = PendingUpload("id", "session", Path(), (), 0, 0.0, seen=[file], turned=True)
     templates.use(store, pending, {})
@@ -127,3 +128,26 @@ def test_an_instrument_is_recognised_by_format_and_headings() -> None:
     ]
     assert one not in others
     assert recognised("CSV", Contents(())) is None
+
+
+def test_a_zero_of_curves_is_not_carried_over_to_frfs() -> None:
+    base = rig_of_raw_curve()
+    form = form_of(base)
+    assert document_of(form, base)[0]["channels"]["force_n"]["tare_percent"] == 10
+    assert "tare_percent" not in document_of(form | {"kind": "frf"}, base)[0]["channels"]["force_n"]
+    assert document_of(form | {"kind": "frf", "tare-force_n": "5"}, base)[0]["channels"]["force_n"]["tare_percent"] == 5
+
+
+def test_a_typed_value_counts_for_more_than_a_property_that_is_still_chosen() -> None:
+    form = {"kind": "indentation", "indenter_radius_mm": "2", "indenter_radius_mm-from": "Tip radius [mm]"}
+    assert document_of(form, {})[0]["recording"]["indenter_radius_mm"] == 2
+    assert document_of(form | {"indenter_radius_mm": " "}, {})[0]["recording"]["indenter_radius_mm"] == {
+        "property": "Tip radius [mm]"
+    }
+
+
+def test_a_property_that_no_file_has_is_not_offered() -> None:
+    lacking = FileSummary("a.txt", "text", 0, [], [], [], [], [], None)
+    assert not may_state([lacking], "Tip radius [mm]")
+    assert may_state([lacking, replace(lacking, properties={"Tip radius [mm]": 2.0})], "Tip radius [mm]")
+    assert may_state([replace(lacking, recordings=1)], "Tip radius [mm]")
