@@ -31,7 +31,8 @@ _OTHER_AXES = {  # those that no unnamed law follows
 @dataclass(frozen=True)
 class CatalogueEntry:
     """A mechanism: `twins` act alike on the reference recordings, the most alike first, or else `nearest` comes
-    closest; `lacking`: why there is no picture of it; `file` is the document of one of the lab's own."""
+    closest; `found`: the diagnoses that name it as the answer, `possible`: how many more name it among several that
+    remain; `lacking`: why there is no picture of it; `file` is the document of one of the lab's own."""
 
     entry: MechanismEntry
     needs: str
@@ -40,6 +41,7 @@ class CatalogueEntry:
     twins: Sequence[Twin]
     nearest: Twin | None
     found: Sequence[FoundIn]
+    possible: int
     lacking: str | None
     file: str | None
 
@@ -101,7 +103,8 @@ def _entry(
         list(by_name.values()),
         [replace(twin, axes=tuple(map(_axis, twin.axes))) for twin in alike if twin.alike >= ALIKE][:_MOST_TWINS],
         alike[0] if alike else None,
-        found,
+        [one for one in found if one.verdict == "explained"],
+        sum(one.verdict == "ambiguous" for one in found),
         lacking(mechanism) if own else None,
         _file(entry) if own else None,
     )

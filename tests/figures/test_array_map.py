@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from underskin.figures.array_map import Quantity, array_map, told_apart
+from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
 from underskin.figures.loads import loaded_array
 from underskin.inversion.beyond_chance import differ_from_others
 from underskin.units import Floats
@@ -106,3 +106,34 @@ def test_the_chosen_sensor_has_a_ring_on_the_ground_that_touches_no_other() -> N
     assert ring.fillcolor is None
     assert (ring.x0 + ring.x1, ring.y0 + ring.y1) == pytest.approx((own.x0 + own.x1, own.y0 + own.y1))
     assert own.x1 < ring.x1 < beside.x0
+
+
+def test_discs_have_the_sensors_size_where_it_can_be_seen() -> None:
+    def widths(radius: float | None, pitch: float) -> set[float]:
+        x, y = (pitch / 4.0 * part for part in (X, Y))
+        figure = array_map(SENSORS, x, y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=radius)
+        return {round(shape.x1 - shape.x0, 6) for shape in figure.layout.shapes}
+
+    assert widths(1.5, 8.0) == {3.0}
+    assert disc_size(X * 2, Y * 2, 1.5) == "Discs have the sensors' size."
+    assert widths(0.1, 40.0) == {33.6}  # too small to be seen
+    assert disc_size(X * 10, Y * 10, 0.1) == "Discs are 168 times as wide as the sensors."
+    assert widths(3.0, 4.0) == {4.0}  # they would overlap
+    assert widths(None, 4.0) == {3.36}
+    assert "not declared" in disc_size(X, Y, None)
+
+
+def test_ids_stand_below_discs_that_have_no_room_for_them() -> None:
+    figure = array_map(SENSORS, 2 * X, 2 * Y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=1.5)
+    (ids,) = [trace for trace in figure.data if trace.mode == "text"]
+    assert list(ids.text) == SENSORS
+    assert list(ids.y) == pytest.approx((2 * Y - 1.5).tolist())
+    assert not figure.layout.showlegend
+
+
+def test_a_map_holds_all_loads() -> None:
+    loads = [(10.0, 8.0), (14.0, 66.0), (-30.0, 2.0)]
+    figure = loaded_array(SENSORS, X, Y, np.linspace(-1, 1, 64), np.full(64, 0.01), loads, 1.0)
+    assert figure.layout.xaxis.range[0] < -30.0
+    assert figure.layout.yaxis.range[1] > 66.0
+    assert figure.layout.xaxis.range[1] > X.max()

@@ -15,6 +15,8 @@ from underskin.inversion.beyond_chance import differ_from_others, differ_from_ze
 from underskin.units import Floats, Mask
 
 _SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
+_SEEN = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
+_WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
 _AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
 _ALONE_MM = 1.0  # radius where there is no other
 _SCALE = "Viridis"  # which has no grey: that means alike here
@@ -54,9 +56,10 @@ def array_map(
     reasons: Sequence[str],
     quantity: Quantity = D33,
     chosen: str | None = None,
+    sensor_radius_mm: float | None = None,
 ) -> go.Figure:
     """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor stands out, empty otherwise,
-    `chosen` is ringed.
+    `chosen` is ringed. Discs have the sensors' radius where it is given and can be seen, as `disc_size` says.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
@@ -69,6 +72,8 @@ def array_map(
         for row, known in enumerate(np.isfinite(value).tolist())
     ]
     plain = np.array([not reason for reason in reasons])
+    radius, apart = _radius(x, y, sensor_radius_mm), _apart(x, y)
+    inside = radius >= _WITH_ROOM * apart
     figure = go.Figure()
     for name, own in (("differs", coloured & plain), ("alike", ~coloured & plain), ("stands out", ~plain)):
         if own.any():
@@ -77,7 +82,7 @@ def array_map(
                 x=x[own],
                 y=y[own],
                 ids=[sensors[row] for row in rows],
-                mode="markers+text" if len(sensors) <= _MOST_WITH_ID else "markers",
+                mode="markers+text" if len(sensors) <= _MOST_WITH_ID and inside else "markers",
                 name=_names(quantity)[name],
                 text=[_id(sensors[row]) for row in rows],
                 textfont={"size": 12 if len(sensors) <= 16 else 9, "color": [_ink(colours[row]) for row in rows]},
@@ -98,7 +103,8 @@ def array_map(
                     "line": {"width": 0},
                 },
             )
-    radius = _radius(x, y)
+    if not inside and len(sensors) <= _MOST_WITH_ID:
+        figure.add_scatter(**_below(sensors, x, y - radius))
     discs = []
     for row, name in enumerate(sensors):
         ring = (
@@ -113,9 +119,10 @@ def array_map(
         discs.append({"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", **disc})
     if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
         discs.append(_ring(x[sensors.index(chosen)], y[sensors.index(chosen)], _AROUND * radius))
-    figure.update_layout(shapes=discs, showlegend=len(figure.data) > 1)
+    figure.update_layout(shapes=discs, showlegend=sum(trace.mode != "text" for trace in figure.data) > 1)
     for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
-        update(range=[float(along.min()) - 1.3 * radius, float(along.max()) + 1.3 * radius])
+        edge = 1.3 * max(radius, _SHARE * apart)
+        update(range=[float(along.min()) - edge, float(along.max()) + edge])
     figure.update_xaxes(title="x [mm]", constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(
         title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
@@ -171,11 +178,45 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
     return "PuOr_r" if quantity.against == "zero" else _SCALE, middle - reach, middle + reach
 
 
-def _radius(x: Floats, y: Floats) -> float:
-    """Of all discs [mm]."""
+def disc_size(x_mm: ArrayLike, y_mm: ArrayLike, sensor_radius_mm: float | None) -> str:
+    """A sentence: of which size the discs of such a map are, beside the sensors themselves."""
+    if sensor_radius_mm is None:
+        return "Discs do not have the sensors' size, which is not declared."
+    drawn = _radius(np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float), sensor_radius_mm)
+    if drawn == sensor_radius_mm:
+        return "Discs have the sensors' size."
+    return f"Discs are {drawn / sensor_radius_mm:.3g} times as wide as the sensors."
+
+
+def _apart(x: Floats, y: Floats) -> float:
+    """The smallest distance of two sensors in different places [mm]; of a single one that at which its disc ends."""
     apart = np.hypot(x[:, None] - x, y[:, None] - y)
     apart = apart[apart > 0]
-    return _SHARE * float(apart.min()) if len(apart) else _ALONE_MM
+    return float(apart.min()) if len(apart) else _ALONE_MM / _SHARE
+
+
+def _radius(x: Floats, y: Floats, sensor_radius_mm: float | None) -> float:
+    """Of all discs [mm]: the sensors', unless it is unknown, too small to be seen, or discs would overlap."""
+    widest = _SHARE * _apart(x, y)
+    side = max(float(np.ptp(x)), float(np.ptp(y)))
+    if sensor_radius_mm is None or sensor_radius_mm < _SEEN * side:
+        return widest
+    alone = side == 0
+    return sensor_radius_mm if alone else min(sensor_radius_mm, widest / _SHARE / 2)
+
+
+def _below(sensors: Sequence[str], x: Floats, y: Floats) -> dict[str, Any]:
+    """Ids below discs that have no room for them."""
+    return {
+        "x": x,
+        "y": y,
+        "mode": "text",
+        "text": list(map(_id, sensors)),
+        "textposition": "bottom center",
+        "textfont": {"size": 11 if len(sensors) <= 16 else 9, "color": INK},
+        "hoverinfo": "skip",
+        "showlegend": False,
+    }
 
 
 def _bar(quantity: Quantity) -> dict[str, Any]:

@@ -31,7 +31,7 @@ def figures(campaign: Campaign, inversion: Inversion) -> tuple[go.Figure, go.Fig
         limits = (float(to_lab("d33_pc_per_n", array.low)), float(to_lab("d33_pc_per_n", array.high)))
     rows = inversion.recordings
     return (
-        array_map(names, x_mm, y_mm, d33, uncertainty, reasons),
+        array_map(names, x_mm, y_mm, d33, uncertainty, reasons, sensor_radius_mm=campaign.skin.sensor_radius_mm),
         frf_versus_preload(
             [f"{name}, sensor {names[sensor]}" for name, sensor in zip(rows.ids, rows.sensor, strict=True)],
             to_lab("indenter_radius_mm", rows.indenter_radius),

@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
+from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS
 from underskin.figures.style import ZONE, label, marked, one_of_many, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
@@ -108,7 +109,7 @@ def _magnitude_axis(traces: Sequence[PlotlyTrace]) -> dict[str, Any]:
     values = _values(traces, "y")
     values = values[values > 0]
     wide = len(values) > 0 and values.max() > _WIDE * np.median(values)
-    return {"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}
+    return {"type": "log", **WHOLE_NUMBERS} if wide else {"rangemode": "tozero"}
 
 
 def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 import numpy as np
 import plotly.graph_objects as go
 
+from underskin.diagnosis.reporting.line_styles import LINE_COLOURS
 from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
@@ -54,8 +55,8 @@ def _one(number: int, entry: SensorPoints) -> go.Scatter:
         error_y={"type": "data", "array": bars, "thickness": 1, "width": 3},
         mode="lines+markers",
         name=label(entry.sensor),
-        line={"color": COLOURS[number % len(COLOURS)], "width": 1.5},
-        marker={"symbol": MARKERS[(number + number // len(COLOURS)) % len(MARKERS)], "size": 8},
+        line={"color": LINE_COLOURS[number % len(LINE_COLOURS)], "width": 1.5},
+        marker={"symbol": MARKERS[(number + number // len(LINE_COLOURS)) % len(MARKERS)], "size": 8},
         hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
         f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(entry.trend)}<extra></extra>",
     )

@@ -12,6 +12,7 @@ from underskin.figures.array_map import Quantity, array_map
 from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats
 
+_ROOM = 0.06  # of the map, between a load and its edge
 _TENSION = 0.01  # of the largest compression, below which it is not told apart by colour
 _CHARGE = Quantity("charge", "pC", "zero")
 
@@ -23,12 +24,16 @@ def loaded_array(
     charge_pc: ArrayLike,
     charge_error_pc: ArrayLike,
     loads_mm: Sequence[tuple[float, float]],
+    sensor_radius_mm: float | None = None,
 ) -> go.Figure:
-    """Each sensor coloured by its charge, with the loads where they have positions.
+    """Each sensor coloured by its charge, in its size where `sensor_radius_mm` tells it, with the loads where they have
+    positions.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
-    figure = array_map(sensors, x_mm, y_mm, charge_pc, charge_error_pc, [""] * len(sensors), _CHARGE)
+    figure = array_map(
+        sensors, x_mm, y_mm, charge_pc, charge_error_pc, [""] * len(sensors), _CHARGE, None, sensor_radius_mm
+    )
     if loads_mm:
         figure.add_scatter(
             x=[x for x, _ in loads_mm],
@@ -39,6 +44,11 @@ def loaded_array(
             hovertemplate="%{text}: x %{x:.4g} mm, y %{y:.4g} mm<extra></extra>",
             marker={"symbol": "x-thin", "size": 14, "line": {"width": 3, "color": "#D55E00"}},
         )
+        for axis, along in ((figure.layout.xaxis, 0), (figure.layout.yaxis, 1)):
+            places = [place[along] for place in loads_mm]
+            low, high = axis.range
+            room = _ROOM * (max(high, *places) - min(low, *places))
+            axis.range = [min(low, min(places) - room), max(high, max(places) + room)]
     return styled(figure, "Charge on the array")
 
 
@@ -81,24 +91,25 @@ def stress_on_base(
     sensors_mm: Sequence[tuple[float, float]],
     sensor_radius_mm: float,
 ) -> go.Figure:
-    """σ_zz on the base under all loads, with the outlines of contacts and sensors.
+    """Compression (−σ_zz) on the base under all loads, with the outlines of contacts and sensors.
 
     Where tension reaches a share of the compression, 0 is in the middle of the colours.
     """
-    low, high = float(stress.sigma_zz_mpa.min()), float(stress.sigma_zz_mpa.max())
-    pulls = high > _TENSION * -low
+    compression = 0.0 - stress.sigma_zz_mpa
+    low, high = float(compression.min()), float(compression.max())
+    pulls = -low > _TENSION * high
     reach = max(-low, high) or 1.0
     figure = go.Figure(
         go.Heatmap(
             x=stress.x_mm,
             y=stress.y_mm,
-            z=stress.sigma_zz_mpa,
-            zmin=-reach,
-            zmax=reach if pulls else 0.0,
+            z=compression,
+            zmin=-reach if pulls else 0.0,
+            zmax=reach,
             zsmooth="best",
-            colorscale="PuOr" if pulls else "Cividis_r",
-            colorbar={"title": {"text": "σ<sub>zz</sub> [MPa]", "side": "right"}},
-            hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>σ<sub>zz</sub> %{z:.4g} MPa<extra></extra>",
+            colorscale="PuOr_r" if pulls else "Cividis",
+            colorbar={"title": {"text": "compression −σ<sub>zz</sub> [MPa]", "side": "right"}},
+            hovertemplate="x %{x:.4g} mm, y %{y:.4g} mm<br>compression %{z:.4g} MPa<extra></extra>",
         )
     )
     contacts = [_circle(place, radius) for place, radius in zip(contacts_mm, stress.contact_radius_mm, strict=True)]

@@ -9,10 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
+from underskin.diagnosis.reporting.line_styles import LINE_COLOURS
 from underskin.errors import unequal_lengths
 from underskin.units import Floats
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLOURS = LINE_COLOURS[:7]
 MARKERS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "star")
 INK, GRID, ZONE = "#1b2733", "#e3e7eb", "rgba(0,158,115,0.12)"
 SDS_OF_95 = 1.96  # half of a 95 % interval in standard deviations: what every error bar shows

@@ -63,7 +63,7 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
     values, taken = shown(store, table, given, skin_id)
     if skin_id is not None and sensors is None:
         taken = [*taken, "No campaign of the skin names its sensors, so they are a grid here"]
-    values |= {name: given.get(name) or default for name, default in _DEFAULTS.items()}
+    values |= {name: given.get(name, default) for name, default in _DEFAULTS.items()}
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
 
@@ -102,13 +102,18 @@ def charge_columns(answer: ArrayStress) -> dict[str, list[Any]]:
     return {"sensor": list(answer.sensors), **{name: column.tolist() for name, column in answer.columns.items()}}
 
 
-def charge_figure(answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], numbers: str) -> Drawn:
-    """Each sensor coloured by its charge, with the loads where they have positions."""
+def charge_figure(
+    answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
+) -> Drawn:
+    """Each sensor coloured by its charge, with the loads where they have positions; `radius_mm`: the sensors'."""
+    from underskin.figures.array_map import disc_size
     from underskin.figures.loads import loaded_array
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))
-    figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm)
-    return drawn("charge", figure, "Each sensor where it lies, coloured by its charge.", numbers)
+    figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm, radius_mm)
+    return drawn(
+        "charge", figure, f"Each sensor where it lies, coloured by its charge. {disc_size(x, y, radius_mm)}", numbers
+    )
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:

@@ -83,7 +83,7 @@ def base_csv(request: Request, store: Store, table: Table, skin: str | None = No
 
 def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Drawn:
     places = [(load["x_mm"], load["y_mm"]) for load in document["contacts"]]
-    return charge_figure(answer, places, f"/loads/charge.csv{_query(request)}")
+    return charge_figure(answer, places, document["sensor_radius_mm"], f"/loads/charge.csv{_query(request)}")
 
 
 def _query(request: Request) -> str:
@@ -99,7 +99,10 @@ def _on_base(request: Request, document: Mapping[str, Any]) -> list[Drawn]:
         return []
     places = [[(one["x_mm"], one["y_mm"]) for one in some] for some in (contacts, sensors)]
     figure = stress_on_base(_base_stress(request, document), places[0], places[1], document["sensor_radius_mm"])
-    about = "Normal stress where the sensors are, seen from above; compression is negative. Loads add."
+    about = (
+        "Normal stress where the sensors are, seen from above; compression is positive, as in the table. Loads add. "
+    )
+    about += "The CSV has σ_zz, in which compression is negative."
     return [drawn("base", figure, about, f"/loads/base.csv{_query(request)}")]
 
 

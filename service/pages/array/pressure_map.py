@@ -94,7 +94,7 @@ def _figures(document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
     }
     return [
         drawn("pressure", pressed, "The map as it was read, and the sensors' outlines.", _csv(as_map)),
-        description.charge_figure(answer, [], _csv(description.charge_columns(answer))),
+        description.charge_figure(answer, [], document["sensor_radius_mm"], _csv(description.charge_columns(answer))),
     ]
 
 

@@ -65,14 +65,14 @@ def _chosen(answer: Mapping[str, Any]) -> str:
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
     """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
 
     if answer["band"] is None:
         return []
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         sensors_of(row, answer), "sensor", *D33Value.model_fields, "x_mm", "y_mm", "reasons"
     )
-    array = answer["array"]
+    array, radius = answer["array"], row.about["skin"].get("sensor_radius_mm")
     limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
     sensor = show if show in names else None
     rows = _of_sensor(numbers["recordings"], sensor)
@@ -96,8 +96,9 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
         ),
         drawn(
             "map",
-            array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor),
-            f"Each sensor where it lies, coloured by its d33. {told_apart(d33, uncertainty)} {CLICK}",
+            array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, sensor, radius),
+            f"Each sensor where it lies, coloured by its d33. {disc_size(x_mm, y_mm, radius)} "
+            f"{told_apart(d33, uncertainty)} {CLICK}",
             f"{place}/d33.csv{chosen}",
         ),
     ]

@@ -129,7 +129,7 @@ def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
@@ -144,10 +144,11 @@ def drawn_maps(
         names, x_mm, y_mm, reasons = columns_of(own, "sensor", "x_mm", "y_mm", "reasons")
         d33, uncertainty, *intervals = columns_of(own, *D33Value.model_fields)
         quantity = Quantity("d33", "pC/N", ends=ends, intervals=tuple(zip(*intervals, strict=True)))
-        figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity)
+        radius = row.about["skin"].get("sensor_radius_mm")
+        figure = array_map(names, x_mm, y_mm, d33, uncertainty, reasons, quantity, None, radius)
         figure.update_layout(title=f"d33, {name}")
         told = told_apart(d33, uncertainty, quantity)
-        about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {told}"
+        about = f"{row.name}, skin {row.skin_id}; colours as on the other map. {disc_size(x_mm, y_mm, radius)} {told}"
         maps.append(drawn(f"map-{name}", figure, about))
     places = {sensor["id"]: sensor for row in both for sensor in row.about["skin"]["sensors"]}
     shared = [row for row in rows if row["difference_pc_per_n"] is not None]
@@ -158,7 +159,8 @@ def drawn_maps(
     )  # by id, since skins of one make have their arrays in common
     x_mm, y_mm = ([places[name][axis] for name in names] for axis in ("x_mm", "y_mm"))
     quantity = Quantity("difference of d33", "pC/N", "zero")
-    figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity)
+    radius = both[1].about["skin"].get("sensor_radius_mm")
+    figure = array_map(names, x_mm, y_mm, gap, uncertainty, [""] * len(names), quantity, None, radius)
     figure.update_layout(title="Difference of d33")
     about = (
         f"The second's d33 less the first's, 0 in the middle of the colours. {told_apart(gap, uncertainty, quantity)}"

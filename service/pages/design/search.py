@@ -51,10 +51,10 @@ class Typed:
 
 
 def _typed(request: Request, store: Store, table: Table, skin: str | None = None) -> Typed:
-    given = {name: text for name, *_ in FIELDS if (text := request.query_params.get(name))}
+    given = {name: request.query_params[name] for name, *_ in FIELDS if name in request.query_params}
     words = {name: (said, unit) for name, said, unit, first in FIELDS if first is None and name not in given}
     own, taken = start(store, table, skin, words)
-    fields = {name: given.get(name) or first or f"{own[name]:g}" for name, _, _, first in FIELDS}
+    fields = {name: given.get(name, first or f"{own[name]:g}") for name, _, _, first in FIELDS}
     return Typed(skin, fields, taken)
 
 

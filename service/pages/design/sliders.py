@@ -47,13 +47,13 @@ class Sliders:
 
 def _sliders(request: Request, store: Store, table: Table, skin: str | None = None) -> Sliders:
     """With the values of the address, or else those of the skin, or of the paper's prototype."""
-    given = {name: text for name, *_ in SLIDERS if (text := request.query_params.get(name))}
+    given = {name: request.query_params[name] for name, *_ in SLIDERS if name in request.query_params}
     own, taken = start(store, table, skin, {name: words for name, words in WORDS.items() if name not in given})
     own = {name: own[name] for name, *_ in SLIDERS}
     values, error = _numbers(own, given)
     pin = request.query_params.get(PIN, "")
-    pinned, wrong = _numbers(own, dict(parse_qsl(pin))) if pin else (None, None)
-    typed = {name: given.get(name) or f"{own[name]:g}" for name, *_ in SLIDERS}
+    pinned, wrong = _numbers(own, dict(parse_qsl(pin, keep_blank_values=True))) if pin else (None, None)
+    typed = {name: given.get(name, f"{own[name]:g}") for name, *_ in SLIDERS}
     return Sliders(skin, own, typed, values, pin, pinned, error or wrong, taken)
 
 

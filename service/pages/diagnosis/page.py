@@ -257,7 +257,8 @@ def _about(name: str, text: str) -> str:
     if "noise_percent" in layout.get("meta", {}):
         noise = in_digits(layout["meta"]["noise_percent"], 2)
         said.append(
-            f"95 % of the noise of a point stays within ±{noise} %; the colours reach twice as far, or farther."
+            f"95 % of the noise of a point, which is a recording or a part of its lines, stays within ±{noise} %, in "
+            "percent of what is predicted there; the colours reach twice as far, or farther."
         )
     return " ".join(said)
 

@@ -15,7 +15,16 @@ from service.auth import session
 from service.problems import Refusal
 from service.store import Conflict, Missing
 from service.usecases import annotations
-from underskin.errors import UNITS_CHECKED, InvalidInput, Mention, Requirement, UnderskinError, out_of_range, wrong_type
+from underskin.errors import (
+    UNITS_CHECKED,
+    InvalidInput,
+    Mention,
+    Requirement,
+    UnderskinError,
+    out_of_range,
+    required,
+    wrong_type,
+)
 from underskin.recordings.readers import text
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
@@ -105,7 +114,10 @@ def attempted(form: str, sent: Mapping[str, str], do: Callable[[], object]) -> R
 
 
 def number(name: str, typed: str) -> float:
-    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput."""
+    """A number that somebody typed, with a decimal point or a decimal comma; raises InvalidInput, also where it is
+    empty."""
+    if not typed.strip():
+        raise required(name, "fill it in")
     value = _value(typed)
     if value is None:
         before_unit = _WITH_UNIT.fullmatch(typed.strip())

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from service.store import Database, campaigns, overview, skins
+from service.pages.shared import verdicts
+from service.store import AnyRow, Database, campaigns, models, overview, skins
 from underskin.surrogate.sigma_table import SigmaTable
 
 # Field, words, unit.
@@ -55,14 +56,32 @@ def start(
     known |= _pitch(described["sensors"])
     taken = []
     if "d33_pc_per_n" not in known and measured is not None and measured > 0:
-        known["d33_pc_per_n"] = float(f"{measured:.4g}")
-        sentence = f"d33 {measured:.4g} pC/N is the median of the sensors in {latest.name[:60]}, by the paper's model"
+        known["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured)
         taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
     lacking = [name for name in words if name in PROTOTYPE and name not in known]
     sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
     if lacking:
         taken.append(f"Not declared, so taken from the paper's prototype: {sentence}")
     return {**PROTOTYPE, **known}, taken
+
+
+def _measured_d33(store: Database, table: SigmaTable, root: str, row: AnyRow, by_paper: float) -> tuple[float, str]:
+    """d33 [pC/N] of the campaign `row` to four digits, by the skin's adopted model where one is in force and gives it,
+    else `by_paper`, the median over the sensors; and in a sentence whose it is, and whether it may be quoted."""
+    paper = f"d33 {by_paper:.4g} pC/N is the median of the sensors in {row.name[:60]}, by the paper's model"
+    with store.reading() as connection:
+        model = models.in_force(connection, root)
+        if model is None:
+            return float(f"{by_paper:.4g}"), paper
+        adopted = verdicts.adopted_versions(connection, [model])[0]
+    answer, lacking = verdicts.answer_by_it(store, table, row)
+    by_model = overview.of_array(answer)
+    if by_model is None:
+        why = lacking or "it gives none of this campaign"
+        return float(f"{by_paper:.4g}"), f"{paper}; the skin's adopted model is in force, but {why.rstrip('.')}"
+    sentence = f"d33 {by_model:.4g} pC/N is that of {row.name[:60]} by the skin's adopted model"
+    quoted = "" if adopted.quotable else ", and not to be quoted yet"
+    return float(f"{by_model:.4g}"), f"{sentence} (by the paper's {by_paper:.4g}){quoted}"
 
 
 def shown(
@@ -72,10 +91,11 @@ def shown(
     skin_id: str | None,
     fields: Sequence[tuple[str, str, str]] = FIELDS,
 ) -> tuple[dict[str, str], list[str]]:
-    """What a form with these fields shows: as it was sent, or else where the view starts, with `start`'s sentences."""
-    missing = {name: (words, unit) for name, words, unit in fields if not given.get(name)}
+    """What a form with these fields shows: as it was sent, also empty, or else where the view starts, with
+    `start`'s sentences."""
+    missing = {name: (words, unit) for name, words, unit in fields if name not in given}
     known, taken = start(store, table, skin_id, missing)
-    return {name: given.get(name) or f"{known[name]:g}" for name, *_ in fields}, taken
+    return {name: given.get(name, f"{known[name]:g}") for name, *_ in fields}, taken
 
 
 def _pressed(scalars: Sequence[Mapping[str, Any]]) -> dict[str, float]:

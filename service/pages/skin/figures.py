@@ -41,7 +41,7 @@ def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
     """The sensors of `map_rows` where they lie, one of them chosen."""
-    from underskin.figures.array_map import Quantity, array_map, told_apart
+    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
@@ -50,10 +50,11 @@ def drawn_map(
     own = None if ends is None else tuple((row.get(ends[0]), row.get(ends[1])) for row in rows)
     quantity = Quantity(name, unit, against, differing=significant, intervals=own)
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
+    radius = row.about["skin"].get("sensor_radius_mm")
     values, uncertainties = columns_of(rows, value, uncertainty)
-    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor)
+    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor, radius)
     about = (
         f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
-    about += f"{told_apart(values, uncertainties, quantity)} {CLICK}"
+    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(values, uncertainties, quantity)} {CLICK}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")

@@ -31,6 +31,7 @@ from underskin.units import Floats, readable_unit
 
 _GREY = "#BBBBBB"
 _MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, that show their number
+_CELL = 10  # pixels, of those numbers: 7.5 points on paper
 _ABOVE_NOISE = 2.0  # times what 95 % of the noise stays in: as far the colours of a map reach at least
 _BAND = 60  # points along a band
 _LABEL = 24  # characters on a line of a label
@@ -140,6 +141,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         customdata=count.reshape(shape),
         text=np.array([_whole(value) for value in mean]).reshape(shape) if labelled else None,
         texttemplate="%{text}" if labelled else None,
+        textfont={"size": _CELL} if len(y.names) <= _MOST_ABREAST else None,
         xgap=1,
         ygap=1,
         colorbar={"title": {"text": f"{name} [%]", "side": "right"}},

@@ -15,7 +15,7 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.frf_data import ShownFrf
-from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN
+from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN, WHOLE_NUMBERS
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
 
@@ -78,6 +78,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     titles = ("|FRF| [pC/N]", "phase [°]", "residual,<br>in phase [%]", "residual, out<br>of phase [%]")
     for row, title in enumerate(titles, start=1):
         figure.update_yaxes(title=title, row=row, col=1)
+    figure.update_yaxes(**WHOLE_NUMBERS, row=1, col=1)
     views = [_view(one, bool(before)) for one in recordings]
     for path, value in views[0].items():
         figure.layout[path] = value

@@ -6,3 +6,10 @@ there for comparison alone. Lines of one meaning are told apart by colour, width
 """
 
 SHOWN, PAPER, BOUND = "solid", "dash", "dot"
+# Labels of a logarithmic axis in full, else 50 and 0.5 were both a 5 beside it.
+WHOLE_NUMBERS = {"tickformat": "~g"}
+# Of many lines beside each other: the colours of Okabe and Ito, then four more that differ from them in both schemes.
+LINE_COLOURS = (
+    *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"),
+    *("#882255", "#999933", "#332288", "#8B5A2B"),
+)

@@ -12,11 +12,11 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_style import AFTER, BEFORE, styled
+from underskin.diagnosis.reporting.line_styles import LINE_COLOURS
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.sentences import capital
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")  # Okabe and Ito
 _MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
 _BESIDE = 0.5  # of a campaign's place on the axis, over which its sensors lie side by side
 _ROW, _OF_SKIN = 130, 22  # height of a quantity, and of a skin in it [pixels]
@@ -62,7 +62,7 @@ def _each(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: 
             error_y=_reaching(own),
             mode="lines+markers",
             name=escape(sensor),
-            line={"color": _COLOURS[number % len(_COLOURS)], "width": 1},
+            line={"color": LINE_COLOURS[number % len(LINE_COLOURS)], "width": 1},
             marker={"symbol": _MARKERS[number % len(_MARKERS)], "size": 8},
             text=[escape(row["campaign"]) for row in own],
             hovertemplate="%{text}: %{y:.4g} pC/N<extra>%{fullData.name}</extra>",
