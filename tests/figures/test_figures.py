@@ -158,3 +158,19 @@ def test_the_lowest_panel_that_is_drawn_has_the_frequency(coherence: float, lowe
     layout = frf_recordings([entry], None).layout
     assert layout[lowest].title.text == "frequency [Hz]"
     assert layout[lowest].showticklabels
+
+
+def test_ten_sensors_of_a_history_have_colours_that_differ() -> None:
+    sensors = [SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(10)]
+    colours = [trace.line.color for trace in d33_history(sensors).data]
+    channels = np.array([[int(one[at : at + 2], 16) for at in (1, 3, 5)] for one in colours])
+    apart = np.abs(channels[:, None] - channels).sum(axis=2)
+    assert apart[~np.eye(10, dtype=bool)].min() > 60
+
+
+def test_a_logarithmic_axis_is_labelled_in_full() -> None:
+    frequency = np.geomspace(5, 800, 30)
+    magnitude = np.where(frequency > 200, 50.0, 7.0)
+    line = FrfLines("r1", frequency, magnitude, np.zeros(30), np.full(30, np.nan))
+    axis = frf_recordings([line], None).layout.yaxis
+    assert (axis.type, axis.tickformat, axis.dtick) == ("log", "~g", None)

@@ -112,7 +112,7 @@ DARK.addEventListener("change", () => document.querySelectorAll(".plot[data-draw
 let unfolded = [];
 function on_sheet(plot, place) {
   const long = document.querySelector(".report .summary.long") !== null;
-  const height = place ? (long ? 170 : 210) : (long ? 260 : 340);
+  const height = place ? (long ? 145 : 190) : (long ? 235 : 340);
   const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
   const axes = Object.keys(plot.layout).filter((name) => /^[xy]axis/.test(name));
   const titles = Object.fromEntries(axes.map((name) => [`${name}.title.font.size`, 9]));

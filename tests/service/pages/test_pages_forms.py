@@ -120,3 +120,22 @@ def test_a_second_upload_leaves_the_first_draft_and_the_form_lists_both(reader: 
     page.wait_for_url("**/campaigns/*")
     reader.go("/upload")
     assert waiting.locator("li").all_inner_texts() == ["second.json for skin drafts"]
+
+
+@pytest.mark.parametrize("path", ["/d33", "/design", "/loads", "/field"])
+def test_an_emptied_field_is_asked_for(visitor: Visit, path: str) -> None:
+    visitor.go(f"{path}?thickness_mm=")
+    page = visitor.page
+    assert page.locator("#thickness_mm").input_value() == ""
+    assert page.locator(".error:visible").first.inner_text() == "thickness h [mm] – fill it in"
+    assert page.locator("[data-result], figure.drawn, table.list tbody td b").count() == 0
+    visitor.go(path)
+    assert page.locator("#thickness_mm").input_value() == "2.5"
+    assert page.locator(".error:visible").count() == 0
+
+
+def test_what_was_told_is_greyed_while_a_slider_is_empty(visitor: Visit) -> None:
+    visitor.go("/design")
+    visitor.page.locator("#thickness_mm").fill("")
+    visitor.page.get_by_text("fill it in").wait_for()
+    assert visitor.page.locator(".results.old").count() == 1

@@ -33,7 +33,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
             page.get_by_role("button", name="Keep it").click()
             page.wait_for_url("**/mechanisms")
             own = page.get_by_role("region", name="The lab's own")
-            expect(own.get_by_role("heading", name="warm_amplifier")).to_be_visible()
+            expect(own.get_by_role("heading", name="Warm amplifier")).to_be_visible()
             expect(own.get_by_text("The gain follows the temperature.", exact=True)).to_be_visible()
             expect(page.get_by_role("row", name="adhesion")).to_be_visible()
             _require_accessible_at_both_widths(visitor)
@@ -47,7 +47,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
             page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=240_000)
 
             page.get_by_role("link", name="Mechanisms", exact=True).click()
-            page.get_by_role("button", name="Discard warm_amplifier").click()
+            page.get_by_role("button", name="Discard warm amplifier").click()
             expect(page.get_by_text("There is none yet.")).to_be_visible()
 
 
@@ -83,6 +83,22 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server,
     expect(page.locator("#ageing")).to_be_in_viewport()
     probability.click()
     page.wait_for_url(f"**/diagnoses/{diagnosis_id}")
+
+
+def test_a_mechanism_among_several_answers_is_possible_and_not_found(idle: Server, reader: Visit) -> None:
+    open_answer = {**report(), "verdict": "ambiguous"}
+    before = _row_of(reader, "Contact resonance")
+    diagnosed(idle, resonant("undecided"), open_answer, skin="undecided")
+    after = _row_of(reader, "Contact resonance")
+    assert after.startswith(before.partition(",")[0])
+    assert after.endswith("possible in 1")
+    expect(reader.page.locator("#contact_resonance").get_by_text("Possible in 1 more")).to_be_visible()
+
+
+def _row_of(reader: Visit, name: str) -> str:
+    """In how many diagnoses the table says that it was found."""
+    reader.go("/mechanisms")
+    return reader.page.get_by_role("row", name=name).locator("td").last.inner_text()
 
 
 def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(idle: Server) -> None:

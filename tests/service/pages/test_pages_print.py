@@ -52,6 +52,17 @@ def require_summary_on_first_sheet(page: Page) -> None:
     assert sheets(page) == 1
 
 
+def require_noise_told(page: Page) -> None:
+    """Of the map, on the screen and on paper: which noise is meant, and why low frequencies may lie off 0."""
+    page.emulate_media(media="print")
+    note = page.locator(".summary .note")
+    assert note.is_visible()
+    assert "noise is that of single points" in note.inner_text()
+    assert "which a resonance draws away" in note.inner_text()
+    page.emulate_media(media="screen")
+    assert note.is_visible()
+
+
 def test_the_summary_of_a_page_is_one_sheet(reader: Visit, idle: Server, printed: Made) -> None:
     page = reader.page
     skin = f"sheet{len(printed.report['statement'])}"
@@ -62,6 +73,7 @@ def test_the_summary_of_a_page_is_one_sheet(reader: Visit, idle: Server, printed
     for plot in page.locator(".three .plot").all():
         plot.scroll_into_view_if_needed()
         plot.locator(".main-svg").first.wait_for()
+    require_noise_told(page)
     require_summary_on_first_sheet(page)
     assert not any(part.get_attribute("open") is not None for part in folded.all())  # as it was before printing
 
@@ -74,6 +86,7 @@ def test_the_summary_of_a_saved_file_is_one_sheet(reader: Visit, idle: Server, p
     file.write_bytes(idle.http.get(f"{place}/report.html").content)
     page.goto(file.as_uri())
     page.wait_for_function("() => document.querySelectorAll('.three .main-svg').length >= 3")
+    require_noise_told(page)
     require_summary_on_first_sheet(page)
     reader.wrong.clear()  # the file itself is not of the server
 
@@ -107,4 +120,6 @@ def test_titles_of_axes_do_not_overlap_on_paper(reader: Visit, idle: Server, mad
     titles = page.locator(".three .plot").first.locator(".infolayer text[class^=y]")
     boxes = sorted((box["y"], box["y"] + box["height"]) for one in titles.all() if (box := one.bounding_box()))
     assert len(boxes) == 4
+    ticks = page.locator(".three .plot").first.locator(".ytick text").all_text_contents()
+    assert {"0.5", "5", "50"} <= set(ticks)
     assert all(above[1] <= below[0] for above, below in pairwise(boxes))
