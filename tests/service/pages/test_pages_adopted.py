@@ -102,6 +102,28 @@ def test_a_d33_that_its_report_quotes_is_the_one_to_quote(reader: Visit, idle: S
         assert "not to be quoted" not in whole.lower()
 
 
+@pytest.mark.parametrize("path", ["design", "loads"])
+def test_a_design_starts_from_d33_by_the_adopted_model(reader: Visit, idle: Server, path: str) -> None:
+    skin = f"from-{path}"
+    document = resonant(skin)
+    document["skin"].pop("d33_pc_per_n", None)
+    campaign_id, diagnosis_id = diagnosed(idle, document, mistuned(), skin)
+    reader.go(f"/skins/{skin}")
+    reader.go(f"/{path}?skin={skin}")
+    assert (
+        "the paper's model; the skin declares none"
+        in reader.page.locator(".note", has_text="is the median").inner_text()
+    )
+    adopted = idle.http.post(f"/v1/skins/{skin}/model", json={"diagnosis_id": diagnosis_id})
+    assert adopted.is_success, adopted.text
+    reader.go(f"/{path}?skin={skin}")
+    value = d33(idle, campaign_id, "adopted")["array"]["d33_pc_per_n"]
+    assert reader.page.locator("#d33_pc_per_n").input_value() == f"{value:.4g}"
+    told = reader.page.locator(".note", has_text="by the skin's adopted model").inner_text()
+    assert f"d33 {value:.4g} pC/N is that of" in told
+    assert "not to be quoted yet" in told
+
+
 def test_what_comes_later_is_told_by_the_adopted_model_too(reader: Visit, idle: Server) -> None:
     _, diagnosis_id = diagnosed(idle, resonant("before"), mistuned(), "palm-b")
     idle.http.post("/v1/skins/palm-b/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
