@@ -15,15 +15,12 @@ from underskin.cli.app import app
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.several.campaigns import diagnose_together
 from underskin.diagnosis.several.fleet import diagnose_fleet
-from underskin.diagnosis.several.sensors import SensorsOfCampaign, changes
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import Campaign, FrfRecording, to_dict
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
 
 pytestmark = pytest.mark.usefixtures("skins_diagnosed_once")
 
-SURE = [0.0, 0.0]  # of ln d33, by mechanisms
 SEPTEMBER = "2017-09-12T09:00:00Z"
 
 
@@ -240,38 +237,6 @@ def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(tmp_path: Pat
     assert [entry["kind"] for entry in report["by_kind"]] == ["compression"]
 
 
-def sensors(name: str, d33: Floats, relative: float) -> SensorsOfCampaign:
-    uncertainty = relative * d33
-    ids = tuple(f"s{number}" for number in range(len(d33)))
-    return SensorsOfCampaign(name, ids, d33, uncertainty, d33 - uncertainty, d33 + uncertainty)
-
-
-def test_a_sensor_that_changed_is_seen_over_how_the_others_scatter() -> None:
-    """Uncertainties that allow for more scatter than there is hide no change of a sixth, and none is seen by chance."""
-    random = np.random.default_rng(11)
-    none = [frozenset[str]()] * 2
-    before, after = (14.0 * np.exp(0.01 * random.normal(size=8)) for _ in range(2))
-    after[3] *= 0.84
-    (change,) = changes([sensors("may", before, 0.03), sensors("june", after, 0.03)], none, SURE)
-    assert (change.sensor, change.since) == ("s3", 1)
-    assert change.value == pytest.approx(-0.16, abs=0.03)
-    seen = 0
-    for _ in range(300):
-        pair = [sensors(name, 14.0 * np.exp(0.04 * random.normal(size=8)), 0.04) for name in ("may", "june")]
-        seen += bool(changes(pair, none, SURE))
-    assert seen <= 6
-
-
-def test_a_sensor_that_one_campaign_alone_says_stands_apart_needs_less_to_have_changed() -> None:
-    random = np.random.default_rng(12)
-    before, after = (14.0 * np.exp(0.03 * random.normal(size=20)) for _ in range(2))
-    after[3] = 0.84 * before[3]
-    pair = [sensors("may", before, 0.03), sensors("june", after, 0.03)]
-    assert changes(pair, [frozenset(), frozenset()], SURE) == []
-    (change,) = changes(pair, [frozenset(), frozenset({"s3"})], SURE)
-    assert change.sensor == "s3"
-
-
 @pytest.mark.parametrize(("stiffness", "scatter"), [(0.15, 0.0), (0.25, 0.16)])
 def test_a_glue_line_that_begins_to_slip_is_listed_with_its_date(
     stiffness: float, scatter: float, table: SigmaTable
@@ -289,18 +254,3 @@ def test_a_glue_line_that_begins_to_slip_is_listed_with_its_date(
     assert not any("ageing" in group for group in groups)
     assert "interface slip" in report["statement"]
     assert entry["parameters"][0]["low"] > 0
-
-
-def test_sensors_that_agree_better_than_they_might_show_a_smaller_change_of_all() -> None:
-    random = np.random.default_rng(13)
-    before, after = (14.0 * np.exp(0.006 * random.normal(size=4)) for _ in range(2))
-    none = [frozenset[str]()] * 2
-    (change,) = changes([sensors("may", before, 0.021), sensors("june", 0.93 * after, 0.021)], none, SURE)
-    assert change.sensor is None
-    assert change.value == pytest.approx(-0.07, abs=0.015)
-    seen = 0
-    for _ in range(300):
-        pair = [sensors(name, 14.0 * np.exp(0.03 * random.normal(size=4)), 0.03) for name in ("may", "june")]
-        seen += bool(changes(pair, none, SURE))
-    assert seen <= 6
-    assert changes([sensors("may", before, 0.021), sensors("june", 0.93 * after, 0.021)], none, [0.0, 0.05]) == []

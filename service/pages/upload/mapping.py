@@ -5,10 +5,10 @@ from copy import deepcopy
 from typing import Any
 
 from service.ingest.reading import InspectedFile
-from service.pages.shared.forms import UNLIKELY, number_or_text, worded
+from service.pages.shared.forms import number_or_text
 from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
-from underskin.errors import ErrorCode, FileError, InvalidInput, not_unique, wrong_type
+from underskin.errors import FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
 from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import MAGNITUDE, PHASE, SCHEMA, RigDescription, channel_fields
@@ -50,16 +50,8 @@ CHANNELS = {
     "coherence": "coherence γ²",
 }  # what a channel can be, of one kind or another
 CHOICES = {**CHANNELS, spring_mapping.DEFLECTION: "deflection of the spring"}  # of the form
-_RATE = "sample_rate_hz"
+RATE = "sample_rate_hz"
 _RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
-_WORDS = {
-    **CHOICES,
-    spring_mapping.SPRING: "spring constant [N/m]",
-    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
-    "sensors": "layout",
-    _RATE: "sample rate [Hz]",
-    **workbench.WORDS,
-}
 _TEXTS = ("sensor",)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
 _PARTS = 3  # of it: name, x, y
@@ -89,40 +81,6 @@ _BY_WORD = {
     "time": "time_s",
 }
 _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press with a spring call their channels
-
-
-def field_words(field: str) -> str:
-    """A field as the form calls it; others as they are."""
-    if field.startswith("derived."):
-        return f"formula of {field.removeprefix('derived.')}"
-    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
-
-
-def what_came(error: Mapping[str, Any]) -> Any:
-    """The value that was refused; None where the form has none, as for a channel that its kind of recording lacks."""
-    return None if _is_of_other_kind(error) else error["value"]
-
-
-def _is_of_other_kind(error: Mapping[str, Any]) -> bool:
-    """Whether a channel was refused since recordings of the chosen kind have none."""
-    place, _, field = str(error["field"]).partition(".")
-    return error["code"] == ErrorCode.NOT_ONE_OF and place == "channels" and field in CHOICES
-
-
-def what_to_do(error: Mapping[str, Any]) -> str:
-    """What is allowed; for what the form asks, where to say it."""
-    if _is_of_other_kind(error):
-        words = field_words(error["field"])
-        return f"the kind of recording that is chosen has no {words}: choose another kind, or set it to “not used”"
-    if error["code"] == ErrorCode.NOT_ONE_OF and error["field"] == "sensor":
-        return "must be the name of a sensor in the layout: fill in the layout below, a line for each sensor"
-    if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
-        return worded(error["allowed"], field_words, UNLIKELY)
-    if error["field"] == _RATE:
-        return "required: fill it in below, or say which channel is the time"
-    if error["field"] in CHANNELS:
-        return "required: say below which channel it is"
-    return "required: fill it in below"
 
 
 def guessed(
@@ -189,7 +147,7 @@ def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
     named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
     rate = next((one for one in properties if one.lower().replace(" ", "_") in _RATES), None)
     if rate is not None:
-        named[_RATE] = rate
+        named[RATE] = rate
     return {name: {"property": named[name]} for name in wanted if name in named}
 
 

@@ -17,7 +17,15 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import attachment, csv_answer
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
-from service.pages.upload import exported_skin, file_summary, similar_errors, spring_mapping, templates, workbench
+from service.pages.upload import (
+    error_words,
+    exported_skin,
+    file_summary,
+    similar_errors,
+    spring_mapping,
+    templates,
+    workbench,
+)
 from service.pages.upload import mapping as mappings
 from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, listed
@@ -156,6 +164,7 @@ def understood(
         document=document,
         layout=mappings.sensors_text(document),
         mapping=mappings,
+        error_words=error_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         spring=spring_mapping,
         workbench=workbench,

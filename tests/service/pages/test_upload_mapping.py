@@ -6,16 +6,15 @@ from typing import Any
 import pytest
 import yaml
 
+from service.pages.upload.error_words import field_of, field_words, what_came, what_to_do
 from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import (
     CHANNELS,
     KINDS,
     document_of,
-    field_words,
     guessed,
     passed_over,
     sensors_text,
-    what_to_do,
 )
 from tests.support.repository import ROOT
 from underskin import InvalidInput
@@ -122,19 +121,30 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
 
 def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
+    channels = [channel("force", "N")]
     missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
-    assert what_to_do(missing) == "required: say below which channel it is"
+    assert what_to_do(missing, channels) == "required: say below which channel it is"
     needs = " needs one of force, such as N"
     refused = Requirement("channel 'force_n': its unit 'V' is one of voltage; ", Mention("force_n"), needs)
-    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused})
+    told = what_to_do({"code": "unreadable_file", "field": "file", "value": "x.csv", "allowed": refused}, channels)
     assert told == "channel 'force_n': its unit 'V' is one of voltage; force needs one of force, such as N"
     with pytest.raises(InvalidInput) as error:
         checked("thickness_mm", 2500.0)
     unlikely = error.value.allowed
-    told = what_to_do({"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely})
+    likely = {"code": "unlikely_magnitude", "field": "skin.thickness_mm", "value": 2500, "allowed": unlikely}
+    told = what_to_do(likely, channels)
     assert "(or tick “These values are right, unusual as they are”)" in told
     assert "units_checked" not in told
-    assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"})
+    assert "fill it in below" in what_to_do({**missing, "field": "sample_rate_hz"}, channels)
+    assert (field_of(missing, []), what_to_do(missing, [])) == ("frf_im_pc_per_n", "required")
+
+
+def test_a_channel_of_another_kind_of_recording_is_said_without_its_value() -> None:
+    channels = [channel("charge", "pC")]
+    refused = {"code": "not_one_of", "field": "channels.charge_pc", "value": "a value of type dict", "allowed": "x"}
+    assert what_came(refused, channels) is None
+    assert what_to_do(refused, channels).startswith("the kind of recording that is chosen has no charge")
+    assert what_came(refused, []) == "a value of type dict"
 
 
 def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:

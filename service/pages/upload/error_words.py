@@ -1,0 +1,63 @@
+"""Errors of an upload in the words of its form; of files that need no form, in those of the request."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.pages.shared.forms import UNLIKELY, worded
+from service.pages.upload import spring_mapping, workbench
+from service.pages.upload.file_summary import ChannelSummary
+from service.pages.upload.mapping import CHANNELS, CHOICES, RATE, RECORDING, SKIN
+from underskin.errors import ErrorCode
+
+_WORDS = {
+    **CHOICES,
+    spring_mapping.SPRING: "spring constant [N/m]",
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
+    "sensors": "layout",
+    RATE: "sample rate [Hz]",
+    **workbench.WORDS,
+}
+
+Error = Mapping[str, Any]
+Channels = Sequence[ChannelSummary]  # of the file with the error: the form is for one that has any
+
+
+def field_words(field: str) -> str:
+    """A field as the form calls it; others as they are."""
+    if field.startswith("derived."):
+        return f"formula of {field.removeprefix('derived.')}"
+    return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
+
+
+def field_of(error: Error, channels: Channels) -> str:
+    """The field that is wrong."""
+    return field_words(error["field"]) if channels else str(error["field"])
+
+
+def what_came(error: Error, channels: Channels) -> Any:
+    """The value that was refused; None where the form has none, as for a channel that its kind of recording lacks."""
+    return None if channels and _is_of_other_kind(error) else error["value"]
+
+
+def what_to_do(error: Error, channels: Channels) -> str:
+    """What is allowed; for what the form asks, where to say it."""
+    if not channels:
+        return str(error["allowed"])
+    if _is_of_other_kind(error):
+        words = field_words(error["field"])
+        return f"the kind of recording that is chosen has no {words}: choose another kind, or set it to “not used”"
+    if error["code"] == ErrorCode.NOT_ONE_OF and error["field"] == "sensor":
+        return "must be the name of a sensor in the layout: fill in the layout below, a line for each sensor"
+    if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
+        return worded(error["allowed"], field_words, UNLIKELY)
+    if error["field"] == RATE:
+        return "required: fill it in below, or say which channel is the time"
+    if error["field"] in CHANNELS:
+        return "required: say below which channel it is"
+    return "required: fill it in below"
+
+
+def _is_of_other_kind(error: Error) -> bool:
+    """Whether a channel was refused since recordings of the chosen kind have none."""
+    place, _, field = str(error["field"]).partition(".")
+    return error["code"] == ErrorCode.NOT_ONE_OF and place == "channels" and field in CHOICES
