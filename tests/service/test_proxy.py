@@ -128,7 +128,12 @@ def proxy(folder: Path) -> Iterator[tuple[httpx.Client, int]]:
         try:
             wait_until_open(service, server)
             wait_until_open(tls, front)
-            with httpx.Client(verify=trust, base_url=f"https://127.0.0.1:{tls}", headers=headers) as client:
+            with httpx.Client(
+                verify=trust,
+                base_url=f"https://127.0.0.1:{tls}",
+                headers=headers,
+                timeout=60.0,  # 70 MB pass through two servers, beside other tests
+            ) as client:
                 yield client, plain
         finally:
             front.terminate()

@@ -22,7 +22,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[str, str]]:
 
 def tried(url: str, key: str) -> httpx.Response:
     """The answer to the login page's form with this key."""
-    with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}) as browser:
+    with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}, timeout=60) as browser:
         form = browser.get("/login")
         return browser.post("/login", data={"key": key, "form_token": token_of(form.text)})
 

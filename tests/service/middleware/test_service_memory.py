@@ -102,7 +102,7 @@ def test_a_chunked_login_form_is_refused_once_it_is_too_long(keyed: Server) -> N
 
 
 def test_a_login_form_of_a_sane_length_is_read(keyed: Server) -> None:
-    with httpx.Client(base_url=keyed.url) as client:
+    with httpx.Client(base_url=keyed.url, timeout=60) as client:
         (token,) = re.findall(r'name="form_token" value="([^"]+)"', client.get("/login").text)
         assert client.post("/login", data={"form_token": token, "key": "k" * 7000}).status_code == 401
 

@@ -225,7 +225,7 @@ def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made:
 def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
     server, keys = locked
     diagnosis_id = asked(server, campaign_id := sent(server, resonant("locked"), "locked"))
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
         somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
         shown = somebody.get(f"/campaigns/{campaign_id}").text
         assert "Diagnose</button>" not in shown

@@ -105,7 +105,7 @@ def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
 def test_a_map_needs_the_session_s_own_form_and_no_right_to_write(
     server: Server, locked: tuple[Server, dict[str, str]]
 ) -> None:
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
         assert somebody.post("/loads/map", files={"map": (None, SMALL)}).status_code == 403
     other, keys = locked
     own = {"Origin": str(other.http.base_url).rstrip("/")}

@@ -200,7 +200,7 @@ def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str
 def test_an_export_beyond_the_limit_is_refused(tmp_path: Path, export: bytes) -> None:
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.02") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody,
     ):
         form = {"form_token": token_of(somebody.get("/upload").text)}
         answer = somebody.post("/upload", data=form, files={"file": ("skin.h5", export)})

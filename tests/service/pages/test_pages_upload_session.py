@@ -45,7 +45,7 @@ def test_kept_twice_is_kept_once_and_what_is_discarded_is_gone(sender: httpx.Cli
 
 def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) -> None:
     place = posted(sender)
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as other:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other:
         form = {"form_token": token_of(other.get("/upload").text), "skin": "stolen"}
         assert other.get(place).status_code == 404
         for path in ("keep", "discard", "mapping"):
@@ -71,7 +71,7 @@ def test_an_upload_needs_the_session_s_own_form(sender: httpx.Client) -> None:
 
 def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]) -> None:
     server, keys = locked
-    with httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
         somebody.post("/login", data={"form_token": token_of(somebody.get("/login").text), "key": keys["read"]})
         shown = somebody.get("/upload").text
         assert "may read only" in shown
@@ -88,7 +88,7 @@ def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]
 def test_an_upload_beyond_the_limit_is_refused_on_a_page(tmp_path: Path) -> None:
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING) as somebody,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody,
     ):
         form = {"form_token": token_of(somebody.get("/upload").text)}
         answer = somebody.post("/upload", data=form, files={"file": ("a.csv", b"1,2\n" * 50_000)})

@@ -235,7 +235,7 @@ def test_the_document_stays_the_same(http: httpx.Client, document: dict[str, Any
 
 def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[str, Any], locked: Server) -> None:
     assert "security" not in document
-    with httpx.Client(base_url=locked.url, headers=authorization(locked)) as client:
+    with httpx.Client(base_url=locked.url, headers=authorization(locked), timeout=60) as client:
         described = client.get("/openapi.json").json()
     assert described["security"] == [{"key": []}]
     assert described["components"]["securitySchemes"]["key"]["scheme"] == "bearer"
