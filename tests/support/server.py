@@ -57,10 +57,11 @@ def running(folder: Path, settings: Mapping[str, str] | None = None, *options: s
 
 def _await_ready(url: str, process: preloaded.Process, log: Path) -> None:
     end = time.monotonic() + _START_LIMIT
-    while time.monotonic() < end and process.poll() is None:
-        try:
-            if httpx.get(f"{url}/ready").status_code == 200:
-                return
-        except httpx.TransportError:
-            time.sleep(0.05)
+    with httpx.Client(timeout=_START_LIMIT) as client:  # one: its certificates take longer to load than the answer
+        while time.monotonic() < end and process.poll() is None:
+            try:
+                if client.get(f"{url}/ready").status_code == 200:
+                    return
+            except httpx.TransportError:
+                time.sleep(0.05)
     raise RuntimeError(f"the server did not start: {log.read_text()[-2000:]}")

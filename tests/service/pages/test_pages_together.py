@@ -53,7 +53,10 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
 
 def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
     first, second, _ = sent_to(idle, "changing", "a", "b", "c")
-    with Client(str(idle.http.base_url)) as client, httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form:
+    with (
+        Client(str(idle.http.base_url)) as client,
+        httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form,
+    ):
         whole = client.skins.diagnose("changing", name="all of it")["id"]
         chosen = client.skins.diagnose("changing", [first, second], "two of it")["id"]
         finished(idle)
@@ -119,7 +122,10 @@ def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form
     sent_to(idle, "bare-0", "a")
     (only,) = sent_to(idle, "bare-1", "b")
     sent_to(idle, "bare-2", "c")
-    with Client(str(idle.http.base_url)) as client, httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form:
+    with (
+        Client(str(idle.http.base_url)) as client,
+        httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form,
+    ):
         client.campaigns.withdraw(only, "wrong sphere")
         fields = {"form_token": token_of(form.get("/fleets").text), "find": "bare-", "name": "<b>batch"}
         chosen = {f"skin-{number + 1}": f"bare-{number}" for number in range(3)}
