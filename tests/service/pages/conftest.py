@@ -7,16 +7,15 @@ from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, WebError, sync_playwright
 
 from tests.support.store_server import Place, Server, running
 
 CHROMIUM = shutil.which("chromium")
 EXAMPLE = "/skins/example"
 SERIOUS = ("serious", "critical")
-# Drawing without a process of its own for a graphics card that is not there, and one process for all pages: a visit of
-# three pages then takes an eighth less of the processor.
-OPTIONS = ["--no-sandbox", "--disable-gpu", "--in-process-gpu", "--renderer-process-limit=1"]
+# Drawing without a process of its own for a graphics card that is not there, and one for all pages of a context.
+OPTIONS = ["--no-sandbox", "--disable-gpu", "--in-process-gpu", "--process-per-site"]
 
 
 @pytest.fixture(scope="package")
@@ -26,8 +25,17 @@ def browser() -> Iterator[Browser]:
         pytest.skip("Chromium (Debian's package chromium) is not installed")
     with sync_playwright() as playwright:
         started = playwright.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        _keep_a_process(started.new_context(timezone_id="Europe/Rome", locale="en-GB", accept_downloads=True))
         yield started
         started.close()
+
+
+def _keep_a_process(context: BrowserContext) -> None:
+    """An empty page of the site of all servers, as long as the browser runs: a page of a new process would take 2 s of
+    the processor to read the scripts of figures anew."""
+    page = context.new_page()
+    page.route("**/*", lambda route: route.fulfill(body=""))
+    page.goto("http://127.0.0.1/")
 
 
 @pytest.fixture(scope="session")
@@ -70,20 +78,32 @@ class Visit:
 
 def visit(browser: Browser, server: Server) -> Iterator[Visit]:
     """A fresh session; at its end nothing may have gone wrong."""
-    context = browser.new_context(timezone_id="Europe/Rome", locale="en-GB", accept_downloads=True)
+    context = browser.contexts[0]
     seen = Visit(context.new_page(), str(server.http.base_url).rstrip("/"))
 
-    def outside(address: str) -> None:
-        if not address.startswith((seen.address, "data:", "blob:")):
-            seen.wrong.append(f"request to {address}")
+    def warned(message: ConsoleMessage) -> None:
+        if message.type in ("error", "warning"):
+            seen.wrong.append(message.text)
 
-    context.on(
-        "console", lambda message: seen.wrong.append(message.text) if message.type in ("error", "warning") else None
-    )
-    context.on("weberror", lambda error: seen.wrong.append(str(error.error)))
-    context.on("request", lambda request: outside(request.url))
-    yield seen
-    context.close()
+    def failed(error: WebError) -> None:
+        seen.wrong.append(str(error.error))
+
+    def asked(request: Request) -> None:
+        if not request.url.startswith((seen.address, "data:", "blob:")):
+            seen.wrong.append(f"request to {request.url}")
+
+    context.on("console", warned)
+    context.on("weberror", failed)
+    context.on("request", asked)
+    try:
+        yield seen
+    finally:
+        for page in context.pages[1:]:
+            page.close()
+        context.remove_listener("console", warned)
+        context.remove_listener("weberror", failed)
+        context.remove_listener("request", asked)
+        context.clear_cookies()
     assert seen.wrong == []
 
 

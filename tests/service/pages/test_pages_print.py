@@ -58,7 +58,7 @@ def require_noise_told(page: Page) -> None:
     note = page.locator(".summary .note")
     assert note.is_visible()
     assert "noise is that of single points" in note.inner_text()
-    assert "which a resonance draws away" in note.inner_text()
+    assert "where part of the band departs from it" in note.inner_text()
     page.emulate_media(media="screen")
     assert note.is_visible()
 
