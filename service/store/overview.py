@@ -68,12 +68,13 @@ def glances(
         if glance.last is not None:
             glance.diagnosis = diagnosed.get(glance.last.number)
         glance.model = adopted.get(glance.skin_id)
-        if glance.model is not None and glance.last is not None:
+        if glance.last is not None:
             own = [row for row in recent if row.root_id == glance.skin_id and row.number in values]
-            of_model = own[-1] if own else glance.last
-            by_model = inversions.find_adopted(connection, of_model, glance.model.model_id, table_sha256)
-            glance.adopted_d33 = of_array(by_model)
-            glance.paper_d33 = of_array(inversions.find(connection, of_model, table_sha256))
+            told = own[-1] if own else glance.last
+            glance.paper_d33 = of_array(inversions.find(connection, told, table_sha256))
+            if glance.model is not None:
+                by_model = inversions.find_adopted(connection, told, glance.model.model_id, table_sha256)
+                glance.adopted_d33 = of_array(by_model)
     titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
     for skin_id, title, tags in connection.execute(titles):
         by_skin[skin_id].title, by_skin[skin_id].tags = title, tags

@@ -9,6 +9,7 @@ import numpy as np
 
 from service.pages.shared import verdicts
 from service.store import AnyRow, Database, campaigns, models, overview, skins
+from service.usecases import d33_cache
 from underskin.surrogate.sigma_table import SigmaTable
 
 # Field, words, unit.
@@ -67,8 +68,12 @@ def start(
 
 def _measured_d33(store: Database, table: SigmaTable, root: str, row: AnyRow, by_paper: float) -> tuple[float, str]:
     """d33 [pC/N] of the campaign `row` to four digits, by the skin's adopted model where one is in force and gives it,
-    else `by_paper`, the median over the sensors; and in a sentence whose it is, and whether it may be quoted."""
-    paper = f"d33 {by_paper:.4g} pC/N is the median of the sensors in {row.name[:60]}, by the paper's model"
+    else by the paper's, of the array or, where it has none, `by_paper`, the median over the sensors; and in a sentence
+    whose it is, and whether it may be quoted."""
+    array = overview.of_array(d33_cache.answer(store, table, row, None))
+    by_paper = by_paper if array is None else array
+    whose = "the median of the sensors" if array is None else "that of the array"
+    paper = f"d33 {by_paper:.4g} pC/N is {whose} in {row.name[:60]}, by the paper's model"
     with store.reading() as connection:
         model = models.in_force(connection, root)
         if model is None:

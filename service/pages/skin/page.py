@@ -91,7 +91,7 @@ def shown(
         is_latest = last is None or campaigns.latest(connection, root) == last
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
-        diagnosed = overview.latest_diagnoses(connection, numbers)
+        diagnosed = overview.latest_diagnoses(connection, numbers if last is None else [*numbers, last.number])
         about = skins.find(connection, root)
         changed = changes.of_skin(connection, root)
         used = annotations.in_use(connection, root)
@@ -131,6 +131,7 @@ def shown(
         last=last,
         answer=answer,
         is_latest=is_latest,
+        of_last=None if last is None else verdict_of.get(last.number),
         described=None if last is None else last.about["skin"],
         rows=[
             (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))

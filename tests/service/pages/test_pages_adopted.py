@@ -40,6 +40,11 @@ def test_an_adopted_model_heads_its_skin_and_the_start(reader: Visit, idle: Serv
     campaign_id, diagnosis_id = diagnosed(idle, resonant("monday"), mistuned(), "palm-a")
     reader.go("/skins/palm-a")
     assert "the paper's" in page.locator(".facts").inner_text()
+    assert "By the paper's model. Not to be quoted yet, by the latest diagnosis: " in page.locator("main").inner_text()
+    array = d33(idle, campaign_id, "paper")["array"]["d33_pc_per_n"]
+    reader.go("/")
+    told = page.get_by_role("row", name="palm-a").locator(".trend").inner_text().replace("\xa0", " ")
+    assert f"array {array:#.4g} pC/N by the paper's model" in told
     reader.go(f"/diagnoses/{diagnosis_id}")
     stays = page.locator("#adopt ~ p").all_inner_texts()[1]
     assert "until another diagnosis of the skin is adopted, or until it is withdrawn" in stays
@@ -112,7 +117,7 @@ def test_a_design_starts_from_d33_by_the_adopted_model(reader: Visit, idle: Serv
     reader.go(f"/{path}?skin={skin}")
     assert (
         "the paper's model; the skin declares none"
-        in reader.page.locator(".note", has_text="is the median").inner_text()
+        in reader.page.locator(".note", has_text="is that of the array").inner_text()
     )
     adopted = idle.http.post(f"/v1/skins/{skin}/model", json={"diagnosis_id": diagnosis_id})
     assert adopted.is_success, adopted.text
