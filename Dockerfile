@@ -10,6 +10,7 @@ COPY service /app/service
 COPY tablegen /app/tablegen
 COPY rig /app/rig
 COPY tables /app/tables
+COPY docs/glossary.md /app/docs/glossary.md
 RUN /opt/venv/bin/pip install --quiet --no-index --no-build-isolation -e '/app[server,fem]'
 # The root is read-only later, so byte code and machine code are written now; the packages' own test suites and pip are
 # not needed any more.

@@ -41,6 +41,7 @@ def measure() -> list[Figure]:
             "Pressure map": "/loads/map?skin=palm-3",
             "Stress under a sphere": "/field?skin=palm-3",
             "Tables": "/tables",
+            "Glossary": "/glossary",
             "Design": "/design?skin=palm-3",
             "Design, a slider's answer": "/design/answer?thickness_mm=3",
             "Designs that resolve 3 mm": "/design/search?resolution_mm=3",

@@ -14,6 +14,7 @@ from service.pages.diagnosis import page as diagnosis
 from service.pages.diagnosis import plan
 from service.pages.field import page as field
 from service.pages.fleet import page as fleet
+from service.pages.glossary import page as glossary
 from service.pages.measured import page as measured
 from service.pages.mechanisms import page as mechanisms
 from service.pages.shared import assets, workbooks
@@ -28,7 +29,8 @@ _OF_SKINS = (
     start, example, skin, skin_changes, campaign, campaign_changes, undo, compare, fleet, diagnosis, plan, upload
 )  # fmt: skip
 _PAGES = (
-    *_OF_SKINS, design, design_search, field, loads, pressure_map, measured, tables, mechanisms, login, sessions, assets
+    *_OF_SKINS, design, design_search, field, loads, pressure_map, measured,
+    tables, mechanisms, glossary, login, sessions, assets,
 )  # fmt: skip
 
 for _page in _PAGES:
