@@ -14,10 +14,13 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("s1-2N")
     exclude.get_by_label("Reason").fill("cable <b>loose</b>")
+    exclude.get_by_label("Your name").fill("Maria <i>B</i>")
     exclude.get_by_role("button", name="Exclude").click()
     page.get_by_text("1 excluded").wait_for()
     row = page.get_by_role("row", name="s1-2N")
-    assert "excluded: cable <b>loose</b>" in row.inner_text()
+    assert "excluded by Maria <i>B</i>: cable <b>loose</b>" in row.inner_text()
+    page.get_by_text("What was changed here").click()
+    assert "by Maria <i>B</i>" in page.locator(".changes").inner_text()
     after = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
     assert after != before
     assert f"{after:.3g}" in page.locator(".result").inner_text()
