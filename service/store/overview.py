@@ -34,6 +34,8 @@ class Glance:
     # not kept
     adopted_d33: float | None = None
     paper_d33: float | None = None
+    # of how many sensors that campaign tells d33, and how many the skin has
+    measured: tuple[int, int] | None = None
     title: str | None = None
     tags: str | None = None
 
@@ -74,6 +76,10 @@ def glances(
             by_model = inversions.find_adopted(connection, of_model, glance.model.model_id, table_sha256)
             glance.adopted_d33 = of_array(by_model)
             glance.paper_d33 = of_array(inversions.find(connection, of_model, table_sha256))
+    told = {row.root_id: row.number for row in recent if row.number in values}
+    sensors = measured_sensors(connection, list(told.values()), table_sha256)
+    for root, number in told.items():
+        by_skin[root].measured = sensors.get(number)
     titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
     for skin_id, title, tags in connection.execute(titles):
         by_skin[skin_id].title, by_skin[skin_id].tags = title, tags
@@ -107,6 +113,20 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     for number, value in connection.execute(query):
         by_campaign.setdefault(number, []).append(value)
     return {number: median(values) for number, values in by_campaign.items()}
+
+
+def measured_sensors(connection: Connection, numbers: Sequence[int], table_sha256: str) -> dict[int, tuple[int, int]]:
+    """Of how many sensors d33 is kept, and how many the skin has, by those campaigns of which any is kept."""
+    counted = (
+        select(sensor_d33.c.campaign, func.count().label("measured"))
+        .join(campaigns, campaigns.c.number == sensor_d33.c.campaign)
+        .join(derived, inversions.fresh(table_sha256))
+        .where(campaigns.c.number.in_(numbers))
+        .group_by(sensor_d33.c.campaign)
+        .subquery()
+    )
+    query = select(counted, campaigns.c.about).join(campaigns, campaigns.c.number == counted.c.campaign)
+    return {row.campaign: (row.measured, len(row.about["skin"]["sensors"])) for row in connection.execute(query)}
 
 
 def of_array(answer: Mapping[str, Any] | None) -> float | None:
