@@ -72,6 +72,11 @@ class PendingUpload:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
+    def is_stale(self) -> bool:
+        """Whether the form holds what cannot be used, so that what was read is not what it says."""
+        return self.draft is not None
+
+    @property
     def is_depth_composed(self) -> bool:
         """Whether the displacement is made of several channels: turned as a whole, its terms would be wrong."""
         mapping = None if self.rig is None else self.rig.channels.get("displacement_mm")
