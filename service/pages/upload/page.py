@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
-from service.ingest import skin_imports
+from service.ingest import field_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
 from service.ingest.uploads import received
@@ -20,6 +20,7 @@ from service.pages.upload import (
     error_words,
     exported_skin,
     file_summary,
+    recorded_time,
     similar_errors,
     spring_mapping,
     templates,
@@ -131,7 +132,8 @@ def understood(
     about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = channels_of(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
-    document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
+    seen = pending.seen[file]
+    document = stated or mappings.guessed(channels, seen.properties, about, dated=seen.began is not None)
     return page(
         request,
         "understood.html",
@@ -159,9 +161,11 @@ def understood(
         layout=mappings.sensors_text(document),
         mapping=mappings,
         error_words=error_words,
+        field_words=field_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         spring=spring_mapping,
         workbench=workbench,
+        recorded_time=recorded_time,
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
