@@ -46,12 +46,12 @@ def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept
     for number, recording in enumerate(document["recordings"]):
         recording["conditions"] = {"temperature_c": 23.5 + number} | ({"operator": "mb"} if number else {})
     look_at(reader, [file("may.json", as_json(document))])
-    declared = page.get_by_label("The skin as it is declared")
+    facts = page.locator("dl.facts").inner_text().replace("\xa0", " ")
     for said in ("thickness\n2.5 mm", "Young's modulus, declared\n16 MPa", "sensor radius\n1.5 mm"):
-        assert said in declared.inner_text().replace("\xa0", " ")
-    places = declared.get_by_role("region", name="Where its sensors are")
+        assert said in facts
+    places = page.get_by_role("region", name="Where its sensors are")
     expect(places).to_be_hidden()
-    declared.get_by_text("Where its sensors are").click()
+    page.get_by_text("Where its sensors are").click()
     assert places.get_by_role("row", name="s5").inner_text().split() == ["s5", "40", "0"]
     row = page.get_by_role("row", name="s1-2N")
     for said in ("2017", "26.5", "mb"):
