@@ -1,6 +1,9 @@
 """Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
 
+import httpx
+
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING, token_of
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
 
@@ -38,6 +41,20 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     reader.require_accessible()
     reader.go("/")
     assert "none in use" in page.get_by_role("row", name="mind").inner_text()
+
+
+def test_a_key_tells_who_it_is_whatever_is_typed(locked: tuple[Server, dict[str, str]]) -> None:
+    server, keys = locked
+    kept = server.http.post("/v1/campaigns", json=campaign("signed")).json()["id"]
+    own = {"Origin": str(server.http.base_url).rstrip("/")}
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as writer:
+        writer.post("/login", data={"form_token": token_of(writer.get("/login").text), "key": keys["write"]})
+        page = writer.get(f"/campaigns/{kept}").text
+        assert 'name="who"' not in page
+        assert "the name of your key, the writeer" in page
+        form = {"form_token": token_of(page), "reason": "wrong sphere", "who": "somebody else"}
+        assert writer.post(f"/campaigns/{kept}/withdraw", data=form, headers=own).status_code == 303
+    assert server.http.get(f"/v1/campaigns/{kept}").json()["withdrawn_from"] == "the writeer"
 
 
 def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -> None:
