@@ -87,6 +87,10 @@ def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(reader
     assert "must be a date, or a date and time, such as" in alert.inner_text()
     expect(keep).to_be_disabled()
     assert "was read before that" in page.locator("#keep-why-not").inner_text()
+    with page.expect_navigation():  # as a page would send it that was opened before
+        page.evaluate("document.querySelector('form.keep').submit()")
+    expect(keep).to_be_disabled()
+    assert len(campaigns_of(idle, "hand")) == 1
     reader.require_accessible()
 
     for name, value in (("first_sample", ""), ("last_sample", ""), ("recorded_at", "3.5.2026 14:30")):
