@@ -10,6 +10,7 @@ from sqlalchemy import Connection
 
 from service.ingest import instruments, repeats
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
+from service.ingest.rig_words import said_of
 from service.ingest.uploads import Upload
 from service.problems import Refusal
 from service.store import Database, answers, campaigns, instrument_templates, skins
@@ -181,7 +182,8 @@ def _place(recording: str) -> str:
 def _kept(
     connection: Connection, checked: CheckedCampaign, options: IngestOptions, rig: RigDescription | None
 ) -> dict[str, Any]:
-    campaign, notes = checked.campaign, list(checked.notes)
+    campaign = checked.campaign
+    notes = [*(said_of(rig) if checked.by_rig and rig is not None else []), *checked.notes]
     refused = [{"id": entry["id"], "status": "refused", "errors": entry["errors"]} for entry in checked.refused]
     result: dict[str, Any] = {"file": checked.file, "errors": checked.errors, "notes": notes, "findings": []}
     if campaign is None:
@@ -191,7 +193,7 @@ def _kept(
     arrival = campaigns.NewCampaign(campaign, options.skin, refused, notes, checked.file, options.sender)
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=options.corrects, reason=options.reason)
     if checked.by_rig and rig is not None:
-        skins.keep_rig(connection, skin_id, orjson.dumps(rig.document).decode())
+        skins.keep_rig(connection, skin_id, instruments.of_skin(rig))
         for instrument in checked.instruments:
             instrument_templates.keep(connection, instrument, instruments.template_of(rig), options.sender)
     stored = [{"id": recording.id, "status": "ok", "errors": []} for recording in campaign.recordings]

@@ -33,6 +33,18 @@ def template_of(rig: RigDescription) -> str:
     return orjson.dumps({**document, "skin": {}, "recording": recording}).decode()
 
 
+def of_skin(rig: RigDescription) -> str:
+    """The part of a rig description (JSON) that holds for later files of its skin: without a time that was typed, which
+    is that of these recordings alone."""
+    recording = {
+        name: value
+        for name, value in rig.document.get("recording", {}).items()
+        if name != "recorded_at" or isinstance(value, Mapping)
+    }
+    said = {"recording": recording} if "recording" in rig.document else {}
+    return orjson.dumps({**rig.document, **said}).decode()
+
+
 def with_skin(template: str, skin: Mapping[str, Any]) -> dict[str, Any]:
     """The rig description (`rig/1`) of a template, for a skin of which these fields are known."""
     return {**orjson.loads(template), "skin": dict(skin)}

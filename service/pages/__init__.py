@@ -23,10 +23,13 @@ from service.pages.skin import page as skin
 from service.pages.start import example, login, sessions
 from service.pages.start import page as start
 from service.pages.tables import page as tables
+from service.pages.upload import discarding as upload_discarding
+from service.pages.upload import downloads as upload_downloads
 from service.pages.upload import page as upload
 
 _OF_SKINS = (
-    start, example, skin, skin_changes, campaign, campaign_changes, undo, compare, fleet, diagnosis, plan, upload
+    start, example, skin, skin_changes, campaign, campaign_changes, undo, compare, fleet, diagnosis, plan, upload,
+    upload_discarding, upload_downloads
 )  # fmt: skip
 _PAGES = (
     *_OF_SKINS, design, design_search, field, loads, pressure_map, measured,

@@ -109,7 +109,9 @@ class CampaignEntry(BaseModel):
     corrected_by: str | None = Field(description="The campaign that replaces it.")
     withdrawn_at: str | None = Field(description="When it was withdrawn, UTC.")
     withdraw_reason: str | None = Field(description="Why.")
-    withdrawn_from: str | None = Field(description="Name of the API key that withdrew it.")
+    withdrawn_from: str | None = Field(
+        description="Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."
+    )
     discarded_at: str | None = Field(description="When it was put away as a mere trial, UTC; lists leave it out.")
     remark: str | None = Field(description="What the lab noted of it.")
     tags: list[str] = Field(description="Words that the lab finds it by.")
@@ -131,7 +133,9 @@ class RecordingEntry(BaseModel):
     recorded_at: str | None = Field(description="When it was made, UTC.")
     excluded_at: str | None = Field(description="When it was excluded, UTC; null where figures use it.")
     exclude_reason: str | None = Field(description="Why it was excluded.")
-    excluded_from: str | None = Field(description="Name of the API key that excluded it.")
+    excluded_from: str | None = Field(
+        description="Name of the API key that excluded it, or, without one, the name that was typed on a page, if any."
+    )
     scalars: dict[str, Any] = Field(description="Its fields that are single values, as in campaign/1.")
 
 

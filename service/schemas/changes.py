@@ -56,7 +56,9 @@ class Change(BaseModel):
     campaign_id: str | None = Field(description="The campaign; null for a change of the skin itself.")
     recording: str | None = Field(description="The recording that was excluded.")
     at: str = Field(description="When, UTC.")
-    made_from: str | None = Field(description="Name of the API key that made it.")
+    made_from: str | None = Field(
+        description="Name of the API key that made it, or, without one, the name that was typed on a page, if any."
+    )
     reason: str | None = Field(description="Why, where it was given.")
     before: dict[str, Any] = Field(description="What `annotate` and `discard` replaced, by field.")
     after: dict[str, Any] = Field(description="What they put in its place.")

@@ -128,7 +128,9 @@ class ModelVersion(BaseModel):
     diagnosis_id: str = Field(description="The diagnosis that it comes from.")
     campaign_id: str = Field(description="The campaign that was diagnosed.")
     withdrawn_at: str | None = Field(description="When it was withdrawn, UTC; null where it was not.")
-    withdrawn_from: str | None = Field(description="Name of the API key that withdrew it.")
+    withdrawn_from: str | None = Field(
+        description="Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."
+    )
     withdraw_reason: str | None = Field(description="Why.")
 
 

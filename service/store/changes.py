@@ -28,7 +28,7 @@ def record(
     after: Mapping[str, Any] | None = None,
     undoes: str | None = None,
 ) -> None:
-    """Keep one change of a skin, or of a campaign of it; `made_from`: name of the API key."""
+    """Keep one change of a skin, or of a campaign of it; `made_from`: name of the API key or, without one, as typed."""
     row = {
         "id": f"ch-{secrets.token_hex(8)}",
         "action": action,

@@ -34,6 +34,8 @@ class Glance:
     # not kept
     adopted_d33: float | None = None
     paper_d33: float | None = None
+    # of how many sensors that campaign tells d33, and how many the skin has
+    measured: tuple[int, int] | None = None
     title: str | None = None
     tags: str | None = None
 
@@ -64,21 +66,27 @@ def glances(
     numbers = [row.number for row in recent]
     diagnosed = _latest_together(connection, numbers) | latest_diagnoses(connection, numbers)
     adopted = adopted_models.in_force_of(connection, list(by_skin))
-    for glance in by_skin.values():
+    told = {row.root_id: row for row in recent if row.number in values}
+    sensors = measured_sensors(connection, [row.number for row in told.values()], table_sha256)
+    for root, glance in by_skin.items():
+        glance.model = adopted.get(root)
         if glance.last is not None:
             glance.diagnosis = diagnosed.get(glance.last.number)
-        glance.model = adopted.get(glance.skin_id)
-        if glance.last is not None:
-            own = [row for row in recent if row.root_id == glance.skin_id and row.number in values]
-            told = own[-1] if own else glance.last
-            glance.paper_d33 = of_array(inversions.find(connection, told, table_sha256))
-            if glance.model is not None:
-                by_model = inversions.find_adopted(connection, told, glance.model.model_id, table_sha256)
-                glance.adopted_d33 = of_array(by_model)
+            _add_d33(connection, glance, told.get(root, glance.last), table_sha256)
+        if root in told:
+            glance.measured = sensors.get(told[root].number)
     titles = select(skins.c.id, skins.c.title, skins.c.tags).where(skins.c.id.in_(by_skin))
     for skin_id, title, tags in connection.execute(titles):
         by_skin[skin_id].title, by_skin[skin_id].tags = title, tags
     return list(by_skin.values())
+
+
+def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha256: str) -> None:
+    """That of the array in a campaign, by the paper's model and by the one in force."""
+    glance.paper_d33 = of_array(inversions.find(connection, campaign, table_sha256))
+    if glance.model is not None:
+        by_model = inversions.find_adopted(connection, campaign, glance.model.model_id, table_sha256)
+        glance.adopted_d33 = of_array(by_model)
 
 
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:
@@ -108,6 +116,20 @@ def medians(connection: Connection, numbers: Sequence[int], table_sha256: str) -
     for number, value in connection.execute(query):
         by_campaign.setdefault(number, []).append(value)
     return {number: median(values) for number, values in by_campaign.items()}
+
+
+def measured_sensors(connection: Connection, numbers: Sequence[int], table_sha256: str) -> dict[int, tuple[int, int]]:
+    """Of how many sensors d33 is kept, and how many the skin has, by those campaigns of which any is kept."""
+    counted = (
+        select(sensor_d33.c.campaign, func.count().label("measured"))
+        .join(campaigns, campaigns.c.number == sensor_d33.c.campaign)
+        .join(derived, inversions.fresh(table_sha256))
+        .where(campaigns.c.number.in_(numbers))
+        .group_by(sensor_d33.c.campaign)
+        .subquery()
+    )
+    query = select(counted, campaigns.c.about).join(campaigns, campaigns.c.number == counted.c.campaign)
+    return {row.campaign: (row.measured, len(row.about["skin"]["sensors"])) for row in connection.execute(query)}
 
 
 def of_array(answer: Mapping[str, Any] | None) -> float | None:

@@ -39,7 +39,7 @@ skins = Table(
     Column("joined_to", String, ForeignKey("skins.id")),
     Column("joined_at", String),
     Column("join_reason", Text),
-    Column("joined_from", Text),  # name of the API key
+    Column("joined_from", Text),  # name of the API key, else as typed on a page
     Column("title", Text),  # what the lab calls it, beside its id
     Column("remark", Text),
     Column("tags", Text),  # with commas between them
@@ -90,7 +90,7 @@ campaigns = Table(
     Column("corrected_by", String),  # id of the campaign that replaces this one
     Column("withdrawn_at", String),
     Column("withdraw_reason", Text),
-    Column("withdrawn_from", Text),  # name of the API key
+    Column("withdrawn_from", Text),  # name of the API key, else as typed on a page
     Column("remark", Text),
     Column("tags", Text),  # with commas between them
     Column("discarded_at", String),  # in no list from then on; withdrawn as well
@@ -108,7 +108,7 @@ recordings = Table(
     Column("recorded_at", String),
     Column("excluded_at", String),
     Column("exclude_reason", Text),
-    Column("excluded_from", Text),  # name of the API key
+    Column("excluded_from", Text),  # name of the API key, else as typed on a page
     Column("scalars", JSON, nullable=False),  # the recording's document without its arrays
     Column("arrays", LargeBinary, nullable=False),  # service/store/codec.py; last, so that lists never read it
     UniqueConstraint("campaign", "id", name="recording_of_campaign"),
@@ -125,7 +125,7 @@ changes = Table(
     Column("campaign_id", String),  # null for a change of the skin itself
     Column("recording", Text),
     Column("at", String, nullable=False),
-    Column("made_from", Text),  # name of the API key
+    Column("made_from", Text),  # name of the API key, else as typed on a page
     Column("reason", Text),
     Column("before", JSON, nullable=False),  # columns by name
     Column("after", JSON, nullable=False),
@@ -249,7 +249,7 @@ models = Table(
     Column("adopted_at", String, nullable=False),
     Column("adopted_from", Text),  # name of the API key
     Column("withdrawn_at", String),
-    Column("withdrawn_from", Text),  # name of the API key
+    Column("withdrawn_from", Text),  # name of the API key, else as typed on a page
     Column("withdraw_reason", Text),
     UniqueConstraint("skin_id", "version", name="version_of_skin"),
 )

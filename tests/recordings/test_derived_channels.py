@@ -43,24 +43,29 @@ def test_a_constant_may_come_from_the_file() -> None:
 
 
 @pytest.mark.parametrize(
-    ("trim", "kept"),
+    ("trim", "kept", "said"),
     [
-        ({"first_sample": 11, "last_sample": 390}, slice(10, 390)),
-        ({"first_sample": 3}, slice(2, None)),
-        ({"last_sample": 1000}, slice(None)),
+        ({"first_sample": 11, "last_sample": 390}, slice(10, 390), "of each curve, samples 11 to 390 are used"),
+        ({"first_sample": 3}, slice(2, None), "of each curve, samples from 3 on are used"),
+        (
+            {"last_sample": 1000},
+            slice(None),
+            "samples 1 to 400 are used: the curve ends there, before the last sample that was said, 1000",
+        ),
     ],
 )
-def test_samples_outside_the_trim_are_left_out(trim: dict[str, int], kept: slice) -> None:
+def test_samples_outside_the_trim_are_left_out(trim: dict[str, int], kept: slice, said: str) -> None:
     reading = read(text_of_raw_curve(), trim=trim)
     curve = curve_of(reading)
     np.testing.assert_allclose(curve.displacement_mm, (DEPTH_MM - 1e-6 * OFFSET_NM)[kept], atol=1e-9)
-    assert any(warning.startswith("of each curve, samples") for warning in reading.warnings)
+    assert said in reading.warnings
 
 
 def test_each_curve_of_a_file_is_trimmed() -> None:
     one = text_of_raw_curve()
     rows = one.partition("\n")[2]
-    reading = read(one + "\n\n" + rows, curves="groups", trim={"first_sample": 101})
+    reading = read(one + "\n\n" + rows, curves="groups", trim={"first_sample": 101, "last_sample": 401})
+    assert "2 of 2 curves end before that, the shortest at sample 400" in "".join(reading.warnings)
     forces = [curve.force_n for curve in reading.campaign.recordings if isinstance(curve, IndentationRecording)]
     assert [len(force) for force in forces] == [len(FORCE_N) - 100] * 2
 

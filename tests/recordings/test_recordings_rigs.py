@@ -1,5 +1,6 @@
 """Rig descriptions: what they refuse, what they convert."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,15 @@ def test_units_and_sensitivities_are_applied() -> None:
     assert recording.force_n == pytest.approx([0, 0.25, 0.25])  # 2.5 V over 0.01 V/mN is 250 mN
     assert recording.recorded_at == "2017-05-03T09:00:00Z"
     assert recording.id == "a"
+
+
+def test_a_time_that_the_file_states_is_in_the_lab_s_zone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
+    rig_of_file = parsed(SMALL.replace("2017-05-03T09:00:00Z", "{property: Date}"))
+    for written in ("03.05.2026 14:30", "2026-05-03 14:30", "2026-05-03T12:30Z"):
+        reading = read_file(f"# Date: {written}\ndepth;load\n0;0\n100;2,5\n200;3".encode(), "a.csv", rig_of_file)
+        (recorded,) = [one.recorded_at for one in reading.campaign.recordings]
+        assert datetime.fromisoformat(recorded or "") == datetime(2026, 5, 3, 12, 30, tzinfo=UTC)
 
 
 def test_the_instruments_own_give_is_subtracted() -> None:

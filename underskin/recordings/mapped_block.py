@@ -14,6 +14,7 @@ from underskin.recordings.curve_signs import falling
 from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
+from underskin.recordings.sampling import even_rate, mean_step
 from underskin.recordings.shown_values import shown
 from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats, readable_unit
@@ -21,7 +22,6 @@ from underskin.units import LAB, Floats, readable_unit
 _DEGREES = {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": math.degrees(1), "radians": math.degrees(1)}
 _PERCENT = 100.0
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
-_SAMPLING_JITTER = 0.01  # of a sample: more is not evenly sampled
 
 
 class MappedBlock:
@@ -261,12 +261,10 @@ class MappedBlock:
         return {"dynamic_force_n": amplitude}
 
     def _rate(self, time: Floats) -> float:
-        with np.errstate(all="ignore"):
-            step = (time[-1] - time[0]) / max(len(time) - 1, 1)
-            jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
-        if not (step > 0 and jitter <= _SAMPLING_JITTER * step):
-            raise self._error("time_s", f"samples are not evenly spaced (step {shown(step)} s)")
-        return float(1 / step)
+        rate = even_rate(time)
+        if rate is None:
+            raise self._error("time_s", f"samples are not evenly spaced (step {shown(mean_step(time))} s)")
+        return rate
 
     def _error(self, place: str, reason: str | Requirement) -> FileError:
         return FileError(self.file, place, reason)

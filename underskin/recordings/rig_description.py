@@ -174,7 +174,8 @@ def _trim(document: Any) -> Trim | None:
         return None
     trim = field.build(Trim, "trim", document, False)
     if trim.first_sample and trim.last_sample and trim.last_sample <= trim.first_sample:
-        raise conflicting("trim.last_sample", trim.last_sample, f"must be above first_sample, {trim.first_sample}")
+        above = Requirement("must be above ", Mention("trim.first_sample", "first_sample"), f", {trim.first_sample}")
+        raise conflicting("trim.last_sample", trim.last_sample, above)
     return trim
 
 

@@ -39,9 +39,10 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     stem = _printable(PurePath(file).stem)
     recordings = []
     taken: dict[str, str] = {"": contents.layout} if contents.layout else {}
-    parts = [(_trimmed(block, rig.trim, file), of) for block, of in curve_parts(blocks, rig.curves, file)]
+    curves = curve_parts(blocks, rig.curves, file)
+    parts = [(_trimmed(block, rig.trim, file), of) for block, of in curves]
     if rig.trim is not None:
-        warnings.append(f"of each curve, {rig.trim.words} are used")
+        warnings.append(_used(rig.trim, [_samples(block) for block, _ in curves]))
     for number, (block, of) in enumerate(parts, start=1):
         label = _label(stem, _printable(block.name) or str(number)) if len(parts) > 1 else stem
         stated = _stated(contents, block, of)
@@ -85,10 +86,29 @@ def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:
         return block
     start = (trim.first_sample or 1) - 1
     channels = tuple(replace(channel, values=channel.values[start : trim.last_sample]) for channel in block.channels)
-    longest = max((len(channel.values) for channel in block.channels), default=0)
-    if longest <= start:
-        raise FileError(file, "trim.first_sample", f"is {start + 1}; {block.name or 'the curve'} has {longest} samples")
+    if _samples(block) <= start:
+        reason = f"is {start + 1}; {block.name or 'the curve'} has {_samples(block)} samples"
+        raise FileError(file, "trim.first_sample", reason)
     return replace(block, channels=channels, group_starts=())
+
+
+def _used(trim: Trim, samples: Sequence[int]) -> str:
+    """Which samples are used of curves that have so many each."""
+    last = trim.last_sample
+    short = [count for count in samples if last is not None and count < last]
+    if not short:
+        return f"of each curve, {trim.words} are used"
+    if len(samples) == 1:
+        used = replace(trim, last_sample=short[0]).words
+        return f"{used} are used: the curve ends there, before the last sample that was said, {last}"
+    ends = f"{len(short)} of {len(samples)} curves end before that, the shortest at sample {min(short)}"
+    return (
+        f"of each curve, {trim.words} are used; {ends}, and of these all samples from {trim.first_sample or 1} on are"
+    )
+
+
+def _samples(block: Block) -> int:
+    return max((len(channel.values) for channel in block.channels), default=0)
 
 
 def _channel_names(rig: RigDescription) -> Sequence[str]:

@@ -6,11 +6,13 @@ from typing import Any
 from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.channel_mapping import Property
 from underskin.recordings.readers import text
+from underskin.recordings.readers.calendar_times import with_zone
 from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
+from underskin.recordings.time_zone import time_zone
 from underskin.units import LAB
 
 Stated = Mapping[str, str | float]
-_TEXTS = ("id", "sensor", "recorded_at")
+_TEXTS = ("id", "sensor")
 _STIFFNESS = "force/length"
 
 
@@ -19,6 +21,8 @@ def common_value(name: str, value: Any | Property, stated: Stated, file: str) ->
     if not isinstance(value, Property):
         return value
     given = _said(value, stated, file)
+    if name == "recorded_at":
+        return _in_zone(given)
     number = _number(given)
     if number is None or name in _TEXTS:
         return given
@@ -26,6 +30,15 @@ def common_value(name: str, value: Any | Property, stated: Stated, file: str) ->
         return number
     label = labelled_unit(value.property)
     return number * factor(label, name, file, f"property {value.property!r}") if label else number
+
+
+def _in_zone(given: str | float) -> str | float:
+    """A time that an instrument wrote, in the lab's zone where it states none; what is no time as it is, to be
+    refused."""
+    try:
+        return with_zone(str(given), time_zone())
+    except ValueError:
+        return given
 
 
 def spring_constant(value: float | Property, stated: Stated, file: str) -> float:

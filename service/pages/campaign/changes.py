@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.dependencies import WRITE, CampaignId, Store, Table, sender
 from service.pages.campaign.page import shown
-from service.pages.shared.forms import Form, annotated, attempted, reason, see
+from service.pages.shared.forms import Form, annotated, attempted, reason, see, signed
 from service.store import Database, annotations, campaigns
 from service.usecases import annotations as written
 from service.usecases.campaigns import exclude as exclude_recording
@@ -34,7 +34,7 @@ def exclude(request: Request, campaign_id: CampaignId, sent: Form, store: Store,
     """Leave a recording out of all figures."""
 
     def do() -> None:
-        exclude_recording(store, table, campaign_id, sent.get("recording", ""), reason(sent), sender(request))
+        exclude_recording(store, table, campaign_id, sent.get("recording", ""), reason(sent), signed(request, sent))
 
     return _done(request, campaign_id, store, table, "exclude", sent, do)
 
@@ -44,7 +44,7 @@ def withdraw(request: Request, campaign_id: CampaignId, sent: Form, store: Store
     """Leave the campaign out of all figures."""
 
     def do() -> None:
-        store.write(campaigns.withdraw, campaign_id, reason(sent), sender(request))
+        store.write(campaigns.withdraw, campaign_id, reason(sent), signed(request, sent))
 
     return _done(request, campaign_id, store, table, "withdraw", sent, do)
 
@@ -54,7 +54,7 @@ def discard(request: Request, campaign_id: CampaignId, sent: Form, store: Store,
     """Put a trial into no list any more."""
 
     def do() -> None:
-        store.write(annotations.discard_campaign, campaign_id, reason(sent), sender(request))
+        store.write(annotations.discard_campaign, campaign_id, reason(sent), signed(request, sent))
 
     return _done(request, campaign_id, store, table, "discard", sent, do)
 

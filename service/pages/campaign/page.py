@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from service.dependencies import CampaignId, Store, Table
 from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
+from service.pages.shared.conditions import condition_columns
 from service.pages.shared.figures import csv_answer, csv_of_rows
 from service.pages.shared.forms import RefusedForm, in_form_words, number
 from service.pages.shared.html import page
@@ -94,6 +95,7 @@ def shown(
         answer=answer,
         described=row.about["skin"],
         recordings=recordings,
+        conditions=condition_columns(entry.scalars.get("conditions") for entry in recordings),
         first=first if first < len(recordings) else 0,
         most_listed=_MOST_LISTED,
         most_offered=_MOST_OFFERED,

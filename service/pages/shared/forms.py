@@ -12,6 +12,7 @@ from fastapi import Depends, Request
 from fastapi.responses import RedirectResponse
 
 from service.auth import session
+from service.dependencies import sender
 from service.problems import Refusal
 from service.store import Conflict, Missing
 from service.usecases import annotations
@@ -30,6 +31,7 @@ from underskin.recordings.readers import text
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 UNLIKELY = "or tick “These values are right, unusual as they are”"
 _LARGEST_BYTES = 100_000
+_LONGEST_NAME = 100  # characters
 _MOST_FIELDS = 500  # a file of many channels has a row of fields for each
 _WITH_UNIT = re.compile(r"(\S*\d)\s*[^\W\d_].*")
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
@@ -42,6 +44,7 @@ _LABELS = {
     "remark": "Notes",
     "tags": "Tags",
     "reason": "Reason",
+    "who": "Your name",
     "skin_id": "Id of the other skin",
 }  # of forms that change what is kept
 
@@ -78,6 +81,17 @@ def reason(sent: dict[str, str]) -> str:
     if not 0 < len(why) <= 1000:
         raise out_of_range("reason", why[:80], "must say why in 1 to 1000 characters")
     return why
+
+
+def signed(request: Request, sent: Mapping[str, str]) -> str | None:
+    """Who sent a form: the name of the API key or, without one, the name that was typed; None where there is neither.
+    Raises InvalidInput."""
+    typed = sent.get("who", "").strip()
+    if request.scope["key"] is not None or not typed:
+        return sender(request)
+    if len(typed) > _LONGEST_NAME or not typed.isprintable():
+        raise out_of_range("who", typed[:80], f"must be a name of up to {_LONGEST_NAME} characters, in one line")
+    return typed
 
 
 def annotated(sent: Mapping[str, str]) -> dict[str, str | None]:

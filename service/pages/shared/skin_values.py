@@ -51,13 +51,14 @@ def start(
             return dict(PROTOTYPE), ["The skin has no campaign in use: all values are those of the paper's prototype"]
         recordings = campaigns.recordings_of(connection, latest.number)
         measured = overview.medians(connection, [latest.number], table.sha256).get(latest.number)
+        sensors = overview.measured_sensors(connection, [latest.number], table.sha256).get(latest.number, (0, 0))
     described = latest.about["skin"]
     known = {name: float(described[name]) for name in PROTOTYPE if described.get(name) is not None}
     known |= _pressed([entry.scalars for entry in recordings if "preload_n" in entry.scalars])
     known |= _pitch(described["sensors"])
     taken = []
     if "d33_pc_per_n" not in known and measured is not None and measured > 0:
-        known["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured)
+        known["d33_pc_per_n"], sentence = _measured_d33(store, table, root, latest, measured, sensors)
         taken += [f"{sentence}; the skin declares none"] if "d33_pc_per_n" in words else []
     lacking = [name for name in words if name in PROTOTYPE and name not in known]
     sentence = ", ".join(f"{words[name][0]} {PROTOTYPE[name]:g} {words[name][1]}".strip() for name in lacking)
@@ -66,14 +67,19 @@ def start(
     return {**PROTOTYPE, **known}, taken
 
 
-def _measured_d33(store: Database, table: SigmaTable, root: str, row: AnyRow, by_paper: float) -> tuple[float, str]:
+def _measured_d33(
+    store: Database, table: SigmaTable, root: str, row: AnyRow, by_paper: float, sensors: tuple[int, int]
+) -> tuple[float, str]:
     """d33 [pC/N] of the campaign `row` to four digits, by the skin's adopted model where one is in force and gives it,
     else by the paper's, of the array or, where it has none, `by_paper`, the median over the sensors; and in a sentence
-    whose it is, and whether it may be quoted."""
+    whose it is, and whether it may be quoted. `sensors`: of how many the campaign tells d33, and how many the skin has.
+    """
     array = overview.of_array(d33_cache.answer(store, table, row, None))
     by_paper = by_paper if array is None else array
+    measured, all_sensors = sensors
+    part = f", from {measured} of {all_sensors} sensors" if measured < all_sensors else ""
     whose = "the median of the sensors" if array is None else "that of the array"
-    paper = f"d33 {by_paper:.4g} pC/N is {whose} in {row.name[:60]}, by the paper's model"
+    paper = f"d33 {by_paper:.4g} pC/N is {whose} in {row.name[:60]}{part}, by the paper's model"
     with store.reading() as connection:
         model = models.in_force(connection, root)
         if model is None:
@@ -84,7 +90,9 @@ def _measured_d33(store: Database, table: SigmaTable, root: str, row: AnyRow, by
     if by_model is None:
         why = lacking or "it gives none of this campaign"
         return float(f"{by_paper:.4g}"), f"{paper}; the skin's adopted model is in force, but {why.rstrip('.')}"
-    sentence = f"d33 {by_model:.4g} pC/N is that of {row.name[:60]} by the skin's adopted model"
+    sentence = (
+        f"d33 {by_model:.4g} pC/N is that of {row.name[:60]}{part}{',' if part else ''} by the skin's adopted model"
+    )
     quoted = "" if adopted.quotable else ", and not to be quoted yet"
     return float(f"{by_model:.4g}"), f"{sentence} (by the paper's {by_paper:.4g}){quoted}"
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 
 from service.dependencies import WRITE, RunnerInUse, SkinId, Store, Table, sender
-from service.pages.shared.forms import OWN_FORM, Form, annotated, attempted, reason, see
+from service.pages.shared.forms import OWN_FORM, Form, annotated, attempted, reason, see, signed
 from service.pages.skin.page import shown
 from service.problems import parsed
 from service.schemas.diagnoses import AskForSkin
@@ -36,7 +36,7 @@ def withdraw_model(request: Request, skin_id: SkinId, sent: Form, store: Store, 
     """Has no model in force."""
 
     def do() -> None:
-        _of_root(store, skin_id, models.withdraw, reason(sent), sender(request))
+        _of_root(store, skin_id, models.withdraw, reason(sent), signed(request, sent))
 
     return _done(request, skin_id, store, table, "model", sent, do)
 
@@ -47,7 +47,7 @@ def join(request: Request, skin_id: SkinId, sent: Form, store: Store, table: Tab
 
     def do() -> None:
         asked = parsed(Join, {"skin_id": sent.get("other", "").strip(), "reason": reason(sent)})
-        usecase.join(store, skin_id, asked.skin_id, asked.reason, sender(request))
+        usecase.join(store, skin_id, asked.skin_id, asked.reason, signed(request, sent))
 
     return _done(request, skin_id, store, table, "join", sent, do)
 
@@ -68,7 +68,7 @@ def discard(request: Request, skin_id: SkinId, sent: Form, store: Store, table: 
     """Put a skin that holds nothing in use into no list any more."""
 
     def do() -> None:
-        _of_root(store, skin_id, annotations.discard, reason(sent), sender(request))
+        _of_root(store, skin_id, annotations.discard, reason(sent), signed(request, sent))
 
     return _done(request, skin_id, store, table, "discard", sent, do)
 

@@ -56,5 +56,7 @@ def drawn_map(
     about = (
         f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
+    sensors = len(row.about["skin"]["sensors"])
+    about += f"It tells of {len(rows)} of the {sensors} sensors. " if len(rows) < sensors else ""
     about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(values, uncertainties, quantity)} {CLICK}"
     return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")

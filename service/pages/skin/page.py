@@ -91,6 +91,7 @@ def shown(
         is_latest = last is None or campaigns.latest(connection, root) == last
         numbers = [row.number for row in rows]
         medians = overview.medians(connection, numbers, table.sha256)
+        measured = overview.measured_sensors(connection, numbers, table.sha256)
         diagnosed = overview.latest_diagnoses(connection, numbers if last is None else [*numbers, last.number])
         about = skins.find(connection, root)
         changed = changes.of_skin(connection, root)
@@ -137,6 +138,7 @@ def shown(
             (row, campaigns.state(row), medians.get(row.number), verdict_of.get(row.number))
             for row in rows[:_ON_A_PAGE]
         ],
+        measured=measured,
         diagnosed_together=list(of_several.values()),
         may_be_together=may_be_together,
         following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,

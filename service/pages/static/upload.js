@@ -65,6 +65,15 @@ if (kind) {
   fit();
 }
 
+// What was changed in the mapping and not read yet is not kept.
+function changed() {
+  const keep = document.querySelector("form.keep .actions button:not(.second)");
+  if (!keep || keep.disabled) return;
+  keep.disabled = true;
+  document.getElementById("keep-why-not").hidden = false;
+}
+document.querySelector("#mapping form")?.addEventListener("input", changed);
+
 // Of a value that is typed or stated by the file, what was done last counts.
 for (const entry of document.querySelectorAll(".either")) {
   const [typed, from] = [entry.querySelector("input"), entry.querySelector("select[name$='-from']")];
@@ -88,6 +97,7 @@ addEventListener("drawn", ({ target: plot }) => {
     fields[0].value = Math.max(1, Math.ceil(first));
     fields[1].value = Math.max(2, Math.floor(last));
     document.getElementById("mapping").open = true;
+    changed();
     document.querySelector("[data-brushed]").textContent =
       `Samples ${fields[0].value} to ${fields[1].value} are filled in below: read it with these settings.`;
   });

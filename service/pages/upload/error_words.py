@@ -3,10 +3,11 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from service.ingest.field_words import CHANNELS, RECORDING, SKIN
 from service.pages.shared.forms import UNLIKELY, worded
 from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary
-from service.pages.upload.mapping import CHANNELS, CHOICES, RATE, RECORDING, SKIN
+from service.pages.upload.mapping import CHOICES, RATE
 from underskin.errors import ErrorCode
 
 _WORDS = {

@@ -1,21 +1,27 @@
 """What was understood of an uploaded file: its channels, its recordings, what is wrong."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from service.ingest.reading import InspectedFile, checked
 from service.ingest.uploads import Upload
+from service.store.codec import recorded_at
 from underskin import InvalidInput
-from underskin.recordings.campaign import CompressionRecording, FrfRecording, Recording
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording
 from underskin.recordings.channels import Channel, Contents
+from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.sampling import even_rate
 from underskin.units import to_lab
 
 MOST_LISTED = 60
 _MOST_CHANNELS = 60
 _MOST_PROPERTIES = 40
+MOST_SENSORS = 300  # listed of a skin
+_MOST_SKINS = 2
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,8 @@ class RecordingSummary:
     pressed_by: str
     points: int
     frf_pc_per_n: float | None
+    recorded_at: str | None = None
+    conditions: Mapping[str, float | str] | None = None  # what the lab noted by names of its own
 
 
 @dataclass(frozen=True)
@@ -55,11 +63,14 @@ class FileSummary:
     notes: Sequence[str]
     campaigns: Sequence[str]  # their names
     skin: str | None
+    described: Sequence[SkinDescription] = ()  # different ones, of its campaigns; of each the first sensors
     known: Sequence[str] = ()  # what to know before it is kept
     day: str | None = None  # of the first recording that has a time
     instrument: str | None = None  # that wrote it, as `instruments.recognised` has it
     parts: int = 0
     sample_rate_hz: float | None = None
+    rate_from: str | None = None  # the channel of times that the sample rate follows from; None where it is stated
+    began: str | None = None  # when, as the first part says itself
     channels: Sequence[ChannelSummary] = ()
     properties: Mapping[str, str | float] = field(default_factory=dict)
     taken: Mapping[str, str] = field(default_factory=dict)  # by field, in words; under none how a text was read
@@ -85,6 +96,7 @@ def seen(upload: Upload, look: InspectedFile, known: Sequence[str]) -> FileSumma
         errors=[error for one in arrived if not one.refused for error in one.errors],
         notes=[note for one in arrived for note in one.notes],
         campaigns=[campaign.name for campaign in campaigns],
+        described=_described(campaigns),
         skin=next(iter(skins)) if len(skins) == 1 else None,
         known=known,
         instrument=next(iter(written_by), None),
@@ -106,6 +118,16 @@ def listed(look: InspectedFile, first: int) -> list[RecordingSummary]:
     return [_recording(recording) for recording in recordings[first : first + MOST_LISTED]]
 
 
+def _described(campaigns: Sequence[Campaign]) -> list[SkinDescription]:
+    """The first of the skins that campaigns describe, each once, whatever it is called."""
+    different: list[SkinDescription] = []
+    for campaign in campaigns:
+        skin = replace(campaign.skin, id=None, sensors=campaign.skin.sensors[:MOST_SENSORS])
+        if skin not in different and len(different) < _MOST_SKINS:
+            different.append(skin)
+    return different
+
+
 def _about(contents: Contents) -> dict[str, Any]:
     by_name: dict[str, list[Channel]] = {}
     for block in contents.blocks:
@@ -114,10 +136,23 @@ def _about(contents: Contents) -> dict[str, Any]:
                 by_name.setdefault(channel.name, []).append(channel)
     return {
         "parts": len(contents.blocks),
-        "sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None,
+        **_rate(contents),
+        "began": contents.blocks[0].recorded_at if contents.blocks else None,
         "channels": [_channel(parts) for parts in by_name.values()],
         "properties": _properties(contents),
     }
+
+
+def _rate(contents: Contents) -> dict[str, Any]:
+    """The sample rate that the first part states, or else that of its channel of times."""
+    if not contents.blocks or contents.blocks[0].sample_rate_hz is not None:
+        return {"sample_rate_hz": contents.blocks[0].sample_rate_hz if contents.blocks else None}
+    for channel in contents.blocks[0].channels:
+        known = unit(channel.unit)
+        if known is not None and known.dimension == "time" and len(channel.values) > 1:
+            rate = even_rate(channel.values.real)
+            return {"sample_rate_hz": rate and rate / known.to_si, "rate_from": channel.name}
+    return {}
 
 
 def _channel(parts: Sequence[Channel]) -> ChannelSummary:
@@ -150,6 +185,11 @@ def _range(values: Any) -> list[float]:
 
 
 def _recording(recording: Recording) -> RecordingSummary:
+    """What it is, and when and under which conditions it was recorded."""
+    return replace(_measured(recording), recorded_at=recorded_at(recording), conditions=recording.conditions)
+
+
+def _measured(recording: Recording) -> RecordingSummary:
     if isinstance(recording, CompressionRecording):
         size = f"{recording.sample_height_mm:g} mm high, {recording.sample_diameter_mm:g} mm across"
         return RecordingSummary(recording.id, recording.kind, None, size, len(recording.force_n), None)

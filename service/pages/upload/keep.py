@@ -28,7 +28,7 @@ SKIN_FIELD, CORRECTS = "skin", "corrects"
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
     """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
     with pending.lock:
-        if pending.kept_at is not None:
+        if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
             return []
         together = sent.get("together", "").strip() if sent.get("as") == "one" else None
         pending.skin = sent.get(SKIN_FIELD, "").strip() or None

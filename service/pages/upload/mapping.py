@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from typing import Any
 
+from service.ingest.field_words import CHANNELS, RECORDING, SKIN
 from service.ingest.reading import InspectedFile
 from service.pages.shared.forms import number_or_text
-from service.pages.upload import spring_mapping, workbench
+from service.pages.upload import recorded_time, spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
@@ -14,45 +15,10 @@ from underskin.recordings.readers.unit_labels import lab_field, unit
 from underskin.recordings.rig_description import MAGNITUDE, PHASE, SCHEMA, RigDescription, channel_fields
 from underskin.recordings.rig_mapping import MappedFile
 
-KINDS = {
-    "frf": "FRF: charge against a shaken force",
-    "indentation": "indentation: force against depth",
-    "compression": "compression of a sample of the elastomer",
-}
-# Field, words, unit, and the kinds that have it.
-SKIN = (
-    ("thickness_mm", "thickness h", "mm"),
-    ("youngs_modulus_mpa", "Young's modulus E", "MPa"),
-    ("poisson_ratio", "Poisson's ratio ν", ""),
-    ("sensor_radius_mm", "sensor radius rT", "mm"),
-)
-RECORDING = (
-    ("sensor", "sensor that was pressed", "", ("frf", "indentation")),
-    ("indenter_radius_mm", "sphere radius R", "mm", ("frf", "indentation")),
-    ("preload_n", "preload F", "N", ("frf",)),
-    ("dynamic_force_n", "dynamic force, peak", "N", ("frf",)),
-    ("sample_rate_hz", "sample rate, if the file does not say", "Hz", ("frf",)),
-    ("stage_stiffness_n_per_mm", "spring's stiffness, if a formula subtracts it", "N/mm", ("indentation",)),
-    ("sample_height_mm", "sample's height", "mm", ("compression",)),
-    ("sample_diameter_mm", "sample's diameter", "mm", ("compression",)),
-)
-CHANNELS = {
-    "force_n": "force",
-    "charge_pc": "charge",
-    "displacement_mm": "displacement",
-    "time_s": "time",
-    "frequency_hz": "frequency",
-    "frf_re_pc_per_n": "FRF, real part",
-    "frf_im_pc_per_n": "FRF, imaginary part",
-    "frf_pc_per_n": "FRF, complex numbers",
-    "frf_magnitude_pc_per_n": "FRF, magnitude",
-    "frf_phase_deg": "FRF, phase",
-    "coherence": "coherence γ²",
-}  # what a channel can be, of one kind or another
 CHOICES = {**CHANNELS, spring_mapping.DEFLECTION: "deflection of the spring"}  # of the form
 RATE = "sample_rate_hz"
 _RATES = ("fs", "sample_rate", "sampling_rate", "samplerate", "sampling_frequency")  # as files call it
-_TEXTS = ("sensor",)
+_TEXTS = ("sensor", recorded_time.FIELD)
 _SEPARATORS = (";", "\t", ",", None)  # of a line of the layout, as tried; None: blanks
 _PARTS = 3  # of it: name, x, y
 _BY_DIMENSION = {
@@ -84,9 +50,10 @@ _OF_SPRINGS = ("deflection", "piezo", "cantilever")  # as instruments that press
 
 
 def guessed(
-    channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any]
+    channels: Sequence[ChannelSummary], properties: Mapping[str, Any], skin: Mapping[str, Any], *, dated: bool = False
 ) -> dict[str, Any]:
-    """A first rig description by units and names of channels and properties; `skin`: what is known of it."""
+    """A first rig description by units and names of channels and properties; `skin`: what is known of it; `dated`:
+    whether each part of the file says itself when it was recorded."""
     kind, fields = _likely(channels)
     channels_by_field: dict[str, Any] = {}
     for one, field in zip(channels, fields, strict=True):
@@ -97,7 +64,7 @@ def guessed(
         "schema": SCHEMA,
         "kind": kind,
         "skin": {"poisson_ratio": 0.5, **known_skin},
-        "recording": _stated(properties, kind),
+        "recording": _stated(properties, kind, dated=dated),
         "channels": spring_mapping.guessed(channels_by_field, channels, properties)
         if kind == "indentation"
         else channels_by_field,
@@ -141,13 +108,16 @@ def _likely(channels: Sequence[ChannelSummary]) -> tuple[str, list[str]]:
     return kind, fields
 
 
-def _stated(properties: Mapping[str, Any], kind: str) -> dict[str, Any]:
+def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[str, Any]:
     """The recording's fields that the file itself states under their own names."""
     wanted = [name for name, _, _, kinds in RECORDING if kind in kinds]
     named = {field: one for one in properties for field in (one, *(lab_field(one) or ())[:1])}
     rate = next((one for one in properties if one.lower().replace(" ", "_") in _RATES), None)
     if rate is not None:
         named[RATE] = rate
+    when = None if dated else recorded_time.stated(properties)
+    named = {name: known_as for name, known_as in named.items() if name != recorded_time.FIELD}
+    named |= {} if when is None else {recorded_time.FIELD: when}
     return {name: {"property": named[name]} for name in wanted if name in named}
 
 
@@ -163,6 +133,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document["skin"] = _replaced(base.get("skin", {}), {name: number_or_text(form.get(name, "")) for name, *_ in SKIN})
     document["skin"] = _replaced(document["skin"], {"sensors": sensors})
     values = {name: _said(form, name) if kind in kinds else None for name, _, _, kinds in RECORDING}
+    mistimed = _in_zone(values)
     document["recording"] = _replaced(base.get("recording", {}), values)
     travel = {"travel": ""} if "travel" in form and "displacement_mm" in workbench.derived_fields(form) else {}
     channels, unsaid = spring_mapping.with_spring(
@@ -180,7 +151,7 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    return document, [*strange, *twice, *unsaid, *workbench.named_twice(form, CHANNELS)]
+    return document, [*strange, *twice, *unsaid, *mistimed, *workbench.named_twice(form, CHANNELS)]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:
@@ -201,6 +172,18 @@ def _said(form: Mapping[str, str], name: str) -> Any:
     if not text and form.get(f"{name}-from"):
         return {"property": form[f"{name}-from"]}
     return (text or None) if name in _TEXTS else number_or_text(text)
+
+
+def _in_zone(values: dict[str, Any]) -> list[InvalidInput]:
+    """Puts a time that was typed into the lab's time zone; what is wrong with it, which is kept to be put right."""
+    typed = values[recorded_time.FIELD]
+    if not isinstance(typed, str):
+        return []
+    try:
+        values[recorded_time.FIELD] = recorded_time.said(typed)
+    except InvalidInput as error:
+        return [error]
+    return []
 
 
 def _sensors(layout: str) -> tuple[list[dict[str, Any]] | None, list[InvalidInput]]:
@@ -261,7 +244,8 @@ def _channel(form: Mapping[str, str], number: int, base: Mapping[str, Any]) -> d
 def rig_of(summary: FileSummary, rig: RigDescription | None) -> RigDescription | None:
     """The rig description in use or, without one, as the form guesses it; None where that cannot be."""
     try:
-        return rig or rig_description.from_dict(guessed(summary.channels, summary.properties, {}))
+        guess = guessed(summary.channels, summary.properties, {}, dated=summary.began is not None)
+        return rig or rig_description.from_dict(guess)
     except InvalidInput:
         return None
 

@@ -3,34 +3,34 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-import orjson
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
-from service.ingest import skin_imports
+from service.ingest import field_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
 from service.ingest.uploads import received
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_answer
+from service.pages.shared.conditions import condition_columns
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
 from service.pages.upload import (
     error_words,
     exported_skin,
     file_summary,
+    recorded_time,
     similar_errors,
     spring_mapping,
     templates,
     workbench,
 )
 from service.pages.upload import mapping as mappings
-from service.pages.upload.figures import lines_columns, trace_columns
 from service.pages.upload.file_summary import MOST_LISTED, listed
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
 from service.pages.upload.looking import channels_of, draw, is_unsaid, look_at_all, looked, used_twice
+from service.pages.upload.of_session import Pending
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Database, Missing, campaigns, skins
 from service.usecases import d33_cache
@@ -47,15 +47,6 @@ _MOST_SKINS = 200  # that the form offers
 _MOST_NAMED = 5  # files in the request that does the same
 
 
-def _pending(request: Request, upload_id: str) -> PendingUpload:
-    """The upload of an address; raises Missing where it is not the session's own."""
-    pending_uploads: PendingUploads = request.app.state.pending_uploads
-    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
-
-
-Pending = Annotated[PendingUpload, Depends(_pending)]
-
-
 @router.get("")
 def form(
     request: Request,
@@ -70,10 +61,12 @@ def form(
 def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     pending_uploads: PendingUploads = request.app.state.pending_uploads
+    cookie = session.cookie_in(dict(request.scope["headers"]))
     return page(
         request,
         "upload.html",
-        waiting=pending_uploads.waiting(session.cookie_in(dict(request.scope["headers"]))),
+        waiting=pending_uploads.waiting(cookie),
+        discarded=pending_uploads.discarded(cookie),
         status=200 if error is None else 422,
         error=error,
         skin=skin,
@@ -114,7 +107,7 @@ async def send(request: Request, store: Store) -> Response:
             async with READING_SLOTS:
                 await run_in_threadpool(look_at_all, request, pending)
     except BaseException:
-        pending_uploads.discard(pending)
+        pending_uploads.remove(pending)
         raise
     return see(f"/upload/{pending.id}")
 
@@ -139,7 +132,8 @@ def understood(
     about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = channels_of(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
-    document = stated or mappings.guessed(channels, pending.seen[file].properties, about)
+    seen = pending.seen[file]
+    document = stated or mappings.guessed(channels, seen.properties, about, dated=seen.began is not None)
     return page(
         request,
         "understood.html",
@@ -153,8 +147,10 @@ def understood(
         refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not is_unsaid(pending, one)),
         unsaid=is_unsaid(pending, pending.seen[file]),
         recordings=recordings,
+        conditions=condition_columns(one.conditions for one in recordings),
         first=first,
         most_listed=MOST_LISTED,
+        most_sensors=file_summary.MOST_SENSORS,
         apart=len({one.day for one in pending.seen if one.day is not None}) > 1,
         known=known,
         skin=pending.skin or pending.seen[file].skin or "",
@@ -165,9 +161,11 @@ def understood(
         layout=mappings.sensors_text(document),
         mapping=mappings,
         error_words=error_words,
+        field_words=field_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         spring=spring_mapping,
         workbench=workbench,
+        recorded_time=recorded_time,
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
@@ -253,34 +251,6 @@ async def bring_in(request: Request, pending: Pending, store: Store) -> Response
         store.require_hope()
         await run_in_threadpool(exported_skin.bring_in, request, store, pending)
     return see(pending.kept_at or f"/upload/{pending.id}")
-
-
-@router.post("/{upload_id}/discard", dependencies=[*WRITE, OWN_FORM])
-def discard(request: Request, pending: Pending) -> Response:
-    """Removes it."""
-    request.app.state.pending_uploads.discard(pending)
-    return see("/upload")
-
-
-@router.get("/{upload_id}/rig.json")
-def rig_json(pending: Pending) -> Response:
-    """The rig description in use."""
-    if pending.rig is None:
-        raise Missing("There is no rig description yet.")
-    content = orjson.dumps(pending.rig.document, option=orjson.OPT_INDENT_2)
-    return attachment("rig.json", content, "application/json")
-
-
-@router.get("/{upload_id}/{file}/traces.csv")
-def traces_csv(request: Request, pending: Pending, file: int) -> Response:
-    """The channels of a file's first part."""
-    return csv_answer("traces", trace_columns(looked(request, pending, file)))
-
-
-@router.get("/{upload_id}/{file}/frf.csv")
-def frf_csv(request: Request, pending: Pending, file: int) -> Response:
-    """The FRFs of a file."""
-    return csv_answer("frf", lines_columns(looked(request, pending, file)))
 
 
 def _latest(store: Database, skin: str | None) -> Mapping[str, Any]:

@@ -1,7 +1,7 @@
 """Uploads that were read and not stored yet: each in a folder of its own, of one session, for an hour.
 
 They lie in the server's folder of uploads, which is removed with the server. A session has a few at a time, and all
-together take at most the room of one upload; the oldest are removed first.
+together take at most the room of one upload; those that were discarded are removed first, then the oldest.
 """
 
 import hashlib
@@ -68,7 +68,13 @@ class PendingUpload:
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of what was kept
+    discarded: bool = False  # it can be taken back while it is here
     lock: threading.Lock = field(default_factory=threading.Lock)
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the form holds what cannot be used, so that what was read is not what it says."""
+        return self.draft is not None
 
     @property
     def is_depth_composed(self) -> bool:
@@ -101,7 +107,7 @@ class PendingUploads:
         self._held: dict[str, PendingUpload] = {}
 
     def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
-        """Take over the files of an upload; of a session that has too many the oldest goes."""
+        """Take over the files of an upload; of a session that has too many the oldest goes, a discarded one first."""
         name = secrets.token_urlsafe(16)
         folder = self._folder / f"shelf-{name}"
         folder.mkdir()
@@ -130,6 +136,13 @@ class PendingUploads:
 
     def waiting(self, cookie: str) -> list[PendingUpload]:
         """The session's own that were neither kept nor discarded, the one used last first."""
+        return [held for held in self._not_kept(cookie) if not held.discarded]
+
+    def discarded(self, cookie: str) -> list[PendingUpload]:
+        """The session's own that were discarded and can be taken back, the one used last first."""
+        return [held for held in self._not_kept(cookie) if held.discarded]
+
+    def _not_kept(self, cookie: str) -> list[PendingUpload]:
         with self._lock:
             self._sweep(0)
             return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
@@ -139,18 +152,18 @@ class PendingUploads:
         shutil.rmtree(pending.folder, ignore_errors=True)
         pending.size = 0
 
-    def discard(self, pending: PendingUpload) -> None:
+    def remove(self, pending: PendingUpload) -> None:
         """Remove it whole."""
         with self._lock:
             self._remove(pending)
 
     def _of_session(self, session: str) -> list[PendingUpload]:
         own = [held for held in self._held.values() if held.session == session]
-        return sorted(own, key=lambda held: held.used, reverse=True)
+        return sorted(own, key=_worth, reverse=True)
 
     def _sweep(self, coming: int) -> None:
-        """Remove what is too old, and the oldest until there is room."""
-        by_age = sorted(self._held.values(), key=lambda held: held.used)
+        """Remove what is too old, and what was discarded, then the oldest, until there is room."""
+        by_age = sorted(self._held.values(), key=_worth)
         total = coming + sum(held.size for held in by_age)
         for held in by_age:
             too_old = time.monotonic() - held.used > LASTS_S
@@ -161,6 +174,11 @@ class PendingUploads:
     def _remove(self, held: PendingUpload) -> None:
         self._held.pop(held.id, None)
         shutil.rmtree(held.folder, ignore_errors=True)
+
+
+def _worth(held: PendingUpload) -> tuple[bool, float]:
+    """In this order uploads make room for others."""
+    return not held.discarded, held.used
 
 
 def _digest(cookie: str) -> str:

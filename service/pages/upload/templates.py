@@ -6,10 +6,10 @@ from typing import Any
 
 import orjson
 
+from service.ingest.field_words import SKIN
 from service.ingest.instruments import template_of, with_skin
 from service.pages.upload import workbench
 from service.pages.upload.file_summary import FileSummary
-from service.pages.upload.mapping import SKIN
 from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.store import AnyRow, Database, Missing, instrument_templates
 from underskin.recordings import rig_description

@@ -46,15 +46,20 @@ def test_a_file_is_told_by_its_content(server: Server) -> None:
 
 
 def test_a_rig_description_is_kept_with_the_skin_and_used_again(server: Server) -> None:
-    form = [("rig", ("bench.yaml", RIG)), ("file", ("cut.csv", CSV))]
+    dated = RIG.replace("2.5}", "2.5, recorded_at: 2026-05-03T12:30:00Z}")
+    form = [("rig", ("bench.yaml", dated)), ("file", ("cut.csv", CSV))]
     first = server.http.post("/v1/campaigns?skin=gel", files=form)
     assert first.status_code == 201, first.text
+    kept = server.http.get(f"/v1/campaigns/{first.json()['campaigns'][0]['id']}").json()
+    assert kept["recorded_at"].startswith("2026-05-03T12:30")
+    assert "force: 'Load (N)', in the unit of its label" in kept["notes"]
     assert server.http.get("/v1/skins/gel").json()["rig"]["channels"]["force_n"]["channel"] == "Load (N)"
     second = server.http.post("/v1/campaigns?skin=gel", files=[("file", ("next.csv", CSV))])
     assert second.status_code == 201, second.text
     name = second.json()["campaigns"][0]["id"]
     (recording,) = server.http.get(f"/v1/campaigns/{name}/document").json()["recordings"]
     assert (recording["kind"], recording["force_n"]) == ("indentation", [0.0, 0.5, 1.4, 2.6])
+    assert "recorded_at" not in recording  # which was typed of the first file
     assert server.http.post("/v1/campaigns", files=[("file", ("next.csv", CSV))]).status_code == 422
 
 

@@ -43,8 +43,8 @@ def test_an_adopted_model_heads_its_skin_and_the_start(reader: Visit, idle: Serv
     assert "By the paper's model. Not to be quoted yet, by the latest diagnosis: " in page.locator("main").inner_text()
     array = d33(idle, campaign_id, "paper")["array"]["d33_pc_per_n"]
     reader.go("/")
-    told = page.get_by_role("row", name="palm-a").locator(".trend").inner_text().replace("\xa0", " ")
-    assert f"array {array:#.4g} pC/N by the paper's model" in told
+    listed = page.get_by_role("row", name="palm-a").locator(".trend").inner_text().replace("\xa0", " ")
+    assert f"array {array:#.4g} pC/N by the paper's model" in listed
     reader.go(f"/diagnoses/{diagnosis_id}")
     stays = page.locator("#adopt ~ p").all_inner_texts()[1]
     assert "until another diagnosis of the skin is adopted, or until it is withdrawn" in stays

@@ -29,7 +29,7 @@ def posted(client: httpx.Client, name: str = "by hand") -> str:
     return answer.headers["location"]
 
 
-def test_kept_twice_is_kept_once_and_what_is_discarded_is_gone(sender: httpx.Client, server: Server) -> None:
+def test_kept_twice_is_kept_once_and_what_is_discarded_can_be_taken_back(sender: httpx.Client, server: Server) -> None:
     place = posted(sender, "twice")
     form = {"form_token": token_of(sender.get(place).text), "skin": "twice"}
     first, second = (sender.post(f"{place}/keep", data=form) for _ in range(2))
@@ -38,9 +38,14 @@ def test_kept_twice_is_kept_once_and_what_is_discarded_is_gone(sender: httpx.Cli
     assert sender.get(place).headers["location"] == first.headers["location"]
     place = posted(sender, "discarded")
     assert sender.post(f"{place}/discard", data=form).status_code == 303
-    assert sender.get(place).status_code == 404
+    for answer in (sender.get(place), sender.post(f"{place}/keep", data=form)):
+        assert answer.status_code == 404
+        assert "can be taken back" in answer.text
     assert campaigns_of(server, "discarded") == []
-    assert list((server.place.folder / "uploads").rglob(f"shelf-{Path(place).name}/*")) == []
+    assert f'action="{place}/restore"' in sender.get("/upload").text
+    assert sender.post(f"{place}/restore", data=form).headers["location"] == place
+    assert sender.get(place).status_code == 200
+    assert f'action="{place}/restore"' not in sender.get("/upload").text
 
 
 def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) -> None:
@@ -48,7 +53,7 @@ def test_an_upload_is_its_session_s_own(sender: httpx.Client, server: Server) ->
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other:
         form = {"form_token": token_of(other.get("/upload").text), "skin": "stolen"}
         assert other.get(place).status_code == 404
-        for path in ("keep", "discard", "mapping"):
+        for path in ("keep", "discard", "restore", "mapping"):
             assert other.post(f"{place}/{path}", data=form).status_code == 404
         assert other.get(f"{place}/0/frf.csv").status_code == 404
     rows = list(csv.DictReader(sender.get(f"{place}/0/frf.csv").text.splitlines()))
@@ -65,7 +70,7 @@ def test_an_upload_needs_the_session_s_own_form(sender: httpx.Client) -> None:
     assert sender.post("/upload", data={"form_token": token}, files=files, headers=other_site).status_code == 403
     assert sender.post("/upload", data={"form_token": token}).status_code in (415, 422)  # no file
     place = posted(sender)
-    for path in ("keep", "discard", "mapping"):
+    for path in ("keep", "discard", "restore", "mapping"):
         assert sender.post(f"{place}/{path}", data={"form_token": "x"}).status_code == 403
 
 
@@ -122,3 +127,7 @@ def test_the_shelf_holds_no_more_than_one_upload_may(tmp_path: Path) -> None:
     with pytest.raises(Missing):
         pending_uploads.find("one", first.id)
     assert pending_uploads.waiting("one") == [*reversed(more), again]
+    more[-1].discarded = True
+    last = pending_uploads.put("one", [upload(arriving, 1)])
+    assert pending_uploads.waiting("one") == [last, *reversed(more[:-1]), again]  # what was discarded goes first
+    assert pending_uploads.discarded("one") == []

@@ -6,11 +6,11 @@ from typing import Any
 import pytest
 import yaml
 
+from service.ingest.field_words import CHANNELS, KINDS
+from service.pages.upload import recorded_time
 from service.pages.upload.error_words import field_of, field_words, what_came, what_to_do
 from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import (
-    CHANNELS,
-    KINDS,
     document_of,
     guessed,
     passed_over,
@@ -152,6 +152,30 @@ def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:
     assert document_of(form, {})[0]["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
     same = {**form, "label-0": "N"}
     assert document_of(same, {})[0]["channels"]["force_n"] == {"channel": "F"}
+
+
+def test_a_time_is_typed_in_the_lab_s_zone_and_shown_as_it_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
+    for typed in ("2026-05-03 14:30", "3.5.2026 14:30", "2026-05-03T12:30Z"):
+        found, wrong = document_of({"recorded_at": typed}, {})
+        assert wrong == []
+        assert recorded_time.shown(found["recording"]["recorded_at"]) == "2026-05-03 14:30"
+    assert found["recording"]["recorded_at"] == "2026-05-03T12:30:00+00:00"
+    found, (wrong_time,) = document_of({"recorded_at": "May"}, {})
+    assert (wrong_time.field, recorded_time.shown(found["recording"]["recorded_at"])) == (
+        "recording.recorded_at",
+        "May",
+    )
+    (ambiguous,) = document_of({"recorded_at": "3/5/2026"}, {})[1]
+    assert "can be two days" in ambiguous.allowed
+
+
+def test_a_file_that_states_its_time_is_taken_at_its_word() -> None:
+    channels = [channel("force", "N"), channel("charge", "pC")]
+    for name, value in (("Date/Time", "03.05.2026 14:30"), ("recorded_at", "2026-05-03T14:30")):
+        assert guessed(channels, {name: value}, {})["recording"] == {"recorded_at": {"property": name}}
+    assert guessed(channels, {"Date": "2026-05-03"}, {}, dated=True)["recording"] == {}
+    assert guessed(channels, {"Date": "Monday", "recorded_at": "noon"}, {})["recording"] == {}
 
 
 def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:

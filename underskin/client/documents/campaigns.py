@@ -79,7 +79,7 @@ class RecordingEntry(Document):
     """Why it was excluded."""
 
     excluded_from: str | None
-    """Name of the API key that excluded it."""
+    """Name of the API key that excluded it, or, without one, the name that was typed on a page, if any."""
 
     scalars: Mapping[str, Any]
     """Its fields that are single values, as in campaign/1."""
@@ -166,7 +166,7 @@ class CampaignDetail(Document):
     """Why."""
 
     withdrawn_from: str | None
-    """Name of the API key that withdrew it."""
+    """Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."""
 
     discarded_at: str | None
     """When it was put away as a mere trial, UTC; lists leave it out."""
@@ -240,7 +240,7 @@ class CampaignEntry(Document):
     """Why."""
 
     withdrawn_from: str | None
-    """Name of the API key that withdrew it."""
+    """Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."""
 
     discarded_at: str | None
     """When it was put away as a mere trial, UTC; lists leave it out."""

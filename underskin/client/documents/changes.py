@@ -33,7 +33,7 @@ class Change(Document):
     """When, UTC."""
 
     made_from: str | None
-    """Name of the API key that made it."""
+    """Name of the API key that made it, or, without one, the name that was typed on a page, if any."""
 
     reason: str | None
     """Why, where it was given."""

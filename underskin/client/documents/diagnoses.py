@@ -183,7 +183,7 @@ class ModelEntry(Document):
     """When it was withdrawn, UTC; null where it was not."""
 
     withdrawn_from: str | None
-    """Name of the API key that withdrew it."""
+    """Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."""
 
     withdraw_reason: str | None
     """Why."""
@@ -242,7 +242,7 @@ class ModelVersion(Document):
     """When it was withdrawn, UTC; null where it was not."""
 
     withdrawn_from: str | None
-    """Name of the API key that withdrew it."""
+    """Name of the API key that withdrew it, or, without one, the name that was typed on a page, if any."""
 
     withdraw_reason: str | None
     """Why."""

@@ -33,6 +33,15 @@ def iso_time(cell: str, zone: tzinfo) -> str:
         raise ValueError(f"is no date and time: {error}") from None
 
 
+def with_zone(text: str, zone: tzinfo) -> str:
+    """A date, or a date and time, as ISO 8601 writes it or as above, with its zone: `zone` where it states none.
+
+    Raises ValueError where it is none of these.
+    """
+    moment = datetime.fromisoformat(iso_time(text.strip(), zone))
+    return (moment if moment.tzinfo is not None else moment.replace(tzinfo=zone)).isoformat()
+
+
 def of_two_cells(day: str, clock: str) -> str:
     """A date, also one that begins an ISO time, and a time of day in cells of their own, as `iso_time` reads them; an
     ISO time beside which there is no other time of day as it is."""

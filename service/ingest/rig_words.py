@@ -1,0 +1,71 @@
+"""What a rig description says, in sentences that are kept with the campaigns that were read by it."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from service.ingest.field_words import CHANNELS, RECORDING
+from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, Property, SignalMapping
+from underskin.recordings.rig_description import RigDescription
+
+_SIGNS = {-1: "turned round", AUTOMATIC: "turned round where it falls as it is pressed"}
+_CURVES = {"file": "a curve is the whole file", "groups": "a curve is each group of rows"}
+
+
+def said_of(rig: RigDescription) -> list[str]:
+    """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
+    said. Of formulas, tare and trim the reading's own notes tell."""
+    channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
+    words = {field: (words, unit) for field, words, unit, _ in RECORDING}
+    values = [f"{_value(*words.get(field, (field, '')), value)}" for field, value in rig.recording.items()]
+    recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
+    checked = ["unusual magnitudes were said to be right"] if rig.units_checked else []
+    return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]
+
+
+def _instrument(document: Mapping[str, Any]) -> list[str]:
+    return [f"instrument: {document['name']}"] if document.get("name") else []
+
+
+def _channel(rig: RigDescription, mapping: ChannelMapping) -> str:
+    """`'Load cell', in V, through 2.25 V/N, turned round`."""
+    how = _signal(rig, mapping)
+    constant = mapping.spring_constant_n_per_m
+    if constant is not None:
+        how += f", a deflection, times {_of_file(constant) if isinstance(constant, Property) else f'{constant:g} N/m'}"
+    if mapping.deflection is not None:
+        how += f", less the deflection {_signal(rig, mapping.deflection)}"
+    if mapping.stiffness_n_per_mm is not None:
+        how += f", less the force over {mapping.stiffness_n_per_mm:g} N/mm"
+    return how
+
+
+def _signal(rig: RigDescription, mapping: SignalMapping) -> str:
+    formula = rig.derived.get(mapping.channel)
+    parts = [f"{mapping.channel!r}{f' = {formula.text}' if formula is not None else ''}"]
+    if formula is None or mapping.unit is not None:
+        parts.append(f"in {mapping.unit}" if mapping.unit is not None else "in the unit of its label")
+    if mapping.labelled is not None:
+        parts.append(f"labelled {mapping.labelled!r}, which is wrong")
+    if mapping.sensitivity is not None:
+        parts.append(f"through {mapping.sensitivity:g} {mapping.sensitivity_unit}")
+    if mapping.sign in _SIGNS:
+        parts.append(_SIGNS[mapping.sign])
+    return ", ".join(parts)
+
+
+def _value(words: str, unit: str, value: Any) -> str:
+    if isinstance(value, Property):
+        return f"{words} {_of_file(value)}"
+    return f"{words} {value:g} {unit}".rstrip() if isinstance(value, float | int) else f"{words} {value}"
+
+
+def _of_file(value: Property) -> str:
+    return f"from {value.property!r} of the file"
+
+
+def _curve(rig: RigDescription) -> list[str]:
+    if rig.curves is None or isinstance(rig.curves, str):
+        return [_CURVES[rig.curves]] if rig.curves is not None else []
+    if rig.curves.channel is not None:
+        return [f"a curve is each run of rows with one value in {rig.curves.channel!r}"]
+    return [f"a curve ends where {rig.curves.segments!r} falls"]

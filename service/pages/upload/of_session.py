@@ -1,0 +1,28 @@
+"""The upload that an address names, as routes are given it: the session's own."""
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from service.auth import session
+from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
+from service.store import Missing
+
+
+def _found(request: Request, upload_id: str) -> PendingUpload:
+    """The upload of an address; raises Missing where it is not the session's own."""
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
+    return pending_uploads.find(session.cookie_in(dict(request.scope["headers"])), upload_id)
+
+
+Found = Annotated[PendingUpload, Depends(_found)]
+
+
+def _pending(found: Found) -> PendingUpload:
+    """The same, which was not discarded; raises Missing where it was."""
+    if found.discarded:
+        raise Missing("This upload was discarded. For an hour it can be taken back on the page “Upload”.")
+    return found
+
+
+Pending = Annotated[PendingUpload, Depends(_pending)]

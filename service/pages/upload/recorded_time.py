@@ -1,0 +1,58 @@
+"""When recordings were made, as the form of an upload says it: in the lab's time zone, unless a zone is typed."""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from underskin.errors import InvalidInput, wrong_type
+from underskin.recordings.readers.calendar_times import with_zone
+from underskin.recordings.time_zone import time_zone
+
+FIELD = "recorded_at"
+_NAMES = (
+    *("recorded at", "recorded", "measured at", "acquired at", "date and time", "date/time", "datetime"),
+    *("timestamp", "start time", "date"),
+)  # of a file's properties, in lower case, the surest first
+
+
+def zone() -> str:
+    """The name of the lab's time zone."""
+    return str(time_zone())
+
+
+def said(typed: str) -> str:
+    """A time that somebody typed, as ISO 8601 with its zone; raises InvalidInput."""
+    try:
+        return with_zone(typed, time_zone())
+    except ValueError as error:
+        why = f" ({error})" if "two days" in str(error) else ""
+        must = f"must be a date, or a date and time, such as 2026-05-03 14:30{why}"
+        raise wrong_type(f"recording.{FIELD}", typed.strip()[:80], must) from None
+
+
+def shown(value: Any) -> str:
+    """A time of a campaign or a rig description as it is typed here; what is none as it is."""
+    try:
+        moment = datetime.fromisoformat(value)
+    except (TypeError, ValueError):
+        return str(value)
+    in_utc = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)  # as campaigns have it
+    moment = in_utc.astimezone(time_zone()).replace(tzinfo=None)
+    return moment.isoformat(" ", "minutes" if moment.second == moment.microsecond == 0 else "auto")
+
+
+def stated(properties: Mapping[str, Any]) -> str | None:
+    """The property of a file that states when it was recorded; None where there is none that can be used."""
+    by_name = {name.lower().replace("_", " ").strip(): name for name in properties}
+    for name in _NAMES:
+        if name in by_name and _is_time(properties[by_name[name]]):
+            return by_name[name]
+    return None
+
+
+def _is_time(value: Any) -> bool:
+    try:
+        said(str(value))
+    except InvalidInput:
+        return False
+    return True
