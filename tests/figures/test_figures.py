@@ -168,9 +168,16 @@ def test_ten_sensors_of_a_history_have_colours_that_differ() -> None:
     assert apart[~np.eye(10, dtype=bool)].min() > 60
 
 
-def test_a_logarithmic_axis_is_labelled_in_full() -> None:
+@pytest.mark.parametrize(
+    ("peak", "expected"), [(50.0, (None, None)), (90.0, ("log", "D2")), (5000.0, ("log", 1)), (7e11, ("log", 2))]
+)
+def test_a_logarithmic_axis_is_labelled_in_full_and_spans_a_decade(
+    peak: float, expected: tuple[str | None, object]
+) -> None:
     frequency = np.geomspace(5, 800, 30)
-    magnitude = np.where(frequency > 200, 50.0, 7.0)
+    magnitude = np.where(frequency > 200, peak, 7.0)
     line = FrfLines("r1", frequency, magnitude, np.zeros(30), np.full(30, np.nan))
-    axis = frf_recordings([line], None).layout.yaxis
-    assert (axis.type, axis.tickformat, axis.dtick) == ("log", "~g", None)
+    layout = frf_recordings([line], None).layout
+    assert (layout.yaxis.type, layout.yaxis.dtick) == expected
+    assert layout.yaxis.tickformat == (None if peak == 50 else "~g")
+    assert (layout.xaxis.dtick, layout.xaxis.tickformat) == ("D2", "~g")
