@@ -16,6 +16,7 @@ from service.pages.array.description import (
     charge_figure,
     described,
     findings,
+    finite_strain,
     tried,
 )
 from service.pages.shared import same_request
@@ -54,7 +55,8 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         loads=loads,
         error=error,
         answer=answer,
-        findings=findings(answer, lines),
+        findings=[] if answer is None else [*findings(answer, lines), *_beyond_reach(document, answer, lines)],
+        strained=finite_strain(answer),
         figures=[] if answer is None else [_figure(request, document, answer), *_on_base(request, document)],
         spheres=[] if answer is None else _spheres(document, lines),
         same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
@@ -120,6 +122,18 @@ def _grid(places: Sequence[float], document: Mapping[str, Any]) -> Floats:
     """Places along an axis, from a margin before the first to one behind the last."""
     margin = document["sensor_radius_mm"] + document["thickness_mm"]
     return np.linspace(min(places) - margin, max(places) + margin, _POINTS)
+
+
+def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Sequence[int]) -> list[tuple[str, str]]:
+    """Of each load that no sensor feels where it is, and how far off the nearest one lies."""
+    sensors = np.array([(one["x_mm"], one["y_mm"]) for one in document["sensors"]])
+    said = []
+    for line, load, radius in zip(lines, document["contacts"], answer.contact_radius_mm.tolist(), strict=True):
+        away = float(np.hypot(*(sensors - (load["x_mm"], load["y_mm"])).T).min())
+        if away - radius > answer.reach_mm:
+            told = f"it lies {away:.4g} mm from the nearest sensor and adds nothing"
+            said.append((f"load in line {line}", f"{told}: sensors feel no further than {answer.reach_mm:.3g} mm."))
+    return said
 
 
 def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:

@@ -115,7 +115,7 @@ def _in_lines(names: Sequence[str]) -> str:
 def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points) -> go.Figure:
     """Measured less the model to which nothing is added, over the located axes; the region outlined.
 
-    A cell is the mean over the points in it; out of phase where the misfit lies in the phase: the title says which. What
+    A cell is the mean over the points in it; out of phase where the misfit lies in the phase, as the title says. What
     is within the noise is pale: that of what is stated, since the model alone takes its misfit for noise. `meta` of the
     layout has what 95 % of it stays in [%].
     """
