@@ -41,7 +41,9 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
-_HEADS = {"position_mm": "place x, y [mm]"}
+_HEADS = {
+    "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
+}  # fmt: skip
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
@@ -176,11 +178,11 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     """The fields of `RigLimits` that the form gives; raises InvalidInput."""
     limits: dict[str, Any] = {}
-    ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
-    if all(ends):
-        limits["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
-    elif any(ends):
+    ends = tuple(number(name, given[name]) for name in (_LOWEST, _HIGHEST) if given.get(name, "").strip())
+    if len(ends) == 1:
         raise required("preload_n", "give both, or leave both empty")
+    if ends:
+        limits["preload_n"] = ends
     for name in _SEVERAL:
         values = numbers(name, given.get(name, ""))
         if len(values) > _MOST_VALUES:
