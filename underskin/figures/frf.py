@@ -29,7 +29,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
     traces: list[PlotlyTrace] = []
     for number, spread in enumerate(spreads):
         colour, look = _look(spread, spreads)
-        name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
+        name = f"R {spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
         low, middle, high = spread.magnitude_pc_per_n
         band = {
             "type": "scatter",

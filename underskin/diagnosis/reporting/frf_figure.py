@@ -209,7 +209,7 @@ def _menu(
 
 
 def _label(one: ShownFrf, both: bool) -> str:
-    where = f"{one.sensor}, {one.indenter_radius_mm:.3g} mm, {one.preload_n:.3g} N"
+    where = f"{one.sensor}, R {one.indenter_radius_mm:.3g} mm, {one.preload_n:.3g} N"
     lines = "" if len(one.frequency_hz) == one.count else f"; {len(one.frequency_hz)} of {one.count} lines"
     before = f"{_percent(one.left_before)} before, " if both else ""
     return f"{one.name} ({where}): misfit {before}{_percent(one.left_after)}{' after' if both else ''}{lines}"
