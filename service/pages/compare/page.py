@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 from service.dependencies import Store, Table
 from service.pages.compare import curves
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, sensors_of
+from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, file_name, sensors_of
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
@@ -125,13 +125,22 @@ def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: 
     """Young's modulus of each curve of both campaigns."""
     both = [store.read(campaigns.find, one) for one in (first, second)]
     rows = curves.rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
-    return csv_of_rows("moduli", curves.COLUMNS, rows)
+    return csv_of_rows(_file(both, "moduli"), curves.COLUMNS, rows)
 
 
 @router.get("/difference.csv")
 def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Response:
     """d33 of each sensor in both campaigns, and the second less the first."""
-    return csv_of_rows("difference", _COLUMNS, _rows([_answer(store, table, one) for one in (first, second)]))
+    both = [store.read(campaigns.find, one) for one in (first, second)]
+    rows = _rows([d33_cache.answer(store, table, row, None) for row in both])
+    return csv_of_rows(_file(both, "difference"), _COLUMNS, rows)
+
+
+def _file(both: Sequence[AnyRow], what: str) -> str:
+    """The name of a file of two campaigns, without its ending; of one skin it names that once."""
+    ids = dict.fromkeys(row.skin_id for row in both)
+    names = [row.name for row in both] if len(ids) == 1 else [f"{row.skin_id}-{row.name}" for row in both]
+    return file_name(*(ids if len(ids) == 1 else ()), *names, what)
 
 
 def _answer(store: Database, table: SigmaTable, campaign_id: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_of_rows
+from service.pages.shared.figures import attachment, csv_of_rows, file_name
 from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
@@ -101,7 +101,8 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
     told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
     counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
     joined = [own | count for own, count in zip(told, counts, strict=True)]
-    return csv_of_rows("plan", [*names, "repeats", "arrived"], joined)
+    row, name = _diagnosed(store, diagnosis_id)
+    return csv_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
 
 
 @router.get("/{number}/rig.yaml")
