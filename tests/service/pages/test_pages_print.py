@@ -131,9 +131,11 @@ def with_numbers(made: Made) -> Made:
 
 def require_apart(boxes: Sequence[FloatRect | None], along: Literal["x", "y"]) -> None:
     """None of the texts runs into the next, but for the air above and below its digits."""
-    length = "width" if along == "x" else "height"
-    air = 0.5 if along == "x" else 2.0
-    ends = sorted((box[along], box[along] + box[length]) for box in boxes if box is not None)
+    known = [box for box in boxes if box is not None]
+    if along == "x":
+        air, ends = 0.5, sorted((box["x"], box["x"] + box["width"]) for box in known)
+    else:
+        air, ends = 2.0, sorted((box["y"], box["y"] + box["height"]) for box in known)
     assert len(ends) > 1
     assert all(one[1] <= following[0] + air for one, following in pairwise(ends)), ends
 
