@@ -132,6 +132,8 @@ def charge_figure(
     about = f"Each sensor where it lies, coloured by its charge. {disc_size(x, y, radius_mm)}"
     if (np.abs(charge) <= error).any():
         about += " Grey: the charge is 0 within its ±."
+    if np.isnan(charge).any():
+        about += " White: no load is within reach."
     return drawn("charge", figure, about, numbers)
 
 
