@@ -88,6 +88,18 @@ def test_a_signed_charge_has_zero_in_the_middle_of_its_colours() -> None:
     assert green
 
 
+def test_charges_of_one_sign_are_coloured_from_0_and_are_grey_within_their_error_alone() -> None:
+    figure = loaded_array(SENSORS[:4], X[:4], Y[:4], [5.0, 0.0006, 0.0002, -0.001], [0.006, *[0.0003] * 3], [])
+    (charge,) = [trace for trace in figure.data if trace.name == "charge"]
+    (grey,) = [trace for trace in figure.data if trace.name == "0 within its ±"]
+    assert (charge.marker.cmin, charge.marker.cmax) == (-0.001, 5.0)  # too little below 0 for colours to tell it apart
+    assert list(grey.ids) == ["s02"]
+    assert [fill == GREY for fill in fills(figure)] == [False, False, True, False]
+    assert "within its ±: 0.0003 to 0.0009" in charge.customdata[1]
+    drawn_in = loaded_array(SENSORS[:2], X[:2], Y[:2], [-5.0, -2.0], [0.01] * 2, []).data[0].marker
+    assert (drawn_in.cmin, drawn_in.cmax) == (-5.0, 0.0)
+
+
 def test_an_uncertainty_is_coloured_from_0_and_an_unknown_value_is_white() -> None:
     values = np.full(64, 0.2)
     values[5] = np.nan

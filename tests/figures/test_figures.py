@@ -24,14 +24,14 @@ def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
     frf = np.array([6.0, 6.2, 7.0, 6.9, 6.1])
     figure = frf_versus_preload(("a", "b", "c", "d", "e"), radius, preload, frf, 0.1 * frf, frf + 0.05)
     points = {trace.name: trace for trace in figure.data}
-    assert set(points) == {"4 mm, measured", "4 mm, model", "10 mm, measured", "10 mm, model"}
-    assert sorted(points["4 mm, measured"].y) == [6.0, 6.1, 6.2]
-    assert list(points["4 mm, model"].x) == [0.5, 1.0]
-    assert points["4 mm, measured"].marker.symbol != points["10 mm, measured"].marker.symbol
-    assert points["4 mm, measured"].marker.color != points["10 mm, measured"].marker.color
-    assert {points[f"{size} mm, model"].line.dash for size in (4, 10)} == {PAPER}
-    assert points["4 mm, model"].line.color == points["4 mm, measured"].marker.color
-    np.testing.assert_allclose(points["4 mm, measured"].error_y.array, 1.96 * 0.1 * points["4 mm, measured"].y)
+    assert set(points) == {"R 4 mm, measured", "R 4 mm, model", "R 10 mm, measured", "R 10 mm, model"}
+    assert sorted(points["R 4 mm, measured"].y) == [6.0, 6.1, 6.2]
+    assert list(points["R 4 mm, model"].x) == [0.5, 1.0]
+    assert points["R 4 mm, measured"].marker.symbol != points["R 10 mm, measured"].marker.symbol
+    assert points["R 4 mm, measured"].marker.color != points["R 10 mm, measured"].marker.color
+    assert {points[f"R {size} mm, model"].line.dash for size in (4, 10)} == {PAPER}
+    assert points["R 4 mm, model"].line.color == points["R 4 mm, measured"].marker.color
+    np.testing.assert_allclose(points["R 4 mm, measured"].error_y.array, 1.96 * 0.1 * points["R 4 mm, measured"].y)
 
 
 def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
@@ -168,9 +168,16 @@ def test_ten_sensors_of_a_history_have_colours_that_differ() -> None:
     assert apart[~np.eye(10, dtype=bool)].min() > 60
 
 
-def test_a_logarithmic_axis_is_labelled_in_full() -> None:
+@pytest.mark.parametrize(
+    ("peak", "expected"), [(50.0, (None, None)), (90.0, ("log", "D2")), (5000.0, ("log", 1)), (7e11, ("log", 2))]
+)
+def test_a_logarithmic_axis_is_labelled_in_full_and_spans_a_decade(
+    peak: float, expected: tuple[str | None, object]
+) -> None:
     frequency = np.geomspace(5, 800, 30)
-    magnitude = np.where(frequency > 200, 50.0, 7.0)
+    magnitude = np.where(frequency > 200, peak, 7.0)
     line = FrfLines("r1", frequency, magnitude, np.zeros(30), np.full(30, np.nan))
-    axis = frf_recordings([line], None).layout.yaxis
-    assert (axis.type, axis.tickformat, axis.dtick) == ("log", "~g", None)
+    layout = frf_recordings([line], None).layout
+    assert (layout.yaxis.type, layout.yaxis.dtick) == expected
+    assert layout.yaxis.tickformat == (None if peak == 50 else "~g")
+    assert (layout.xaxis.dtick, layout.xaxis.tickformat) == ("D2", "~g")

@@ -45,9 +45,9 @@ def frf_versus_preload(
             y=frf[chosen],
             error_y={"type": "data", "array": SDS_OF_95 * uncertainty[chosen], "thickness": 1},
             mode="markers",
-            name=f"{size:.3g} mm, measured",
+            name=f"R {size:.3g} mm, measured",
             text=[label(recordings[row]) for row in np.flatnonzero(chosen).tolist()],
-            hovertemplate=f"%{{text}}<br>sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} "
+            hovertemplate=f"%{{text}}<br>sphere of radius {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} "
             "± %{error_y.array:.2g} pC/N (95 %)<extra></extra>",
             marker={"color": colour, "symbol": marker, "size": 8, "opacity": 0.7},
         )
@@ -56,8 +56,8 @@ def frf_versus_preload(
             x=at,
             y=model[chosen][first],
             mode="lines",
-            name=f"{size:.3g} mm, model",
-            hovertemplate=f"model, sphere {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} pC/N<extra></extra>",
+            name=f"R {size:.3g} mm, model",
+            hovertemplate=f"model, sphere of radius {size:g} mm, %{{x:.3g}} N<br>FRF %{{y:.5g}} pC/N<extra></extra>",
             line={"color": colour, "dash": PAPER},
         )
     figure.update_xaxes(title="preload [N]", rangemode="tozero")

@@ -19,9 +19,11 @@ _SEEN = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
 _AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
 _ALONE_MM = 1.0  # radius where there is no other
+_FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
+_MIXED = 0.01  # of the largest size, from which on the other sign is told apart by colour
 _DARK = 0.55  # luminance below which an id is written in white
 
 
@@ -30,15 +32,16 @@ class Quantity:
     """What a map shows of each sensor.
 
     `against`: `others` greys what does not differ from the others beyond chance, and the colours reach at least as far
-    as chance does; `zero` the same from 0, with 0 in the middle of the colours; `nothing` colours from 0 upwards, or
-    between `ends`, which several maps may have in common. `differing`: which sensors differ, where a test of its own
-    has told, as that of a trend does. `intervals`: each sensor's own of 95 %; without them 1.96 uncertainties to each
-    side are told.
+    as chance does; `zero` the same from 0, with 0 in the middle of the colours; `bound` greys what is 0 within its
+    uncertainty, which is no standard one but a bound, with 0 in the middle where signs are mixed; `nothing` colours
+    from 0 upwards, or between `ends`, which several maps may have in common. `differing`: which sensors differ, where
+    a test of its own has told, as that of a trend does. `intervals`: each sensor's own of 95 %; without them 1.96
+    uncertainties to each side are told.
     """
 
     name: str
     unit: str
-    against: Literal["others", "zero", "nothing"] = "others"
+    against: Literal["others", "zero", "bound", "nothing"] = "others"
     ends: tuple[float, float] | None = None
     differing: tuple[bool, ...] | None = None
     intervals: tuple[tuple[float | None, float | None], ...] | None = None
@@ -149,9 +152,13 @@ def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity =
 
 
 def _names(quantity: Quantity) -> dict[str, str]:
-    what = "the others" if quantity.against == "others" else "0"
-    alike = "not known" if quantity.against == "nothing" else f"not different from {what}"
-    return {"differs": quantity.name, "alike": alike, "stands out": "stands out"}
+    alike = {
+        "others": "not different from the others",
+        "zero": "not different from 0",
+        "bound": "0 within its ±",
+        "nothing": "not known",
+    }
+    return {"differs": quantity.name, "alike": alike[quantity.against], "stands out": "stands out"}
 
 
 def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
@@ -159,6 +166,8 @@ def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
         return np.isfinite(value)
     if quantity.differing is not None:
         return np.array(quantity.differing, dtype=bool)
+    if quantity.against == "bound":
+        return np.abs(value) > uncertainty
     return (differ_from_others if quantity.against == "others" else differ_from_zero)(value, uncertainty)
 
 
@@ -171,11 +180,20 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
         return _SCALE, 0.0, 1.0
     if quantity.against == "nothing":
         return _SCALE, 0.0, float(known.max()) or 1.0
-    middle = 0.0 if quantity.against == "zero" else float(np.median(known))
+    if quantity.against == "bound" and not _mixed(known):
+        low, high = min(0.0, float(known.min())), max(0.0, float(known.max()))
+        return _SCALE, low, high if high > low else 1.0
+    middle = 0.0 if quantity.against in _FROM_ZERO else float(np.median(known))
     sure = uncertainty[np.isfinite(uncertainty)]
     by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
     reach = max(float(np.abs(known - middle).max()), by_chance) or 1.0
-    return "PuOr_r" if quantity.against == "zero" else _SCALE, middle - reach, middle + reach
+    return "PuOr_r" if quantity.against in _FROM_ZERO else _SCALE, middle - reach, middle + reach
+
+
+def _mixed(known: Floats) -> bool:
+    """Whether values lie on both sides of 0 so far that colours should tell them apart."""
+    least, most = sorted((abs(float(known.min())), abs(float(known.max()))))
+    return bool(known.min() < 0 < known.max()) and least > _MIXED * most
 
 
 def disc_size(x_mm: ArrayLike, y_mm: ArrayLike, sensor_radius_mm: float | None) -> str:
@@ -228,13 +246,13 @@ def _id(name: str) -> str:
 
 
 def _interval(row: int, value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[float, float] | None:
-    """Of 95 %; None where it is not known."""
+    """Of 95 %, or within the bounds; None where it is not known."""
     if quantity.against == "nothing" or not np.isfinite(uncertainty[row]):
         return None
     if quantity.intervals is not None:
         low, high = quantity.intervals[row]
         return None if low is None or high is None else (low, high)
-    half = SDS_OF_95 * uncertainty[row]
+    half = (1.0 if quantity.against == "bound" else SDS_OF_95) * uncertainty[row]
     return value[row] - half, value[row] + half
 
 
@@ -244,7 +262,8 @@ def _told(name: str, reason: str, value: float, interval: tuple[float, float] | 
     if not np.isfinite(value):
         return f"{text}<br>{quantity.name} not known"
     text += f"<br>{quantity.name} {value:.5g} {quantity.unit}"
-    return text if interval is None else f"{text}<br>95 %: {interval[0]:.4g} to {interval[1]:.4g}"
+    of = "within its ±" if quantity.against == "bound" else "95 %"
+    return text if interval is None else f"{text}<br>{of}: {interval[0]:.4g} to {interval[1]:.4g}"
 
 
 def _ink(colour: str) -> str:

@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.figures.style import COLOURS, GRID, INK, MARKERS, styled
+from underskin.figures.style import COLOURS, INK, MARKERS, styled
 from underskin.units import Floats, Mask
 
-_KEPT_OUT = "#aeb9c3"
+# Translucent, so that they recede on white paper and on a dark ground.
+_UNRESOLVED, _KEPT_OUT = "rgba(127,137,147,0.18)", "rgba(127,137,147,0.6)"
+_LEAST_SPAN = 0.05  # of the largest pitch: what differs by less looks alike
 _TICKS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20)
 _BAR = {"title": {"text": "largest pitch [mm]", "side": "top"}, "orientation": "h", "y": -0.5, "thickness": 14}
 
@@ -47,7 +49,7 @@ def design_region(
     figure = go.Figure()
     resolved = np.isfinite(largest_pitch_mm)
     for name, own, colour in (
-        ("cannot resolve it", ~resolved, GRID),
+        ("cannot resolve it", ~resolved, _UNRESOLVED),
         ("resolves it, another limit is missed", resolved & ~feasible, _KEPT_OUT),
         ("meets the demand", feasible, None),
     ):
@@ -70,8 +72,10 @@ def design_region(
 
 
 def _pitches(shown: Floats) -> dict[str, Any]:
-    """From 0, so that pitches that are nearly the same look so."""
-    return {"colorscale": "Cividis", "zmin": 0, "zmax": float(np.max(shown, initial=0.0)) or 1.0, "colorbar": _BAR}
+    """From the smallest to the largest, unless these are nearly the same."""
+    high = float(np.max(shown, initial=0.0)) or 1.0
+    low = min(float(np.min(shown, initial=high)), (1 - _LEAST_SPAN) * high)
+    return {"colorscale": "Cividis", "zmin": low, "zmax": high, "colorbar": _BAR}
 
 
 def _plain(colour: str) -> dict[str, Any]:

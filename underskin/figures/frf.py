@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS
+from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS, decade_ticks
 from underskin.figures.style import ZONE, label, marked, one_of_many, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
@@ -21,7 +21,7 @@ _HEIGHT = 640
 _MOST_IN_LEGEND = 12
 _BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
-_WIDE = 3.0  # largest magnitude over the median, from which on the axis is logarithmic
+_WIDE, _DECADE = 3.0, 10.0  # largest magnitude over median and smallest, from which on the axis is logarithmic
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
@@ -29,7 +29,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
     traces: list[PlotlyTrace] = []
     for number, spread in enumerate(spreads):
         colour, look = _look(spread, spreads)
-        name = f"{spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
+        name = f"R {spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
         low, middle, high = spread.magnitude_pc_per_n
         band = {
             "type": "scatter",
@@ -89,7 +89,10 @@ def _finished(traces: Sequence[PlotlyTrace], zone_hz: tuple[float, float] | None
             text="flat zone", x=np.log10(zone_hz[0]), y=1, yref="y domain", xanchor="left", yanchor="top",
             showarrow=False, font={"size": 12, "color": "#00664b"},
         )  # fmt: skip
-    figure.update_xaxes(type="log", dtick=1)
+    lines_hz = np.concatenate([np.asarray(trace["x"]) for trace in traces]) if traces else np.zeros(0)
+    lines_hz = lines_hz[lines_hz > 0]
+    ticks = decade_ticks(float(lines_hz.min()), float(lines_hz.max())) if len(lines_hz) else 1
+    figure.update_xaxes(type="log", dtick=ticks, **WHOLE_NUMBERS)
     # An axis without a line is not drawn: where no coherence was recorded, phase is the lowest panel.
     lowest = 3 if len(_values(traces, "y3")) else 2
     figure.update_xaxes(title="frequency [Hz]", showticklabels=True, row=lowest, col=1)
@@ -108,8 +111,9 @@ def _magnitude_axis(traces: Sequence[PlotlyTrace]) -> dict[str, Any]:
     """A logarithmic axis where a resonance exceeds the other values by far."""
     values = _values(traces, "y")
     values = values[values > 0]
-    wide = len(values) > 0 and values.max() > _WIDE * np.median(values)
-    return {"type": "log", **WHOLE_NUMBERS} if wide else {"rangemode": "tozero"}
+    if len(values) and values.max() > _WIDE * np.median(values) and values.max() >= _DECADE * values.min():
+        return {"type": "log", "dtick": decade_ticks(float(values.min()), float(values.max())), **WHOLE_NUMBERS}
+    return {"rangemode": "tozero"}
 
 
 def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:

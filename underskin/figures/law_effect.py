@@ -16,7 +16,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, to_lab
 
-RIG = "h 2.5 mm, rT 1.5 mm, E 2 MPa, sphere of 4 mm, preload 1 N, dynamic force 0.3 N, 60 s, 10,000 cycles"
+RIG = "h 2.5 mm, rT 1.5 mm, E 2 MPa, sphere radius 4 mm, preload 1 N, dynamic force 0.3 N, 60 s, 10,000 cycles"
 STRENGTHS = (0.5, 1.0, 2.0)  # times the usual strength
 _WEAKER = (0.25, 0.5, 1.0)  # where twice the usual one cannot be
 _QUOTED_HZ = 30.0

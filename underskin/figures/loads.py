@@ -14,7 +14,7 @@ from underskin.units import Floats
 
 _ROOM = 0.06  # of the map, between a load and its edge
 _TENSION = 0.01  # of the largest compression, below which it is not told apart by colour
-_CHARGE = Quantity("charge", "pC", "zero")
+_CHARGE = Quantity("charge", "pC", "bound")
 
 
 def loaded_array(
@@ -26,8 +26,8 @@ def loaded_array(
     loads_mm: Sequence[tuple[float, float]],
     sensor_radius_mm: float | None = None,
 ) -> go.Figure:
-    """Each sensor coloured by its charge, in its size where `sensor_radius_mm` tells it, with the loads where they have
-    positions.
+    """Each sensor coloured by its charge, grey where that is 0 within its error, in its size where `sensor_radius_mm`
+    tells it, with the loads where they have positions.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """

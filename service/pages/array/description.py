@@ -15,9 +15,13 @@ from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
 from underskin.errors import UnderskinError, out_of_range, wrong_type
+from underskin.findings.codes import Reason
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
+# What finite strain adds by the table of contacts (docs/http-api.md): in percent at the L up to which it is known, and
+# the power of L with which it grows from 0.01 on, where it adds 1.3 %.
+_KNOWN_TO, _ADDED_PERCENT, _GROWTH = 0.1, 3.0, 0.36
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
@@ -78,6 +82,20 @@ def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tupl
     return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
 
 
+def finite_strain(answer: ArrayStress | None) -> str | None:
+    """How much finite strain, which is in neither charge nor error, may add beyond where that is known; None where no
+    load lies there."""
+    for one in [] if answer is None else answer.findings:
+        load = one.arguments.get("load_parameter", 0.0)
+        if one.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_TO:
+            return (
+                f"The ± does not include finite strain. At L = {_KNOWN_TO:g} that adds {_ADDED_PERCENT:g} % to the "
+                f"stress on a sensor beneath the sphere; here L reaches {load:.2g}, where it would add about "
+                f"{_ADDED_PERCENT * (load / _KNOWN_TO) ** _GROWTH:.1g} % if it grew on as it does up to there."
+            )
+    return None
+
+
 def tried(
     request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
 ) -> tuple[dict[str, Any], ArrayStress | None, str | None]:
@@ -111,9 +129,12 @@ def charge_figure(
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))
     figure = loaded_array(answer.sensors, x, y, charge, error, loads_mm, radius_mm)
-    return drawn(
-        "charge", figure, f"Each sensor where it lies, coloured by its charge. {disc_size(x, y, radius_mm)}", numbers
-    )
+    about = f"Each sensor where it lies, coloured by its charge. {disc_size(x, y, radius_mm)}"
+    if (np.abs(charge) <= error).any():
+        about += " Grey: the charge is 0 within its ±."
+    if np.isnan(charge).any():
+        about += " White: no load is within reach."
+    return drawn("charge", figure, about, numbers)
 
 
 def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:

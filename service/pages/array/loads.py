@@ -16,6 +16,7 @@ from service.pages.array.description import (
     charge_figure,
     described,
     findings,
+    finite_strain,
     tried,
 )
 from service.pages.shared import same_request
@@ -54,8 +55,9 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         loads=loads,
         error=error,
         answer=answer,
-        findings=findings(answer, lines),
-        figures=[] if answer is None else [_figure(request, document, answer), *_on_base(request, document)],
+        findings=[] if answer is None else [*findings(answer, lines), *_beyond_reach(document, answer, lines)],
+        strained=finite_strain(answer),
+        figures=[] if answer is None else _figures(request, document, answer),
         spheres=[] if answer is None else _spheres(document, lines),
         same=same_request.post(request, "/v1/stress", document, f"client.stress({document!r})"),
     )
@@ -75,15 +77,19 @@ def charge_csv(
 def base_csv(request: Request, store: Store, table: Table, skin: str | None = None, loads: Loads = _LOADS) -> Response:
     """The normal stress on the base, a row for each point of its grid."""
     document = _document(described(store, table, request.query_params, skin), loads)
-    stress = _base_stress(request, document)
+    felt = _felt(document, answered(request, document))
+    stress = _base_stress(request, {**document, "contacts": felt or document["contacts"]})
     x, y = np.meshgrid(stress.x_mm, stress.y_mm)
     columns = {"x_mm": x, "y_mm": y, "sigma_zz_mpa": stress.sigma_zz_mpa}
     return csv_answer("base", {name: column.ravel().tolist() for name, column in columns.items()})
 
 
-def _figure(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> Drawn:
-    places = [(load["x_mm"], load["y_mm"]) for load in document["contacts"]]
-    return charge_figure(answer, places, document["sensor_radius_mm"], f"/loads/charge.csv{_query(request)}")
+def _figures(request: Request, document: Mapping[str, Any], answer: ArrayStress) -> list[Drawn]:
+    """Charge and stress under the loads that a sensor feels: others would make a map of nothing wide."""
+    felt = _felt(document, answer)
+    places = [(load["x_mm"], load["y_mm"]) for load in felt]
+    charge = charge_figure(answer, places, document["sensor_radius_mm"], f"/loads/charge.csv{_query(request)}")
+    return [charge, *(_on_base(request, {**document, "contacts": felt}) if felt else [])]
 
 
 def _query(request: Request) -> str:
@@ -120,6 +126,28 @@ def _grid(places: Sequence[float], document: Mapping[str, Any]) -> Floats:
     """Places along an axis, from a margin before the first to one behind the last."""
     margin = document["sensor_radius_mm"] + document["thickness_mm"]
     return np.linspace(min(places) - margin, max(places) + margin, _POINTS)
+
+
+def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Sequence[int]) -> list[tuple[str, str]]:
+    """Of each load that no sensor feels where it is, and how far off the nearest one lies."""
+    further = f"sensors feel no further than {answer.reach_mm:.3g} mm. It is not drawn."
+    return [
+        (f"load in line {line}", f"it lies {away:.4g} mm from the nearest sensor and adds nothing: {further}")
+        for line, away, load in zip(lines, _away_mm(document), document["contacts"], strict=True)
+        if load not in _felt(document, answer)
+    ]
+
+
+def _away_mm(document: Mapping[str, Any]) -> list[float]:
+    """How far from each load the nearest sensor lies."""
+    sensors = np.array([(one["x_mm"], one["y_mm"]) for one in document["sensors"]])
+    return [float(np.hypot(*(sensors - (one["x_mm"], one["y_mm"])).T).min()) for one in document["contacts"]]
+
+
+def _felt(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
+    """The loads of which a part lies within the reach of a sensor."""
+    edges = np.array(_away_mm(document)) - answer.contact_radius_mm
+    return [one for one, edge in zip(document["contacts"], edges.tolist(), strict=True) if edge <= answer.reach_mm]
 
 
 def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:

@@ -77,6 +77,7 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
         error=error,
         answer=answer,
         findings=description.findings(answer),
+        strained=description.finite_strain(answer),
         figures=[] if answer is None else _figures(document, answer),
         body=None if answer is None else _inside("application/json", orjson.dumps(document)),
         same=same_request.from_file(request, "/v1/stress", "request.json", "client.stress({})"),

@@ -84,8 +84,8 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
         drawn(
             "preload",
             frf_versus_preload(titles, *(rows[name] for name in _AGAINST_PRELOAD)),
-            f"FRF in the flat zone against preload{'' if sensor is None else f' of {sensor}'}, for each sphere, with "
-            "95 % intervals; dashed lines are the paper's model with the array's d33, in the sphere's colour.",
+            f"FRF in the flat zone against preload{'' if sensor is None else f' of {sensor}'}, for each sphere (radius "
+            "R) with 95 % intervals; dashed lines are the paper's model with the array's d33, in the sphere's colour.",
             f"{place}/preload.csv{chosen}",
         ),
         drawn(

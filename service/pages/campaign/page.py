@@ -9,11 +9,11 @@ from service.dependencies import CampaignId, Store, Table
 from service.pages.campaign.figures import band_query, figures
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.conditions import condition_columns
-from service.pages.shared.figures import csv_answer, csv_of_rows
+from service.pages.shared.figures import csv_answer, csv_of_rows, file_name
 from service.pages.shared.forms import RefusedForm, in_form_words, number
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
-from service.store import Database, annotations, campaigns, diagnoses
+from service.store import AnyRow, Database, annotations, campaigns, diagnoses
 from service.usecases import changes, d33_cache
 from service.usecases.figure_data import frf_columns
 from underskin.errors import InvalidInput
@@ -112,14 +112,17 @@ def shown(
 @router.get("/frf.csv")
 def frf_csv(campaign_id: CampaignId, store: Store, show: str = "") -> Response:
     """Every line of the recordings, or of those of `show`, as they came or were estimated."""
-    return csv_answer("frf", frf_columns(_loaded(store, campaign_id), show))
+    name = _file(store.read(campaigns.find, campaign_id), "frf")
+    return csv_answer(name, frf_columns(_loaded(store, campaign_id), show))
 
 
 @router.get("/preload.csv")
 def preload_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQuery) -> Response:
     """The FRF in the flat zone of each recording, and the model's."""
     row = store.read(campaigns.find, campaign_id)
-    return csv_answer("frf-against-preload", d33_cache.with_numbers(store, table, row, band)[1]["recordings"])
+    return csv_answer(
+        _file(row, "frf-against-preload"), d33_cache.with_numbers(store, table, row, band)[1]["recordings"]
+    )
 
 
 @router.get("/d33.csv")
@@ -128,7 +131,7 @@ def d33_csv(campaign_id: CampaignId, store: Store, table: Table, band: BandOfQue
     row = store.read(campaigns.find, campaign_id)
     answer = d33_cache.answer(store, table, row, band)
     names = ("sensor", "indenter_radius_mm", "preload_n", "recordings", *D33Value.model_fields)
-    return csv_of_rows("d33", names, [*answer["sensors"], *answer["cells"]])
+    return csv_of_rows(_file(row, "d33"), names, [*answer["sensors"], *answer["cells"]])
 
 
 @router.get("/curves.csv")
@@ -140,7 +143,12 @@ def curves_csv(campaign_id: CampaignId, store: Store) -> Response:
             columns["recording"] += [recording.id] * len(recording.force_n)
             columns["displacement_mm"] += recording.displacement_mm.tolist()
             columns["force_n"] += recording.force_n.tolist()
-    return csv_answer("curves", columns)
+    return csv_answer(_file(store.read(campaigns.find, campaign_id), "curves"), columns)
+
+
+def _file(row: AnyRow, what: str) -> str:
+    """The name of a file of a campaign, without its ending."""
+    return file_name(row.skin_id, row.name, what)
 
 
 def _loaded(store: Database, campaign_id: str) -> Campaign:

@@ -1,16 +1,18 @@
 """Two campaigns side by side, of one skin or of two: their maps in the same colours, and the map of the difference; of
 curves, these and Young's modulus."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
+from sqlalchemy import Connection
 
 from service.dependencies import Store, Table
 from service.pages.compare import curves
 from service.pages.shared import same_request
-from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, sensors_of
+from service.pages.shared.figures import Drawn, columns_of, csv_of_rows, drawn, file_name, sensors_of
 from service.pages.shared.html import page
 from service.schemas.campaign_d33 import D33Value
 from service.store import AnyRow, Database, campaigns
@@ -21,6 +23,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 router = APIRouter(prefix="/compare")
 
 _MOST_LISTED = 200
+_MOST_NAMED = 6  # sensors that lie elsewhere
+_SAME_PLACE_MM = 0.01
 _COLUMNS = (
     "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
     "difference_pc_per_n", "difference_uncertainty_pc_per_n",
@@ -42,17 +46,15 @@ def compare(
     skin: Chosen = "",
     kind: ChosenKind = None,
 ) -> Response:
-    """Of the campaigns `first` and `second`; where one is not named, the one with recordings of a `kind` in use, of
-    `skin` or of all, that was recorded first or last. Without a kind, the first of `KINDS` that the first campaign has,
-    or any."""
+    """Of the campaigns `first` and `second`; where one is not named, of those with recordings of a `kind` in use: of
+    `skin` the one that was recorded first or last, of all the last two of one skin. Without a kind, the first of
+    `KINDS` that the first campaign has, or any."""
     kind = kind or _kind(store, table, skin, first)
     with store.reading() as connection:
         offered = [one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)]
         listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind=kind))
         if listed:
-            (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind=kind, oldest_first=True)
-            first = first or oldest.id
-            second = second or next((row.id for row in listed if row.id != first), first)
+            first, second = _pair(connection, skin, kind, listed, first, second)
         both = [campaigns.find(connection, one) for one in (first, second) if one]
     listed += [row for row in both if row.id not in {one.id for one in listed}]
     answers = [d33_cache.answer(store, table, row, None) for row in both]
@@ -60,6 +62,7 @@ def compare(
     rows = _rows(answers) if is_two and kind == "frf" else []
     of_curves = curves.rows(kind, both, answers) if is_two and kind != "frf" else []
     beside = drawn_maps(both, answers, rows)
+    elsewhere = moved(both, rows)
     return page(
         request,
         "compare.html",
@@ -72,10 +75,38 @@ def compare(
         second=second,
         both=both,
         rows=rows,
+        moved=elsewhere[:_MOST_NAMED],
+        more_moved=len(elsewhere[_MOST_NAMED:]),
         means=curves.means(of_curves) if of_curves else [],
         figures=curves.figures(store, kind, both, of_curves) if is_two and kind != "frf" and both else beside,
         same=same_request.get(request, f"/v1/campaigns/{first}/d33", f"client.campaigns.d33({first!r})"),
     )
+
+
+def _pair(
+    connection: Connection, skin: str, kind: Kind, listed: Sequence[AnyRow], first: str, second: str
+) -> tuple[str, str]:
+    """The campaigns that are compared where one is not named; `listed`: those to choose from, the latest first."""
+    if not (skin or first or second):
+        for own in dict.fromkeys(row.skin_id for row in listed):
+            last = campaigns.current_by_time(connection, own, 2, kind=kind)
+            if len(last) == 2:
+                return last[1].id, last[0].id
+    (oldest,) = campaigns.current_by_time(connection, skin or None, 1, kind=kind, oldest_first=True)
+    first = first or oldest.id
+    of_first = next((row.skin_id for row in listed if row.id == first), None)
+    others = sorted((row for row in listed if row.id != first), key=lambda row: row.skin_id != of_first)
+    return first, second or next((row.id for row in others), first)
+
+
+def moved(both: Sequence[AnyRow], rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
+    """Of each sensor with a difference that lies elsewhere in the two campaigns its id and how far off [mm]."""
+    if len(both) < 2:
+        return []
+    first, second = ({one["id"]: (one["x_mm"], one["y_mm"]) for one in row.about["skin"]["sensors"]} for row in both)
+    shared = [row["sensor"] for row in rows if row["difference_pc_per_n"] is not None]
+    gaps = [(name, math.dist(first[name], second[name])) for name in shared]
+    return [(name, gap) for name, gap in gaps if gap > _SAME_PLACE_MM]
 
 
 def _kind(store: Database, table: SigmaTable, skin: str, first: str) -> Kind:
@@ -94,13 +125,22 @@ def moduli_csv(store: Store, table: Table, first: Chosen, second: Chosen, kind: 
     """Young's modulus of each curve of both campaigns."""
     both = [store.read(campaigns.find, one) for one in (first, second)]
     rows = curves.rows(kind, both, [d33_cache.answer(store, table, row, None) for row in both])
-    return csv_of_rows("moduli", curves.COLUMNS, rows)
+    return csv_of_rows(_file(both, "moduli"), curves.COLUMNS, rows)
 
 
 @router.get("/difference.csv")
 def difference_csv(store: Store, table: Table, first: Chosen, second: Chosen) -> Response:
     """d33 of each sensor in both campaigns, and the second less the first."""
-    return csv_of_rows("difference", _COLUMNS, _rows([_answer(store, table, one) for one in (first, second)]))
+    both = [store.read(campaigns.find, one) for one in (first, second)]
+    rows = _rows([d33_cache.answer(store, table, row, None) for row in both])
+    return csv_of_rows(_file(both, "difference"), _COLUMNS, rows)
+
+
+def _file(both: Sequence[AnyRow], what: str) -> str:
+    """The name of a file of two campaigns, without its ending; of one skin it names that once."""
+    ids = dict.fromkeys(row.skin_id for row in both)
+    names = [row.name for row in both] if len(ids) == 1 else [f"{row.skin_id}-{row.name}" for row in both]
+    return file_name(*(ids if len(ids) == 1 else ()), *names, what)
 
 
 def _answer(store: Database, table: SigmaTable, campaign_id: str) -> dict[str, Any]:
@@ -116,7 +156,8 @@ def _rows(answers: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         for entry in answer["sensors"]:
             row = of_sensor.setdefault(entry["sensor"], dict.fromkeys(_COLUMNS) | {"sensor": entry["sensor"]})
             row[f"{which}_pc_per_n"] = entry["d33_pc_per_n"]
-            row[f"{which}_uncertainty_pc_per_n"] = entry["d33_uncertainty_pc_per_n"]
+            for part in ("uncertainty", "low", "high"):
+                row[f"{which}_{part}_pc_per_n"] = entry[f"d33_{part}_pc_per_n"]
     for row in of_sensor.values():
         if None not in (row["first_pc_per_n"], row["second_pc_per_n"]):
             row["difference_pc_per_n"] = row["second_pc_per_n"] - row["first_pc_per_n"]

@@ -37,8 +37,8 @@ router = APIRouter()
 _ABOUT = {
     "where": "Each cell is the mean over the recordings in it, empty where there is none.",
     "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
-    "predicted on the band that 95 % of the noise stays in. Before, d33 fits all lines at once, which a resonance "
-    "draws away from the level of the flat part. A double click shows residuals beyond the panel.",
+    "predicted on the band that 95 % of the noise stays in. Before, one d33 fits all lines at once: where part of the "
+    "band departs from the model, the rest may lie off it too. A double click shows residuals beyond the panel.",
     "curve": "One recording with the models before and after, the worst explained one first; below, measured less "
     "predicted on the band that 95 % of the noise stays in. A double click shows all of the air, another one the "
     "contact.",

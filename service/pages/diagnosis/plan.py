@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_of_rows
+from service.pages.shared.figures import attachment, csv_of_rows, file_name
 from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
@@ -41,7 +41,9 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
-_HEADS = {"position_mm": "place x, y [mm]"}
+_HEADS = {
+    "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
+}  # fmt: skip
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
@@ -99,7 +101,8 @@ def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: Planner
     told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
     counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
     joined = [own | count for own, count in zip(told, counts, strict=True)]
-    return csv_of_rows("plan", [*names, "repeats", "arrived"], joined)
+    row, name = _diagnosed(store, diagnosis_id)
+    return csv_of_rows(file_name(row.skin_id, name, "plan"), [*names, "repeats", "arrived"], joined)
 
 
 @router.get("/{number}/rig.yaml")
@@ -176,11 +179,11 @@ def _diagnosed(store: Database, diagnosis_id: str) -> tuple[AnyRow, str]:
 def _limits(given: Mapping[str, str]) -> dict[str, Any]:
     """The fields of `RigLimits` that the form gives; raises InvalidInput."""
     limits: dict[str, Any] = {}
-    ends = [given.get(name, "").strip() for name in (_LOWEST, _HIGHEST)]
-    if all(ends):
-        limits["preload_n"] = tuple(number(name, text) for name, text in zip((_LOWEST, _HIGHEST), ends, strict=True))
-    elif any(ends):
+    ends = tuple(number(name, given[name]) for name in (_LOWEST, _HIGHEST) if given.get(name, "").strip())
+    if len(ends) == 1:
         raise required("preload_n", "give both, or leave both empty")
+    if ends:
+        limits["preload_n"] = ends
     for name in _SEVERAL:
         values = numbers(name, given.get(name, ""))
         if len(values) > _MOST_VALUES:

@@ -1,5 +1,5 @@
-"""What pages load: style, scripts, that of the figures' colours, which files without a server have too, and plotly's
-own from its package. A version in the address lets browsers keep them for good.
+"""What pages load: style, scripts, those of figures' colours and paper, which files without a server have too, and
+plotly's own from its package. A version in the address lets browsers keep them for good.
 """
 
 import base64
@@ -20,7 +20,8 @@ router = APIRouter()
 
 LIBRARY = "plotly.min.js"
 _FOLDER = Path(__file__).parents[1] / "static"
-_ELSEWHERE = {LIBRARY: Path(plotly.__file__).parent / "package_data", SCHEME.name: SCHEME.parent}
+_OF_FIGURES = dict.fromkeys((SCHEME.name, "paper.js"), SCHEME.parent)
+_ELSEWHERE = {LIBRARY: Path(plotly.__file__).parent / "package_data", **_OF_FIGURES}
 _TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".csv": "text/csv"}
 _FOR_GOOD = "public, max-age=31536000, immutable"
 

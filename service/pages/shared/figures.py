@@ -1,9 +1,12 @@
 """A plotly figure in a page: its JSON, its words, and where its numbers are."""
 
+import re
+import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 import numpy as np
 import orjson
@@ -20,6 +23,8 @@ from underskin.units import Floats
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+_NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
+_LONGEST_PART = 60  # characters, of a name
 CLICK = "Click a sensor to choose it."
 
 
@@ -104,8 +109,17 @@ def attachment(file: str, content: str | bytes, media_type: str, **headers: str)
     return Response(content, headers=_saved(file) | headers, media_type=media_type)
 
 
+def file_name(*parts: str) -> str:
+    """Of what a file is about, such as a skin, a campaign and what of them: without what a file system minds."""
+    plain = (_NOT_IN_NAMES.sub("-", part)[:_LONGEST_PART].strip("-.") for part in parts)
+    return "-".join(part for part in plain if part)
+
+
 def _saved(file: str) -> dict[str, str]:
-    return {"Content-Disposition": f'attachment; filename="{file}"', "X-Content-Type-Options": "nosniff"}
+    """Headers of a file to be saved; a name beyond ASCII also as RFC 6266 has it."""
+    plain = unicodedata.normalize("NFKD", file).encode("ascii", "ignore").decode()
+    told = f'attachment; filename="{plain}"' + ("" if plain == file else f"; filename*=UTF-8''{quote(file)}")
+    return {"Content-Disposition": told, "X-Content-Type-Options": "nosniff"}
 
 
 def csv_of_rows(name: str, names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> CsvAnswer:

@@ -31,7 +31,7 @@ def drawn_frf(
             return []
         if len(chosen) <= MOST_SINGLE:
             lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
-            about = "Magnitude, phase and coherence of each recording."
+            about = "Magnitude, phase and coherence of each recording; R is the sphere's radius."
             return [drawn("frf", frf_recordings(lines, zone), about, place)]
         summaries = spreads_of(chosen)
     else:
@@ -39,11 +39,11 @@ def drawn_frf(
     count = sum(spread.recordings for spread in summaries)
     about = (
         f"{count} recordings: for each sphere and preload the median magnitude "
-        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings."
+        "and phase and the lowest coherence; as a band, the magnitudes of all its recordings. R is the sphere's radius."
     )
     return [drawn("frf", frf_overview(summaries, zone), about, place)]
 
 
 def _title(recording: FrfRecording, show: str) -> str:
     where = "" if show == recording.sensor else f"{recording.sensor}, "
-    return f"{where}{recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"
+    return f"{where}R {recording.indenter_radius_mm:.3g} mm, {recording.preload_n:.3g} N"

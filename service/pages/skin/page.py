@@ -12,7 +12,7 @@ from starlette.background import BackgroundTask
 
 from service.dependencies import SkinId, Store, Table, number_of_cursor
 from service.pages.shared import same_request, verdicts
-from service.pages.shared.figures import Drawn, csv_of_rows
+from service.pages.shared.figures import Drawn, csv_of_rows, file_name
 from service.pages.shared.forms import RefusedForm
 from service.pages.shared.frf import drawn_frf
 from service.pages.shared.history import By, drawn_history
@@ -200,7 +200,7 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") 
     history = usecase.history_by_model(store, table, root, by)
     row = store.read(campaigns.describing, root)
     rows = [] if row is None else map_rows(row, d33_cache.by_model(store, table, row, by), history)
-    return csv_of_rows("map", _MAP_COLUMNS, rows)
+    return csv_of_rows(file_name(root, "map"), _MAP_COLUMNS, rows)
 
 
 @router.get("/history.csv")
@@ -212,7 +212,7 @@ def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "pape
         for entry in usecase.history_by_model(store, table, root, by).sensors
         for point in entry.points
     ]
-    return csv_of_rows("history", _HISTORY_COLUMNS, points)
+    return csv_of_rows(file_name(root, "history"), _HISTORY_COLUMNS, points)
 
 
 def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int]:

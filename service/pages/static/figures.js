@@ -110,13 +110,11 @@ const seen = new IntersectionObserver(
 const SHEET = 680;
 DARK.addEventListener("change", () => document.querySelectorAll(".plot[data-drawn]").forEach(redraw));
 let unfolded = [];
-function on_sheet(plot, place) {
+function in_summary(plot, place) {
   const long = document.querySelector(".report .summary.long") !== null;
-  const height = place ? (long ? 145 : 190) : (long ? 235 : 340);
+  const height = place ? (long ? 145 : 190) : (long ? 260 : 340);
   const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
-  const axes = Object.keys(plot.layout).filter((name) => /^[xy]axis/.test(name));
-  const titles = Object.fromEntries(axes.map((name) => [`${name}.title.font.size`, 9]));
-  return { width: place ? SHEET / 2 - 5 : SHEET, height, margin, "font.size": 8, ...titles };
+  return on_sheet(plot, { width: place ? SHEET / 2 - 5 : SHEET, height, margin });
 }
 addEventListener("beforeprint", () => {
   unfolded = [...document.querySelectorAll(".report details:not([open])")];
@@ -126,8 +124,8 @@ addEventListener("beforeprint", () => {
     if (DARK.matches && plot.dataset.drawn) redraw(plot);
     else draw(plot);
     const place = summary.indexOf(plot);
-    const size = place < 0 ? { width: Math.min(SHEET, plot.clientWidth) } : on_sheet(plot, place);
-    Plotly.relayout(plot, { autosize: false, ...size });
+    if (place < 0) Plotly.relayout(plot, { autosize: false, width: Math.min(SHEET, plot.clientWidth) });
+    else Plotly.update(plot, ...in_summary(plot, place));
   }
 });
 addEventListener("afterprint", () => {

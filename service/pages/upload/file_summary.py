@@ -194,10 +194,10 @@ def _measured(recording: Recording) -> RecordingSummary:
         size = f"{recording.sample_height_mm:g} mm high, {recording.sample_diameter_mm:g} mm across"
         return RecordingSummary(recording.id, recording.kind, None, size, len(recording.force_n), None)
     if not isinstance(recording, FrfRecording):
-        size = f"sphere of {recording.indenter_radius_mm:g} mm"
+        size = f"sphere, radius {recording.indenter_radius_mm:g} mm"
         return RecordingSummary(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
     column = recording.force_n if recording.force_n is not None else recording.frequency_hz
-    pressed = f"{recording.preload_n:g} N, sphere of {recording.indenter_radius_mm:g} mm"
+    pressed = f"{recording.preload_n:g} N, sphere radius {recording.indenter_radius_mm:g} mm"
     points = 0 if column is None else len(column)
     return RecordingSummary(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
 

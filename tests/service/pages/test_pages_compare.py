@@ -62,6 +62,13 @@ def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle
         for name in ("first", "second")
     ]
     assert ends[0] == ends[1]
+    values = page.get_by_role("region", name="d33 of each sensor")
+    row = values.get_by_role("row", name=re.compile("^s2")).locator("td")
+    assert re.fullmatch(r"−4\.\d", row.first.inner_text())  # 30 % less, right after the sensor
+    assert re.fullmatch(r"1\d\.\d+\n\(1\d\.\d+ to 1\d\.\d+\)", row.nth(2).inner_text())
+    box = row.first.bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= width  # without moving the table sideways
     told = page.locator("#figure-map-difference figcaption").inner_text()
     assert "1 of 4 differ from 0 beyond chance" in told
     changed = page.locator("#figure-map-difference .plot").evaluate(
@@ -95,6 +102,30 @@ def test_first_is_the_one_recorded_first_however_late_it_arrives(idle: Server) -
     assert chosen == [ids[2017], ids[2020]]
 
 
+def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_elsewhere_are_named(idle: Server) -> None:
+    def of_year(year: int, skin: str, shift_mm: float = 0.0) -> str:
+        made = campaign(replace(BEFORE, sensors=2), table())
+        dated = tuple(replace(one, recorded_at=f"{year}-05-03T09:00:00Z") for one in made.recordings)
+        document = to_dict(replace(made, name=str(year), recordings=dated))
+        document["skin"]["sensors"][1]["y_mm"] += shift_mm
+        for one in document["recordings"]:
+            one.pop("position_mm", None)
+        return sent(idle, document, skin)
+
+    alone = of_year(2042, "by itself")
+    ids = [of_year(year, "thrice") for year in (2039, 2040, 2041)]
+    text = idle.http.get("/compare", headers=BROWSING).text
+    assert re.findall(r'value="([^"]*)" selected', text) == ids[1:]
+    assert ">2041-05-03, thrice: 2041<" in text
+    assert "lie elsewhere" not in text
+    of_one = idle.http.get(f"/compare?first={ids[0]}", headers=BROWSING).text
+    assert re.findall(r'value="([^"]*)" selected', of_one) == [ids[0], ids[2]]
+    bent = of_year(2043, "bent", 6.0)
+    warned = idle.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
+    (said,) = re.findall(r"Sensors of the same id lie elsewhere in the two campaigns: (.*?)\. Their", warned)
+    assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
+
+
 def test_sensors_without_d33_leave_nothing_to_draw() -> None:
     nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
     rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
@@ -119,7 +150,7 @@ def test_only_what_has_frfs_is_offered_and_none_with_itself(idle: Server) -> Non
     assert f"{first}" in text
     assert "There is one campaign with FRFs of this skin: nothing to compare it with." in text
     assert 'id="figure-map-first"' not in text
-    assert f"single 1, received {time.strftime('%Y', time.gmtime())}-" in text
+    assert f">{time.strftime('%Y-%m-%d', time.gmtime())} (received), mixed: single 1<" in text
 
 
 def pressed(name: str, moduli_mpa: Sequence[float], year: int) -> dict[str, object]:

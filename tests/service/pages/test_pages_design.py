@@ -2,10 +2,13 @@
 
 import re
 
+import numpy as np
+import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.support.store_server import Server
+from underskin.figures.design_region import design_region
 
 
 def cell(visitor: Visit, name: str, column: str) -> str:
@@ -26,6 +29,16 @@ def test_a_design_is_pinned_and_the_other_one_moves_beside_it(reader: Visit) -> 
     page.get_by_role("button", name="Pin this as A").press("Enter")
     page.get_by_role("heading", name="A, pinned, and B, as the sliders stand").wait_for()
     assert cell(reader, "thickness_mm", "change") == "same"
+    assert page.get_by_role("columnheader", name="Change from A to B").is_visible()
+    slider = page.get_by_label("thickness h, slider")
+    assert slider.is_visible()
+    page.emulate_media(media="print")
+    assert not slider.is_visible()
+    assert page.get_by_label("thickness h [mm]").is_visible()
+    assert (
+        page.locator("section[aria-labelledby=beside]").evaluate("one => getComputedStyle(one).breakInside") == "avoid"
+    )
+    page.emulate_media(media="screen")
     fits_and_is_accessible(reader)
     with page.expect_response("**/design/answer?*"):
         page.locator("#thickness_mm").fill("1.25")
@@ -111,6 +124,15 @@ def test_where_no_skin_does_the_limit_is_named(reader: Visit) -> None:
     page.get_by_role("button", name="Search").click()
     expect(page.get_by_role("alert")).to_contain_text("thinnest layer that can be made [mm]: thick – must be a number")
     assert page.get_by_label("thinnest layer").input_value() == "thick"
+
+
+@pytest.mark.parametrize(("pitches", "ends"), [((0.8, 0.95), (0.8, 0.95)), ((0.9, 0.901), (0.95 * 0.901, 0.901))])
+def test_colours_of_the_map_span_the_pitches_that_are_shown(
+    pitches: tuple[float, float], ends: tuple[float, float]
+) -> None:
+    pitch = np.array([[*pitches, np.nan, 5.0]])
+    figure = design_region(np.ones(4), np.ones(1), pitch, pitch, np.array([[True, True, False, False]]), [])
+    assert (figure.data[2].zmin, figure.data[2].zmax) == pytest.approx(ends)
 
 
 def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:

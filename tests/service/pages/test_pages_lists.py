@@ -5,7 +5,9 @@ import io
 import json
 import re
 from collections.abc import Iterator
+from datetime import datetime
 from itertools import pairwise
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -81,6 +83,33 @@ def test_a_workbook_holds_what_the_csv_does(reader: Visit, place: str) -> None:
     assert len(rows) == len(table)
     assert [row[-1] for row in rows[1:]] == pytest.approx([float(row[-1]) for row in table[1:]])
     assert isinstance(rows[1][0], str)
+
+
+def test_a_file_is_named_after_skin_and_campaign_however_odd_their_names(reader: Visit, idle: Server) -> None:
+    skin = 'Hand "ä" 9\u624b'
+    sent = idle.http.post("/v1/campaigns", params={"skin": skin}, json=campaign('of "May", 1/2')).raise_for_status()
+    reader.go(f"/campaigns/{sent.json()['id']}")
+    with reader.page.expect_download() as saving:
+        reader.page.locator("#figure-response").get_by_role("link", name="XLSX").click()
+    assert saving.value.suggested_filename == "Hand-ä-9\u624b-of-May-1-2-d33.xlsx"
+    place = f"/skins/{quote(skin, safe='')}"
+    told = idle.http.get(f"{place}/history.csv").headers["content-disposition"]
+    assert told.startswith('attachment; filename="Hand-a-9-history.csv"; filename*=UTF-8')
+    both = {"first": sent.json()["id"], "second": sent.json()["id"]}
+    told = idle.http.get("/compare/difference.csv", params=both).headers["content-disposition"]
+    assert told.startswith('attachment; filename="Hand-a-9-of-May-1-2-of-May-1-2-difference.csv"')
+    book = load_workbook(io.BytesIO(idle.http.get(f"{place}/history.xlsx").content)).active
+    heads = {cell.value: cell for cell in book[1]}
+    assert heads["d33_uncertainty_pc_per_n"].comment.text.startswith("Standard uncertainty")
+    assert heads["time"].comment.text == "UTC"
+    assert heads["d33_pc_per_n"].comment is None
+
+
+def test_times_of_a_workbook_are_dates_in_utc() -> None:
+    given = ["2024-05-14T10:00:00+02:00", "2024-05-14", "1850-01-01T00:00:00Z"]
+    book = load_workbook(io.BytesIO(workbook({"time": given, "sensor": given}))).active
+    assert [cell.value for cell in book["A"]] == ["time", datetime(2024, 5, 14, 8), *given[1:]]  # noqa: DTZ001 -- workbooks know no zones
+    assert [cell.value for cell in book["B"]] == ["sensor", *given]
 
 
 def test_no_text_of_a_workbook_is_a_formula() -> None:

@@ -186,8 +186,26 @@ def test_a_sensor_out_of_reach_says_so(server: Server) -> None:
     text = server.http.get("/loads?pitch_mm=100&loads=0 0 4 1", headers=BROWSING).text
     assert "out of reach: no load within" in text.partition(">s02<")[2].partition("</tr>")[0]
     assert "out of reach" not in text.partition(">s01<")[2].partition("</tr>")[0]
-    assert "± at most [pC]" in text
+    assert "± of the linear model [pC]" in text
+    assert "White: no load is within reach." in text
     assert '<a href="/d33">d33</a>' in text  # at the top of every page
+
+
+def _base(server: Server, loads: str) -> str:
+    return server.http.get(f"/loads/base.csv?loads={loads}").raise_for_status().text
+
+
+def test_a_load_that_no_sensor_feels_and_one_that_strains_the_layer_much_are_told(server: Server) -> None:
+    text = server.http.get("/loads?loads=0 0 4 1%0A%0A500 500 4 1", headers=BROWSING).text
+    (told,) = re.findall(r"<b>Check load in line 3:</b> (.*?)</p>", text)
+    assert re.fullmatch(r"it lies 673.2 mm from the nearest sensor and adds nothing: sensors feel .*", told)
+    assert "does not include finite strain" not in text
+    wide = [float(row["x_mm"]) for row in csv.DictReader(_base(server, "0 0 4 1%0A500 500 4 1").splitlines())]
+    assert max(wide) < 40  # so that the grid is fine where sensors are
+    assert 'id="figure-base"' not in server.http.get("/loads?loads=500 500 4 1", headers=BROWSING).text
+    text = server.http.get("/loads?loads=0 0 4 60", headers=BROWSING).text  # L = 60 N/(16 mm² × 16 MPa)
+    assert "here L reaches 0.23, where it would add about 4 %" in text
+    assert "adds nothing" not in text
 
 
 @pytest.mark.parametrize(

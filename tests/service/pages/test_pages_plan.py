@@ -53,7 +53,8 @@ def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dic
     visitor.page.reload()
     row = plan.get_by_role("region", name="Recordings to make").locator("tbody tr").first
     assert f"✓ {planned[0]['repeats']} of {planned[0]['repeats']}" in row.inner_text()
-    assert "1 of" in plan.locator("[role=status]").inner_text()
+    count, repeats = sum(entry["repeats"] for entry in planned), planned[0]["repeats"]
+    assert f"{repeats} of {count} recordings have arrived." in plan.locator("[role=status]").inner_text()
     visitor.require_accessible()
 
 
@@ -82,7 +83,10 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     visitor.require_accessible()
+    rows = plan.get_by_role("region", name="Recordings to make")
+    assert rows.evaluate("table => table.scrollWidth <= table.clientWidth")
     page.set_viewport_size({"width": 1280, "height": 844})
+    assert rows.evaluate("table => table.scrollWidth <= table.clientWidth")
     _ticked_off_as_they_arrive(visitor, server, expected["recordings"])
     page.get_by_text("The same by request").click()
     command = page.get_by_label("Shell").inner_text()
@@ -93,6 +97,8 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(
     ("query", "told"),
     [
         ({"lowest_preload_n": "3", "highest_preload_n": "1"}, r"lowest and highest preload \[N\].*the lowest first"),
+        ({"lowest_preload_n": "abc"}, r"lowest preload \[N\]: abc – must be a number"),
+        ({"highest_preload_n": "1"}, "lowest and highest preload.*give both, or leave both empty"),
         ({"lowest_preload_n": "0", "highest_preload_n": "1"}, "must be above 0"),
         ({"indenter_radius_mm": "4 big"}, r"radii of the spheres at hand \[mm\]: big – must be a number"),
         ({"indenter_radius_mm": "4 nan"}, "must be above 0"),

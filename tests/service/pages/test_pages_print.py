@@ -1,12 +1,15 @@
 """A report on paper: its summary is the first page whole, what is folded below it follows."""
 
 import re
+from collections.abc import Sequence
 from copy import deepcopy
 from itertools import pairwise
 from pathlib import Path
+from typing import Literal
 
+import orjson
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import FloatRect, Page, expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import Made, keep, made_of
@@ -96,7 +99,10 @@ def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server
     page = reader.page
     page.set_viewport_size({"width": width, "height": 800})
     skin = f"folded{width}"
-    reader.go(f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), made, skin)}")
+    place = f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), made, skin)}"
+    heading = idle.http.get(f"{place}/where.csv").text.splitlines()[0]
+    assert "measured less the paper's model, in phase, in percent of it" in heading
+    reader.go(place)
     summary = page.locator(".summary")
     assert "No d33" in summary.inner_text()
     assert "by noise alone" in summary.inner_text()
@@ -112,14 +118,62 @@ def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server
     reader.require_accessible()
 
 
-def test_titles_of_axes_do_not_overlap_on_paper(reader: Visit, idle: Server, made: Made) -> None:
-    page = reader.page
-    reader.go(f"/diagnoses/{keep(idle, resonant('titles', lines=LINES), made, 'titles')}")
+def with_numbers(made: Made) -> Made:
+    """The report with a map of as many columns as show their numbers, of as many digits as misfits have."""
+    where = orjson.loads(made.figures["where"])
+    rows = len(where["layout"]["yaxis"]["ticktext"])
+    numbers = {"z": [[-193.0] * 12] * rows, "customdata": [[4] * 12] * rows, "text": [["−193"] * 12] * rows}
+    where["data"][0] |= {**numbers, "texttemplate": "%{text}"}
+    where["layout"]["xaxis"] |= {"tickvals": list(range(12)), "ticktext": [f"{10 * n}.5" for n in range(12)]}
+    where["layout"]["shapes"] = []  # the outline of a region of more columns
+    return Made(made.report, {**made.figures, "where": orjson.dumps(where).decode()})
+
+
+def require_apart(boxes: Sequence[FloatRect | None], along: Literal["x", "y"]) -> None:
+    """None of the texts runs into the next, but for the air above and below its digits."""
+    known = [box for box in boxes if box is not None]
+    if along == "x":
+        air, ends = 0.5, sorted((box["x"], box["x"] + box["width"]) for box in known)
+    else:
+        air, ends = 2.0, sorted((box["y"], box["y"] + box["height"]) for box in known)
+    assert len(ends) > 1
+    assert all(one[1] <= following[0] + air for one, following in pairwise(ends)), ends
+
+
+def require_texts_apart(page: Page, plots: str) -> None:
+    """On paper, of the summary's first figure and of the map; then the screen has them as they were."""
+    first, where = page.locator(plots).first, page.locator(plots).nth(1)
+    for plot in (first, where):
+        plot.scroll_into_view_if_needed()
+        plot.locator(".main-svg").first.wait_for()
+    assert {"0.5", "5", "50"} <= set(first.locator(".ytick text").all_text_contents())
+    on_screen = where.locator(".heatmap-label text").first.get_attribute("style")
     page.emulate_media(media="print")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    titles = page.locator(".three .plot").first.locator(".infolayer text[class^=y]")
-    boxes = sorted((box["y"], box["y"] + box["height"]) for one in titles.all() if (box := one.bounding_box()))
-    assert len(boxes) == 4
-    ticks = page.locator(".three .plot").first.locator(".ytick text").all_text_contents()
-    assert {"0.5", "5", "50"} <= set(ticks)
-    assert all(above[1] <= below[0] for above, below in pairwise(boxes))
+    titles = first.locator(".infolayer text[class^=y]").all()
+    assert len(titles) == 4
+    require_apart([one.bounding_box() for one in titles], "y")
+    require_apart([one.bounding_box() for one in first.locator(".yaxislayer-above > .ytick text").all()], "y")
+    require_apart([one.bounding_box() for one in where.locator(".heatmap-label").all()[:12]], "x")
+    require_apart([one.bounding_box() for one in where.locator(".xtick text").all()], "x")
+    require_apart([one.bounding_box() for one in where.locator(".cbaxis text").all()], "y")
+    page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    expect(where.locator(".heatmap-label text").first).to_have_attribute("style", on_screen or "")
+
+
+def test_texts_of_figures_do_not_overlap_on_paper(reader: Visit, idle: Server, printed: Made, tmp_path: Path) -> None:
+    page, skin = reader.page, f"texts{len(printed.report['statement'])}"
+    place = f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), with_numbers(printed), skin)}"
+    reader.go(place)
+    chosen = page.locator(".three .choice select")
+    assert "Where: measured less the paper's model, in phase, in percent of it" in page.locator(".three").inner_text()
+    require_texts_apart(page, ".three .plot")
+    page.emulate_media(media="print")
+    assert chosen.evaluate("list => getComputedStyle(list).appearance") == "none"  # printed as the name alone
+    page.emulate_media(media="screen")
+    file = tmp_path / "report.html"
+    file.write_bytes(idle.http.get(f"{place}/report.html").content)
+    page.goto(file.as_uri())
+    require_texts_apart(page, ".three .plotly-graph-div")
+    reader.wrong.clear()  # the file itself is not of the server

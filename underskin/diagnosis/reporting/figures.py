@@ -47,7 +47,7 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
     thinned = Thinned(diagnosis, diagnosis.problem, shown)
     before, after = thinned.points(nothing), thinned.points(shown)
     drawn = {
-        "where": residual_map(diagnosis, thinned, before),
+        "where": residual_map(diagnosis, thinned, before, after),
         "before_after": before_and_after(diagnosis, thinned, before, after, shown),
         "explanations": explanations(document),
     }
@@ -112,13 +112,15 @@ def _in_lines(names: Sequence[str]) -> str:
     return " +<br>".join(lines)
 
 
-def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -> go.Figure:
+def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points) -> go.Figure:
     """Measured less the model to which nothing is added, over the located axes; the region outlined.
 
-    A cell is the mean over the points in it; out of phase where the misfit lies in the phase. What is within the noise
-    is pale; `meta` of the layout has what 95 % of it stays in [%].
+    A cell is the mean over the points in it; out of phase where the misfit lies in the phase, as the title says. What
+    is within the noise is pale: that of what is stated, since the model alone takes its misfit for noise. `meta` of the
+    layout has what 95 % of it stays in [%].
     """
     part, name = _part(diagnosis, before.residual_percent)
+    which = "" if thinned.lines.curves else f", {name}"
     x_axis, y_axis = _map_axes(diagnosis, thinned)
     x, y = (None if axis is None else thinned.levels(axis) for axis in (x_axis, y_axis))
     one_place = Levels(np.zeros(len(before.recording), dtype=np.intp), [""], np.zeros(1), np.zeros(1))
@@ -128,7 +130,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
     count = np.bincount(cell, minlength=size)
     mean = np.where(count > 0, np.bincount(cell, part, size) / np.maximum(count, 1), np.nan)
     shape = (len(y.names), len(x.names))
-    noise = SDS_OF_95 * float(np.median(before.noise_percent))
+    noise = SDS_OF_95 * float(np.median(after.noise_percent))
     limit = max(float(np.nanmax(np.abs(mean))), _ABOVE_NOISE * noise) or 1.0
     labelled = size <= _MOST_LABELLED and len(x.names) <= _MOST_ABREAST
     figure = go.Figure()
@@ -154,7 +156,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points) -
         (x0, x1), (y0, y1) = _outline(diagnosis, x_axis, x), _outline(diagnosis, y_axis, y)
         figure.add_shape(type="rect", x0=x0, x1=x1, y0=y0, y1=y1, line={"color": MEASURED, "width": 3})
     figure.update_layout(
-        title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}, in percent of it",
+        title=f"Where: measured less {SIMPLEST[thinned.lines.kind]}{which}, in percent of it",
         height=170 + 40 * max(4, min(len(y.names), 12)),
         meta={"noise_percent": noise},
     )
@@ -165,7 +167,7 @@ def _whole(percent: float) -> str:
     """A number of a cell with its sign; empty where there is none."""
     if np.isnan(percent):
         return ""
-    return f"{percent:+.0f}" if round(percent) else "0"
+    return f"{percent:+.0f}".replace("-", "−") if round(percent) else "0"
 
 
 def before_and_after(

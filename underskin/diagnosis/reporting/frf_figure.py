@@ -15,13 +15,13 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.frf_data import ShownFrf
-from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN, WHOLE_NUMBERS
+from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN, WHOLE_NUMBERS, decade_ticks
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
 
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
-_WIDE = 3.0  # largest magnitude over the median, from which on its axis is logarithmic
+_WIDE, _DECADE = 3.0, 10.0  # largest magnitude over median and smallest, from which on its axis is logarithmic
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _ROOM = 0.08  # at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: as far as residuals are in view at first
@@ -73,7 +73,9 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
                 **trace.look,
             }
         )
-    figure.update_xaxes(type="log", dtick=1)
+    lines_hz = np.concatenate([one.frequency_hz[one.frequency_hz > 0] for one in recordings])
+    ticks = decade_ticks(float(lines_hz.min()), float(lines_hz.max())) if len(lines_hz) else 1
+    figure.update_xaxes(type="log", dtick=ticks, **WHOLE_NUMBERS)
     figure.update_xaxes(title="frequency [Hz]", row=4, col=1)
     titles = ("|FRF| [pC/N]", "phase [°]", "residual,<br>in phase [%]", "residual, out<br>of phase [%]")
     for row, title in enumerate(titles, start=1):
@@ -172,11 +174,13 @@ def _view(one: ShownFrf, both: bool) -> dict[str, Any]:
     columns = _columns(one)
     names = ("measured", "before", "after") if both else ("measured", "after")
     sizes = np.concatenate([columns[name] for name in names])
-    wide = float(sizes.max()) > _WIDE * float(np.median(columns["measured"])) and float(sizes.min()) > 0
+    smallest, largest = float(sizes.min()), float(sizes.max())
+    wide = largest > _WIDE * float(np.median(columns["measured"])) and largest >= _DECADE * smallest > 0
     low, high = (np.log10([sizes.min(), sizes.max()]) if wide else (0.0, sizes.max())) if sizes.max() > 0 else (0, 1)
     room = _ROOM * (high - low)
     view: dict[str, Any] = {
         "yaxis.type": "log" if wide else "linear",
+        "yaxis.dtick": decade_ticks(smallest, largest) if wide else None,
         "yaxis.range": [float(low - room) if wide else 0.0, float(high + room)],
     }
     phases = [columns["measured phase" if name == "measured" else f"{name} phase"] for name in names]
@@ -205,7 +209,7 @@ def _menu(
 
 
 def _label(one: ShownFrf, both: bool) -> str:
-    where = f"{one.sensor}, {one.indenter_radius_mm:.3g} mm, {one.preload_n:.3g} N"
+    where = f"{one.sensor}, R {one.indenter_radius_mm:.3g} mm, {one.preload_n:.3g} N"
     lines = "" if len(one.frequency_hz) == one.count else f"; {len(one.frequency_hz)} of {one.count} lines"
     before = f"{_percent(one.left_before)} before, " if both else ""
     return f"{one.name} ({where}): misfit {before}{_percent(one.left_after)}{' after' if both else ''}{lines}"

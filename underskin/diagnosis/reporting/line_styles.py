@@ -5,11 +5,22 @@ paper's model beside it, Hertz's or Hooke's law for curves. Dotted is a bound or
 there for comparison alone. Lines of one meaning are told apart by colour, width or markers.
 """
 
+import math
+
 SHOWN, PAPER, BOUND = "solid", "dash", "dot"
 # Labels of a logarithmic axis in full, else 50 and 0.5 were both a 5 beside it.
 WHOLE_NUMBERS = {"tickformat": "~g"}
+_FEW_DECADES = 2.5  # up to which 2 and 5 have room beside each other
+_MOST_POWERS = 9  # of ten, that an axis labels
 # Of many lines beside each other: the colours of Okabe and Ito, then four more that differ from them in both schemes.
 LINE_COLOURS = (
     *("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"),
     *("#882255", "#999933", "#332288", "#8B5A2B"),
 )
+
+
+def decade_ticks(low: float, high: float) -> str | int:
+    """The `dtick` of a logarithmic axis from `low` to `high`, both above 0: 1, 2 and 5 of each decade, or, where these
+    would be too close, the powers of ten; plotly's own would label 8, 9 and 10 on top of each other."""
+    decades = math.log10(high / low)
+    return "D2" if decades <= _FEW_DECADES else math.ceil(decades / _MOST_POWERS)
