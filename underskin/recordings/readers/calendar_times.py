@@ -38,8 +38,9 @@ def with_zone(text: str, zone: tzinfo) -> str:
 
     Raises ValueError where it is none of these.
     """
-    moment = datetime.fromisoformat(iso_time(text.strip(), zone))
-    return (moment if moment.tzinfo is not None else moment.replace(tzinfo=zone)).isoformat()
+    told = iso_time(text.strip(), zone)
+    moment = datetime.fromisoformat(told)
+    return told if moment.tzinfo is not None else moment.replace(tzinfo=zone).isoformat()
 
 
 def of_two_cells(day: str, clock: str) -> str:
