@@ -16,7 +16,7 @@ def said_of(rig: RigDescription) -> list[str]:
     said. Of formulas, tare and trim the reading's own notes tell."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
     words = {field: (words, unit) for field, words, unit, _ in RECORDING}
-    values = [f"{_value(*words.get(field, (field, '')), value)}" for field, value in rig.recording.items()]
+    values = [_value(*words.get(field, (field, "")), value) for field, value in rig.recording.items()]
     recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
     checked = ["unusual magnitudes were said to be right"] if rig.units_checked else []
     return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]

@@ -104,6 +104,22 @@ def test_an_error_half_as_large_again_as_before_misleads(square: float, misled: 
     assert not replace(after, unsure=2.0).misleads(before)  # as do parameters that the rest does not tell
 
 
+def test_a_set_is_fitted_again_from_the_bound_that_its_point_lies_beyond(table: SigmaTable) -> None:
+    """Other recordings may narrow a bound; beyond it the posterior is 0, and the diagnosis failed."""
+    problem = FittingProblem(curve_lines(pressed(3.0, (5.0,)), "indentation"), table)
+    (entry,) = problem.explain([Request(("contact_creep",), kept=True)])
+    assert entry is not None
+    fitter = Fitter([problem.hypothesis(entry.names, placed=False)])
+    own = own_places(entry.names, problem.lines)["contact_creep"]
+    fit = entry.point.fit.copy()
+    fit[own] = fitter.low[0, own] - 0.1
+    beyond = replace(entry, best=replace(entry.best, point=replace(entry.point, fit=fit)))
+    within, again = problem.refit([entry, beyond])
+    assert within is not None
+    assert again is not None
+    assert again.log_evidence == pytest.approx(within.log_evidence, abs=0.5)
+
+
 @pytest.mark.parametrize("added", ["contact_creep", "compressible_layer", "instrument_compliance"])
 def test_a_set_of_curves_begins_also_where_its_parent_stands_and_the_added_mechanism_does_nothing(
     added: str, table: SigmaTable

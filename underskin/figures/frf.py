@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS, decade_ticks
+from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS, decade_ticks, is_logarithmic
 from underskin.figures.style import ZONE, label, marked, one_of_many, styled
 from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
@@ -21,7 +21,6 @@ _HEIGHT = 640
 _MOST_IN_LEGEND = 12
 _BRIGHTEST = 0.85  # of Viridis; lighter colours are invisible on white
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
-_WIDE, _DECADE = 3.0, 10.0  # largest magnitude over median and smallest, from which on the axis is logarithmic
 
 
 def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | None) -> go.Figure:
@@ -90,9 +89,7 @@ def _finished(traces: Sequence[PlotlyTrace], zone_hz: tuple[float, float] | None
             showarrow=False, font={"size": 12, "color": "#00664b"},
         )  # fmt: skip
     lines_hz = np.concatenate([np.asarray(trace["x"]) for trace in traces]) if traces else np.zeros(0)
-    lines_hz = lines_hz[lines_hz > 0]
-    ticks = decade_ticks(float(lines_hz.min()), float(lines_hz.max())) if len(lines_hz) else 1
-    figure.update_xaxes(type="log", dtick=ticks, **WHOLE_NUMBERS)
+    figure.update_xaxes(type="log", dtick=decade_ticks(lines_hz), **WHOLE_NUMBERS)
     # An axis without a line is not drawn: where no coherence was recorded, phase is the lowest panel.
     lowest = 3 if len(_values(traces, "y3")) else 2
     figure.update_xaxes(title="frequency [Hz]", showticklabels=True, row=lowest, col=1)
@@ -111,8 +108,8 @@ def _magnitude_axis(traces: Sequence[PlotlyTrace]) -> dict[str, Any]:
     """A logarithmic axis where a resonance exceeds the other values by far."""
     values = _values(traces, "y")
     values = values[values > 0]
-    if len(values) and values.max() > _WIDE * np.median(values) and values.max() >= _DECADE * values.min():
-        return {"type": "log", "dtick": decade_ticks(float(values.min()), float(values.max())), **WHOLE_NUMBERS}
+    if len(values) and is_logarithmic(values, float(np.median(values))):
+        return {"type": "log", "dtick": decade_ticks(values), **WHOLE_NUMBERS}
     return {"rangemode": "tozero"}
 
 

@@ -19,9 +19,8 @@ from underskin.findings.codes import Reason
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
-# What finite strain adds by the table of contacts (docs/http-api.md): in percent at the L up to which it is known, and
-# the power of L with which it grows from 0.01 on, where it adds 1.3 %.
-_KNOWN_TO, _ADDED_PERCENT, _GROWTH = 0.1, 3.0, 0.36
+# The L up to which it is known what finite strain adds, and how much in percent there (docs/http-api.md).
+_KNOWN_TO, _ADDED_PERCENT = 0.1, 3
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
@@ -83,15 +82,15 @@ def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tupl
 
 
 def finite_strain(answer: ArrayStress | None) -> str | None:
-    """How much finite strain, which is in neither charge nor error, may add beyond where that is known; None where no
-    load lies there."""
+    """That finite strain, which is in neither charge nor error, adds more than is known; None where no load is so
+    large."""
     for one in [] if answer is None else answer.findings:
         load = one.arguments.get("load_parameter", 0.0)
         if one.reason is Reason.LOAD_NOT_LINEAR and load > _KNOWN_TO:
             return (
-                f"The ± does not include finite strain. At L = {_KNOWN_TO:g} that adds {_ADDED_PERCENT:g} % to the "
-                f"stress on a sensor beneath the sphere; here L reaches {load:.2g}, where it would add about "
-                f"{_ADDED_PERCENT * (load / _KNOWN_TO) ** _GROWTH:.1g} % if it grew on as it does up to there."
+                f"The ± does not include finite strain. At L = {_KNOWN_TO:g} that adds {_ADDED_PERCENT} % to the "
+                f"stress on a sensor beneath the sphere; here L reaches {load:.2g}, beyond where it is known what it "
+                "adds."
             )
     return None
 

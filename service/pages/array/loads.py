@@ -133,8 +133,8 @@ def _beyond_reach(document: Mapping[str, Any], answer: ArrayStress, lines: Seque
     further = f"sensors feel no further than {answer.reach_mm:.3g} mm. It is not drawn."
     return [
         (f"load in line {line}", f"it lies {away:.4g} mm from the nearest sensor and adds nothing: {further}")
-        for line, away, load in zip(lines, _away_mm(document), document["contacts"], strict=True)
-        if load not in _felt(document, answer)
+        for line, away, is_felt in zip(lines, _away_mm(document), _are_felt(document, answer), strict=True)
+        if not is_felt
     ]
 
 
@@ -144,10 +144,15 @@ def _away_mm(document: Mapping[str, Any]) -> list[float]:
     return [float(np.hypot(*(sensors - (one["x_mm"], one["y_mm"])).T).min()) for one in document["contacts"]]
 
 
-def _felt(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
-    """The loads of which a part lies within the reach of a sensor."""
+def _are_felt(document: Mapping[str, Any], answer: ArrayStress) -> list[bool]:
+    """Of each load whether a part of its contact lies within the reach of a sensor."""
     edges = np.array(_away_mm(document)) - answer.contact_radius_mm
-    return [one for one, edge in zip(document["contacts"], edges.tolist(), strict=True) if edge <= answer.reach_mm]
+    return [bool(edge <= answer.reach_mm) for edge in edges]
+
+
+def _felt(document: Mapping[str, Any], answer: ArrayStress) -> list[Mapping[str, Any]]:
+    """The loads that a sensor feels."""
+    return [one for one, is_felt in zip(document["contacts"], _are_felt(document, answer), strict=True) if is_felt]
 
 
 def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[int, str]]:

@@ -199,7 +199,9 @@ class FittingProblem:
                 continue  # what was left out is what the mechanism, or any model of a curve, needs
             if [one.name for one in hypothesis.model.parameters] == [one.name for one in entry.model.parameters]:
                 fitter = Fitter([hypothesis])
-                starts[len(hypotheses)] = fitter.at(replace(entry.point, bend=fitter.no_bend))
+                # Bounds may be narrower here: those of a time follow from how often the curves were sampled.
+                fit = np.clip(entry.point.fit, fitter.low[0], fitter.high[0])
+                starts[len(hypotheses)] = fitter.at(replace(entry.point, fit=fit, bend=fitter.no_bend))
                 hypotheses.append(hypothesis)
         requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
         fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}

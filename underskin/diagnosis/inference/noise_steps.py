@@ -20,8 +20,7 @@ class SettlingEvaluator(Evaluator):
     """Evaluates points, and moves their covariance parameters towards the least cost."""
 
     def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
-        """Newton steps of the covariance parameters, one of which may be held, at fixed predictions, from where the
-        cost is finite.
+        """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
 
         Several of a mechanism's own hang together, so that steps of one at a time would creep.
         """
@@ -30,10 +29,9 @@ class SettlingEvaluator(Evaluator):
         from underskin.diagnosis.inference.settle_kernel import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
 
         low, high = self._lowest, self._highest
-        points, cost = at.points, at.cost.copy()
-        moving = np.flatnonzero(np.isfinite(cost))  # no noise level makes impossible predictions possible
+        points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
         products = at.products.values
-        for _ in range(steps if len(moving) else 0):
+        for _ in range(steps):
             part = Evaluated(points, products, cost.copy()).some(moving)
             gradient, hessian = self.covariance_equations(part, first_mixed=self._common)
             if held is not None:

@@ -15,13 +15,12 @@ from plotly.subplots import make_subplots
 
 from underskin.diagnosis.reporting.figure_style import AFTER, BAND, BEFORE, MEASURED, TEMPLATE
 from underskin.diagnosis.reporting.frf_data import ShownFrf
-from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN, WHOLE_NUMBERS, decade_ticks
+from underskin.diagnosis.reporting.line_styles import PAPER, SHOWN, WHOLE_NUMBERS, decade_ticks, is_logarithmic
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.units import Floats
 
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
-_WIDE, _DECADE = 3.0, 10.0  # largest magnitude over median and smallest, from which on its axis is logarithmic
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
 _ROOM = 0.08  # at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: as far as residuals are in view at first
@@ -73,9 +72,8 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
                 **trace.look,
             }
         )
-    lines_hz = np.concatenate([one.frequency_hz[one.frequency_hz > 0] for one in recordings])
-    ticks = decade_ticks(float(lines_hz.min()), float(lines_hz.max())) if len(lines_hz) else 1
-    figure.update_xaxes(type="log", dtick=ticks, **WHOLE_NUMBERS)
+    lines_hz = np.concatenate([one.frequency_hz for one in recordings])
+    figure.update_xaxes(type="log", dtick=decade_ticks(lines_hz), **WHOLE_NUMBERS)
     figure.update_xaxes(title="frequency [Hz]", row=4, col=1)
     titles = ("|FRF| [pC/N]", "phase [°]", "residual,<br>in phase [%]", "residual, out<br>of phase [%]")
     for row, title in enumerate(titles, start=1):
@@ -174,13 +172,12 @@ def _view(one: ShownFrf, both: bool) -> dict[str, Any]:
     columns = _columns(one)
     names = ("measured", "before", "after") if both else ("measured", "after")
     sizes = np.concatenate([columns[name] for name in names])
-    smallest, largest = float(sizes.min()), float(sizes.max())
-    wide = largest > _WIDE * float(np.median(columns["measured"])) and largest >= _DECADE * smallest > 0
+    wide = is_logarithmic(sizes, float(np.median(columns["measured"])))
     low, high = (np.log10([sizes.min(), sizes.max()]) if wide else (0.0, sizes.max())) if sizes.max() > 0 else (0, 1)
     room = _ROOM * (high - low)
     view: dict[str, Any] = {
         "yaxis.type": "log" if wide else "linear",
-        "yaxis.dtick": decade_ticks(smallest, largest) if wide else None,
+        "yaxis.dtick": decade_ticks(sizes) if wide else None,
         "yaxis.range": [float(low - room) if wide else 0.0, float(high + room)],
     }
     phases = [columns["measured phase" if name == "measured" else f"{name} phase"] for name in names]
