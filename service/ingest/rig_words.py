@@ -15,7 +15,7 @@ def said_of(rig: RigDescription) -> list[str]:
     """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
     said. Of formulas, tare and trim the reading's own notes tell."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
-    words = {field: (words, unit) for field, words, unit, _ in RECORDING}
+    words = {field: (words.partition(", if ")[0], unit) for field, words, unit, _ in RECORDING}
     values = [_value(*words.get(field, (field, "")), value) for field, value in rig.recording.items()]
     recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
     checked = ["unusual magnitudes were said to be right"] if rig.units_checked else []
