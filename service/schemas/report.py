@@ -48,7 +48,7 @@ class ReportMechanism(BaseModel):
     probability: float = Field(description="Posterior that it is there, 0 to 1.")
     parameters: list[Parameter] = Field(description="How strong it is.")
     explains_percent: float | None = Field(
-        description="Share of the misfit beyond noise that it takes away [%]; null where that says nothing."
+        description="Share of the misfit beyond noise that comes back without it [%]; null where that says nothing."
     )
     scope: Scope | None = Field(default=None, description="Of several campaigns or skins: where it acts.")
     statement: str | None = Field(default=None, description="What is to be known of it, in words.")

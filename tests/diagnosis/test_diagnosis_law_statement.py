@@ -2,14 +2,16 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rig.unlisted.campaign import as_json, draw
+from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.recordings.campaign import parse
+from underskin.recordings.campaign import FrfRecording, parse
 from underskin.surrogate.sigma_table import load_table
 
 SEED, HERTZ = 4242, 67  # of a campaign drawn with a contact radius that grows with F^0.067
@@ -36,3 +38,25 @@ def test_a_delay_that_disperses_is_a_delay_with_another_exponent() -> None:
     assert "this is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
     exponent = next(entry for entry in report["unnamed"]["parameters"] if entry["name"] == "exponent")
     assert exponent["value"] == pytest.approx(2.0, abs=0.05)
+
+
+def test_a_constant_phase_beside_weak_sensors_is_told_apart_from_them() -> None:
+    """Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle."""
+    made = campaign(Made(sensors=6, gain=0.01, line=0.005, highest_hz=800.0), load_table())
+    kept = {"s2": 0.8, "s4": 0.6}
+    turned = []
+    for entry in made.recordings:
+        assert isinstance(entry, FrfRecording)
+        assert entry.frf_re_pc_per_n is not None
+        assert entry.frf_im_pc_per_n is not None
+        frf = (entry.frf_re_pc_per_n + 1j * entry.frf_im_pc_per_n) * kept.get(entry.sensor, 1.0)
+        frf = frf * np.exp(-1j * np.radians(1.2))
+        turned.append(replace(entry, frf_re_pc_per_n=frf.real, frf_im_pc_per_n=frf.imag))
+    report = diagnosis_report(replace(made, recordings=tuple(turned)), load_table())
+    statement = report["statement"]
+    assert "What is missing beside sensor spread turns the frequency response by the same angle at all" in statement
+    assert "the phase by -1.2" in statement
+    assert "with it and sensor spread, recordings held out are predicted to" in statement
+    assert "the reference phase of a lock-in amplifier" in statement
+    assert report["location"]["region"]["sensor"] == ["s4"]
+    assert "it is largest at sensor s4, where the response is 4" in report["location"]["statement"]

@@ -80,6 +80,14 @@ def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: 
 
 
 @pytest.mark.slow
+def test_limits_beyond_the_tables_are_said_to_be_that(narrow: Left) -> None:
+    planned = narrow.plan(indenter_radius_mm=[2000.0], preload_n=(50.0, 60.0))
+    assert planned["recordings"] == []
+    assert "the tables hold none of their contacts" in planned["statement"]
+    assert "more widely" not in planned["statement"]
+
+
+@pytest.mark.slow
 def test_where_nothing_can_be_planned_it_is_said_why(twins: Left) -> None:
     planned = twins.plan(preload_n=(0.3, 2.4))
     assert planned["recordings"] == []

@@ -23,6 +23,7 @@ from underskin.diagnosis.selection.occam_correction import fit_and_plausibility,
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness, left_open
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind
+from underskin.recordings.campaign import FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
@@ -78,8 +79,52 @@ def test_a_location_has_units_and_leaves_out_what_spans_a_whole_axis() -> None:
     )
     assert "spread over all of the recordings" in both
     assert "off by 12 % (root mean square" in both
+    worst: dict[str, list[float | str]] = {"preload_n": [2.0, 3.0], "sensor": ["s04"]}
+    axes = [AXES[0], AxisResult("sensor", 0.001, 0.3)]
+    largest = location_statement(axes, worst, dict.fromkeys(worst, False), size)
+    assert "; most of it lies at preload 2 to 3 N and it is largest at sensor s04, where the response is" in largest
     hidden = location_statement([entry for entry in AXES if entry.p_value is None], {}, {}, size)
     assert hidden == "Whether the misfit depends on load cycles, this design cannot tell."
+
+
+def test_an_axis_with_a_trace_of_the_misfit_is_no_cause_to_look_for() -> None:
+    size = EffectSize(1.0, 0.5, 1.5, True)
+    trace = [AxisResult("preload_n", 0.01, 0.0004)]
+    said = location_statement(trace, {}, {}, size)
+    assert said == (
+        "The misfit changes with preload beyond chance, but no more than a trace of it goes along with that."
+    )
+    beside = location_statement([*trace, AxisResult("sensor", 0.001, 0.6)], {"sensor": ["s2"]}, {"sensor": False}, size)
+    assert beside.startswith("The misfit depends on sensor; it is largest at sensor s2, where")
+
+
+def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:
+    """Each sphere on a day of its own: what differs between the spheres may have come with the day."""
+    plain = campaign(Made(sensors=4), table)
+    on_days = [
+        replace(
+            entry,
+            recorded_at=f"2020-01-{int(entry.indenter_radius_mm):02d}T10:{number:02d}:00Z",
+            load_cycles=None,
+            dwell_s=None,
+        )
+        for number, entry in enumerate(plain.recordings)
+        if isinstance(entry, FrfRecording)
+    ]
+    document = report(diagnose(replace(plain, recordings=tuple(on_days)), table))
+    (entry,) = [one for one in document["location"]["axes"] if one["axis"] == "indenter_radius_mm"]
+    assert entry["undecidable"] == "the time of recording determines it in this design"
+    assert "whether it depends on" in document["location"]["statement"]
+
+
+def test_each_mechanism_of_a_set_has_its_own_part_of_the_misfit(table: SigmaTable) -> None:
+    made = Made(("ageing", "amplifier_high_pass"), (0.3, 300.0, 0.0, 0.3))
+    document = report(diagnose(campaign(made, table), table))
+    parts = {entry["name"]: entry["explains_percent"] for entry in document["mechanisms"]}
+    assert set(parts) == set(made.mechanisms)
+    assert 10 < parts["ageing"] < 50 < parts["amplifier_high_pass"] < 90
+    assert sum(parts.values()) == pytest.approx(100, abs=5)
+    assert "without it, " in page(document)
 
 
 @pytest.mark.parametrize(

@@ -94,6 +94,26 @@ def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[flo
     assert "whole recorded range" not in zone.reason
 
 
+def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
+    """One line in twenty is excited; between them the charge is noise, which nothing makes follow the force."""
+    frequency = np.arange(1.0, 301.0)
+    sines = frequency % 20 == 0
+    frfs, conditions = recorded(frequency, "")
+    noise = np.random.default_rng(4).normal(size=(len(frfs), len(frequency), 2)) @ [3e-12, 3e-12j]
+    coherence = np.random.default_rng(5).uniform(0.0, 0.6, size=(len(frfs), len(frequency)))
+    idle = [
+        Frf(frequency, np.where(sines, one.values, apart), np.where(sines, 0.99, low))
+        for one, apart, low in zip(frfs, noise, coherence, strict=True)
+    ]
+    zone = flat_zone(stacked(idle), conditions)
+    assert (zone.low_hz, zone.high_hz) == (20.0, 300.0)
+    assert zone.holds(frequency).sum() == 15
+    assert "266 lines inside it were not excited" in zone.reason
+    assert "below 20 Hz it was not excited" in zone.reason
+    mean, _, _ = band_average(stacked(idle), zone)
+    assert mean == pytest.approx([one.values.real[sines].mean() for one in frfs], rel=0.01)
+
+
 def test_where_the_charge_follows_the_force_nowhere_all_lines_count() -> None:
     """As of a dead sensor."""
     frfs, conditions = recorded(LOG_GRID, "")
@@ -105,7 +125,7 @@ def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
     zone = zone_of("resonance")
     assert 40 < zone.high_hz < 110  # 1/(1 − (f/400)²) has risen by 1 % to 8 %
     assert zone.low_hz == LOG_GRID[0]
-    assert "4 mm sphere at 0.5 N" in zone.reason
+    assert "the sphere of 4 mm radius at 0.5 N" in zone.reason
     assert "moving with the contact" in zone.reason
 
 

@@ -7,6 +7,7 @@ own permutations; the p-values are those of the largest over all axes, (b + 1)/(
 axis with too few arrangements, or that the others determine, is undecidable.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from math import factorial
@@ -25,6 +26,7 @@ _LEAST_ARRANGEMENTS = 40
 _ALIASED = 0.98  # share of an axis' functions that the other axes' determine
 _LEVELS = 6  # up to as many levels an axis is a set of levels, beyond it a polynomial
 SIGNIFICANT = 0.05
+_WORTH_TELLING = 0.005  # share of the misfit below which an axis is no cause to look for
 
 
 class Undecidable(StrEnum):
@@ -40,13 +42,25 @@ class Undecidable(StrEnum):
 class AxisResult:
     """Whether the residual depends on an axis: the p-value, and the share of the misfit that the axis explains.
 
-    `p_value` is None where that is undecidable, for the `reason`.
+    `p_value` is None where that is undecidable, for the `reason`; `determined_by` are the axes without any of which
+    the others would no longer determine it, where that is the reason.
     """
 
     axis: str
     p_value: float | None
     share: float
     reason: Undecidable | None = None
+    determined_by: Sequence[str] = ()
+
+    @property
+    def significant(self) -> bool:
+        """Whether the residual depends on it beyond chance."""
+        return self.p_value is not None and self.p_value < SIGNIFICANT
+
+    @property
+    def telling(self) -> bool:
+        """Whether it does so, and with more than a trace of the misfit."""
+        return self.significant and self.share >= _WORTH_TELLING
 
 
 def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
@@ -82,7 +96,7 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
         others = [other for key, other in bases.items() if key != name]
         reason = _undecidable(basis, others, blocks[name])
         if reason:
-            results.append(AxisResult(name, None, 0.0, reason))
+            results.append(AxisResult(name, None, 0.0, reason, _determining(name, bases, reason)))
         else:
             statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
     statistics |= _sign_flips(lines, residuals, random)
@@ -147,12 +161,30 @@ def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undeci
         design = np.column_stack([np.ones(len(basis)), *others])
         if design.shape[1] >= len(basis):
             return Undecidable.FEW_RECORDINGS
-        fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
-        centred = basis - basis.mean(axis=0)
-        left = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
-        if left.max() < 1 - _ALIASED:
+        if _determined(basis, others):
             return Undecidable.ALIASED
     return None
+
+
+def _determined(basis: Floats, others: Sequence[Floats]) -> bool:
+    """Whether functions of other axes make nearly all of each of an axis' own."""
+    design = np.column_stack([np.ones(len(basis)), *others])
+    fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
+    centred = basis - basis.mean(axis=0)
+    left = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
+    return bool(left.max() < 1 - _ALIASED)
+
+
+def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) -> tuple[str, ...]:
+    """The axes without any of which an aliased one would not be determined."""
+    if reason is not Undecidable.ALIASED:
+        return ()
+    others = {key: basis for key, basis in bases.items() if key != name}
+    return tuple(
+        left_out
+        for left_out in others
+        if not _determined(bases[name], [basis for key, basis in others.items() if key != left_out])
+    )
 
 
 def _freedman_lane(

@@ -7,14 +7,17 @@ import numpy as np
 from underskin.diagnosis.data.axes import recording_axes
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.residuals import Residuals
-from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult
+from underskin.diagnosis.localisation.permutation_test import AxisResult
 from underskin.units import Array, Floats, Mask
 
 _MOST_OF_IT = 0.7
 
 
 def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dict[str, list[float | str]]:
-    """The smallest ranges of up to two significant axes that hold most of the misfit.
+    """The smallest ranges of up to two telling axes that hold most of the misfit; of sensors or days the one where
+    it is largest.
+
+    Along the lines it is the lines' misfit that counts, over recordings their gains'.
 
     Parameters
     ----------
@@ -28,25 +31,26 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     Returns
     -------
     dict
-        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis is significant.
+        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis tells.
     """
-    telling = [entry for entry in results if entry.p_value is not None and entry.p_value < SIGNIFICANT]
-    telling = sorted(telling, key=lambda entry: -entry.share)[:2]
-    recording_misfit = (residuals.gain / residuals.gain_deviation) ** 2
-    line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
+    telling = sorted((entry for entry in results if entry.telling), key=lambda entry: -entry.share)[:2]
     if not telling:
         return {}
     by_line = telling[0].axis in lines.row_axes
-    misfit = line_misfit if by_line else recording_misfit
+    gain_misfit = (residuals.gain / residuals.gain_deviation) ** 2
+    if by_line:
+        gain_misfit = (gain_misfit / np.bincount(lines.recording))[lines.recording]
+    line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
     columns = {}
     for entry in telling:
         name = "frequency_hz" if entry.axis == "phase" else entry.axis
         column = axis_values(lines, name, by_line)
         if column is not None:
             columns[name] = column
-    inside = np.ones(len(misfit), dtype=bool)
+    inside = np.ones(len(gain_misfit), dtype=bool)
     ranges: dict[str, list[float | str]] = {}
     for name, column in columns.items():
+        misfit = line_misfit if name in lines.row_axes else gain_misfit
         chosen = _smallest_range(column[inside], misfit[inside])
         if column.dtype.kind == "U":
             ranges[name] = [str(chosen[0])]

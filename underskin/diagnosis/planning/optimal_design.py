@@ -33,6 +33,11 @@ _SURVIVES = 0.02
 _RIVALS = 4
 _PROMISING = 0.3  # chance of deciding below which recordings are not proposed
 WRONG_MODULUS = "modulus_error"
+_OF_FRFS = (  # what can be varied
+    *("preload_n", "indenter_radius_mm", "position_mm", "dwell_s", "sensor", "dynamic_force_n", "load_cycles"),
+    "frequency_hz",
+)
+_OF_CURVES = ("indenter_radius_mm", "displacement_mm", "force_n", "time_s", "sample_height_mm", "sample_diameter_mm")
 _MODULUS = ("youngs_modulus", "modulus_factor")  # whose logarithms make that of E
 _OF_BLOCK = 0.03  # relative, of E by a block: 2 % from piece to piece, and its fit
 
@@ -49,6 +54,7 @@ class NextRecordings:
     minutes: float = 0.0
     beyond: bool = False  # the recordings go beyond what the campaign did
     differ_on: Collection[str] = ()  # axes on which the rivals differ, where there are no recordings
+    outside: bool = False  # all recordings within the limits lie beyond the tables
     block: float | None = None  # chance that E from a block tells whether the modulus is wrong, where that is promising
 
 
@@ -57,25 +63,31 @@ def plan(problem: FittingProblem, search: Search, limits: RigLimits) -> NextReco
     surviving = [answer for answer in search.answers if answer.probability > _SURVIVES][:_RIVALS]
     if len(surviving) < 2:
         return None
+    outside = False
     if not problem.lines.curves:
         within = inferred(problem.lines.campaign, limits)
         for beyond, rig in enumerate([within] if limits.given else [within, wider(problem.lines.campaign, within)]):
             planned = _planned(problem, surviving, rig, bool(beyond))
             if planned and planned.probability >= _PROMISING:
                 return replace(planned, block=_by_block(problem, surviving))
+            outside = planned is not None and planned.outside
     if surviving[0].probability >= EXPLAINED:
         return None
-    return replace(_nothing_to_plan(surviving), block=_by_block(problem, surviving))
+    nothing = _nothing_to_plan(surviving, _OF_CURVES if problem.lines.curves else _OF_FRFS)
+    return replace(nothing, outside=outside, block=_by_block(problem, surviving))
 
 
 def _planned(
     problem: FittingProblem, surviving: Sequence[Answer], limits: RigLimits, beyond: bool
 ) -> NextRecordings | None:
-    """The best recordings within these limits; None where none brings anything."""
+    """The best recordings within these limits; None where none brings anything, none in number where the tables hold
+    none of them."""
     allowed = candidates(problem.lines.campaign, limits)
     rivals, outlook, allowed = _outlook(problem, surviving, allowed)
-    if len(rivals) < 2 or not allowed:
+    if len(rivals) < 2:
         return None
+    if not allowed:
+        return NextRecordings([answer.names for answer in rivals], outside=True)
     chosen, chance = _choose(outlook, allowed, limits)
     if not chosen:
         return None
@@ -118,10 +130,11 @@ def _log_modulus(explanation: Explanation) -> tuple[float, float]:
     return float(explanation.point.fit[places].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
-def _nothing_to_plan(surviving: Sequence[Answer]) -> NextRecordings:
-    """No recordings, and on which axes the rivals would differ."""
+def _nothing_to_plan(surviving: Sequence[Answer], varied: Collection[str]) -> NextRecordings:
+    """No recordings, and on which of the axes that can be `varied` the rivals would differ."""
     names = [answer.names for answer in surviving]
-    axes = [{axis for name in own for axis in CATALOGUE[name].axes} for own in names if set(own) <= set(CATALOGUE)]
+    known = [own for own in names if set(own) <= set(CATALOGUE)]
+    axes = [{axis for name in own for axis in CATALOGUE[name].axes if axis in varied} for own in known]
     return NextRecordings(
         names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)}
     )

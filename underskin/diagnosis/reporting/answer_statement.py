@@ -76,8 +76,12 @@ def answer_statement(
     stated, *means = _answer(answers, verdict, model, of_answer, all_used=not around.slips)
     reserve = _reserve(fit) if fit is not None and verdict in ("explained", "no_mismatch") else ""
     of_curves = fit is not None and "youngs_modulus" in fit["before"]
-    modulus = [modulus_clause(fit["after"])] if fit is not None and of_curves and verdict != "unexplained" else []
-    quoted = [*around.quoted, *modulus]
+    modulus = ""
+    if fit is not None and of_curves and verdict != "unexplained":
+        settled = verdict != "ambiguous"
+        how = "under this answer" if settled else f"with {in_words(fit['mechanisms'])}, which is not settled"
+        modulus = _modulus_clause(fit["after"], how)
+    quoted = [*around.quoted, modulus]
     first = around.first(stated, reserve)
     if verdict == "no_mismatch":
         return of_clauses(first, [*means, *quoted], [power_clause(power, kind)])
@@ -157,11 +161,11 @@ def _law(names: Sequence[str]) -> str:
 def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
     """The first parameter of each of a few mechanisms."""
     each = [
-        f"{in_words([entry['name']])} has a {parameter_in_words(entry['parameters'][0])}"
+        (in_words([entry["name"]]), parameter_in_words(entry["parameters"][0]))
         for entry in mechanisms[:_STATED]
         if entry["parameters"]
     ]
-    return ", ".join(each)
+    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in each)
 
 
 def parameter_in_words(entry: Mapping[str, Any]) -> str:
@@ -198,11 +202,11 @@ def first_and_rest(statement: str) -> tuple[str, str]:
     return first.rstrip("."), rest
 
 
-def modulus_clause(after: Mapping[str, Any]) -> str:
-    """E of curves under the stated answer."""
+def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
+    """E of curves, and what it is under."""
     modulus = after["youngs_modulus"]
     interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
-    return f"Young's modulus under this answer: {modulus['value']:.3g} {modulus['unit']} ({interval})"
+    return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 
 
 def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
@@ -216,7 +220,8 @@ def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None
     if law is not None:
         added = f"this law and {in_words(law)}" if law else "this law"
     beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
-    return f"{said}{beside}" + (f"; {modulus_clause(after)}" if added and "youngs_modulus" in after else "")
+    modulus = _modulus_clause(after, f"with {added}") if added and "youngs_modulus" in after else ""
+    return f"{said}{beside}" + (f"; {modulus}" if modulus else "")
 
 
 def power_clause(power: Sequence[Power], kind: Kind) -> str:

@@ -23,11 +23,10 @@ def explains_percent(
     name: str,
     whole: cross_validation.PredictionScore,
 ) -> float | None:
-    """How much of the misfit beyond noise, without the mechanism, it takes away [%].
+    """How much of the base model's misfit beyond noise comes back where the mechanism is left out of its set [%].
 
-    None where the set without it was not fitted, or where the misfit without it is no larger than noise makes it: an
-    effect that only many recordings together tell. A mechanism that adds variance takes nothing away (see
-    `_share_of_variance`).
+    None where the misfit without it is no larger than noise makes it: an effect that only many recordings together
+    tell. A mechanism that adds variance takes nothing away (see `_share_of_variance`).
     """
     own = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
     if any(entry.acts_on == "line_variance" for entry in own):
@@ -36,10 +35,17 @@ def explains_percent(
     known = [entry for entry in (*search.explanations, *search.laws) if entry.names == rest]
     without = known[0] if known else problem.explain([Request(rest)])[0]
     assert without is not None  # alone, nothing is left out
-    misfit = cross_validation.in_sample(problem, without)
-    beyond = misfit.square / misfit.size - whole.noise / whole.size
-    left = whole.square / whole.size - whole.noise / whole.size
-    return round(100 * float(np.clip(1 - max(left, 0.0) / beyond, 0.0, 1.0)), 1) if beyond > 0 else None
+    nothing = next(entry for entry in search.explanations if not entry.names)
+    noise = whole.noise / whole.size
+    of_base, beyond = (_relative_square(problem, entry) - noise for entry in (nothing, without))
+    left = max(whole.square / whole.size - noise, 0.0)
+    back = (beyond - left) / max(of_base, beyond) if beyond > 0 else None
+    return None if back is None else round(100 * float(np.clip(back, 0.0, 1.0)), 1)
+
+
+def _relative_square(problem: FittingProblem, explanation: Explanation) -> float:
+    misfit = cross_validation.in_sample(problem, explanation)
+    return misfit.square / misfit.size
 
 
 def _share_of_variance(explanation: Explanation) -> float:

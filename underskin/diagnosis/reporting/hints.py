@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 _ANY = ""
 TURNED = "time_s, on the way back"
+CONSTANT_PHASE = "frequency_hz, the same angle"
 HINTS: Mapping[tuple[str, str], str] = {
     ("modulus", "recorded_at"): "A skin that warms up, cures on or swells would do this; note its temperature.",
     ("modulus", "time_of_day"): "The temperature of the room would do this; at equal temperature it should vanish.",
@@ -70,6 +71,11 @@ HINTS: Mapping[tuple[str, str], str] = {
     ): "Play of the stage, or a surface that does not come back, would do this; press a stiff block.",
     ("frequency_response", "frequency_hz"): "A resonance of the frame, an electronic filter or a cable would do this; "
     "record a stiff steel block in place of the skin.",
+    (
+        "frequency_response",
+        CONSTANT_PHASE,
+    ): "The reference phase of a lock-in amplifier, or a sensor's loss angle, would "
+    "do this; record a stiff steel block in place of the skin.",
     ("frequency_response", "dynamic_force_n"): "Friction that grows with the amplitude would do this; record at "
     "several dynamic forces.",
     ("frequency_response", "preload_n"): "Losses in the contact that grow with the preload would do this.",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.reporting.answer_statement import Around
-from underskin.diagnosis.reporting.hints import TURNED, hint
+from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
@@ -37,13 +37,13 @@ def statement(
     `left` says how far the base model goes on curves; the law may be `outweighed` by a course of no form.
     """
     law = leading.law
-    acts_on, axis = law.spoken.acts_on, law.spoken.axis
+    acts_on = law.spoken.acts_on
     beside = tuple(name for name in leading.explanation.names if name != law.name)
     known = f" beside {_listed(beside)}" if beside else ""
     held = document["heldout_rmse_percent"]
-    worth = _worth(held, floor, _held_out(law))
+    worth = _worth(held, floor, _held_out(law), f" and {_listed(beside)}" if beside else "")
     altered = [*_altered(law, document), *_order(law, document)]
-    missing = [f"what is missing{known} {_does(law)}{_follows(leading)}: {_size(leading)}", worth, *altered]
+    missing = [f"what is missing{known} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, *altered]
     rivals = [
         f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
         f"({in_percent(entry['probability'])} of it)"
@@ -52,10 +52,17 @@ def statement(
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
     if outweighed:
         also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
-    turns = isinstance(law, CurveLaw) and law.shape.variant == TURN
-    told = "" if altered or leading.is_constant else hint(acts_on, TURNED if turns else axis)
+    told = "" if altered or leading.is_constant else hint(acts_on, _hinted(leading))
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
     return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
+
+
+def _hinted(leading: LeadingLaw) -> str:
+    """What it follows, as hints have it."""
+    law = leading.law
+    if isinstance(law, CurveLaw) and law.shape.variant == TURN:
+        return TURNED
+    return CONSTANT_PHASE if leading.is_constant_phase else law.spoken.axis
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -94,13 +101,16 @@ def _held_out(law: UnnamedLaw) -> str:
     return "samples" if isinstance(law, CurveLaw) else "recordings"
 
 
-def _does(law: UnnamedLaw) -> str:
+def _does(leading: LeadingLaw) -> str:
+    law = leading.law
     acts_on = law.spoken.acts_on
     of_curves = {
         "position": "moves the surface along the travel",
         "gain": "changes the gain of the cell",
         "force": "adds to the force that is read",
     }
+    if leading.is_constant_phase:
+        return "turns the frequency response"
     if isinstance(law, CurveLaw) and acts_on in of_curves:
         return of_curves[acts_on]
     return {
@@ -112,6 +122,8 @@ def _does(law: UnnamedLaw) -> str:
 
 
 def _follows(leading: LeadingLaw) -> str:
+    if leading.is_constant_phase:
+        return " by the same angle at all frequencies"
     return ", the same in all recordings" if leading.is_constant else f" with {_axis_words(leading)}"
 
 
@@ -147,7 +159,7 @@ def _size(leading: LeadingLaw) -> str:
 
 def _where(leading: LeadingLaw, at: float) -> str:
     axis = leading.axis
-    if leading.is_constant:
+    if leading.is_constant or leading.is_constant_phase:
         return ""
     if isinstance(leading.law, CurveLaw) and leading.law.shape.variant == TURN:
         return "on the way back"
@@ -164,11 +176,11 @@ def _where(leading: LeadingLaw, at: float) -> str:
     return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
 
 
-def _worth(held: Mapping[str, float | None], floor: float, what: str) -> str:
+def _worth(held: Mapping[str, float | None], floor: float, what: str, beside: str) -> str:
     noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
     if held["before"] is None or held["after"] is None:
         return f"too few {what} to hold any out"
     after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
     if held["after"] >= held["before"]:
         return f"it predicts {what} held out no better: to {after} % instead of {before} %{noise}"
-    return f"with it, {what} held out are predicted to {after} % instead of {before} %{noise}"
+    return f"with it{beside}, {what} held out are predicted to {after} % instead of {before} %{noise}"

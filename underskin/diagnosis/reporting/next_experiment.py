@@ -9,6 +9,13 @@ from underskin.diagnosis.reporting.statements import listed
 from underskin.findings.formatting import in_percent
 
 _STIFFENING = "strain_stiffening"
+_VARIED = {  # of curves, as `WORDS` else
+    "displacement_mm": "depth",
+    "force_n": "largest force",
+    "sample_diameter_mm": "diameter of the sample",
+    "sample_height_mm": "height of the sample",
+    "time_s": "speed and the time of a hold",
+}
 
 
 def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
@@ -41,8 +48,9 @@ def _statement(plan: NextRecordings) -> str:
     assert first is not None
     count = f"{len(plan.recordings)} recordings, first" if len(plan.recordings) > 1 else "One recording"
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
+    how = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
     return (
-        f"{count} with the {first.indenter_radius_mm:g} mm sphere at {first.preload_n:g} N, should tell whether "
+        f"{count} {how}, should tell whether "
         f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
 
@@ -58,9 +66,14 @@ def _block(plan: NextRecordings) -> str:
 
 
 def _why_none(plan: NextRecordings) -> str:
+    if plan.outside:
+        return (
+            f"No recordings within these limits can be planned to tell whether it is {_rivals(plan)}: the tables hold "
+            f"none of their contacts; choose spheres and preloads nearer to those of the campaign.{_block(plan)}"
+        )
     statement = f"No recordings within these limits are likely to tell whether it is {_rivals(plan)}."
     if plan.differ_on:
-        words = sorted(WORDS[axis][0] if axis in WORDS else axis for axis in plan.differ_on)
+        words = sorted(_VARIED[axis] if axis in _VARIED else WORDS[axis][0] for axis in plan.differ_on)
         statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
     return statement + _block(plan)
 

@@ -283,7 +283,7 @@ def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool)
                 "axis": entry.axis,
                 "p_value": None if entry.p_value is None else round(entry.p_value, 3),
                 "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": statements.UNDECIDABLE[entry.reason]} if entry.reason else {}),
+                **({"undecidable": why} if (why := statements.undecidable(entry)) else {}),
             }
             for entry in diagnosis.axes
         ],

@@ -9,7 +9,7 @@ import numpy as np
 from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.reporting import averaged
-from underskin.diagnosis.reporting.statements import CONFOUNDED
+from underskin.diagnosis.reporting.statements import CONFOUNDED, listed
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness
@@ -38,9 +38,11 @@ class StatedD33:
     skin_pc_per_n: float | None = None
 
     @property
-    def declared(self) -> list[HiddenShift]:
-        """The hidden ones that are wrong declared numbers, the largest first."""
-        chosen = [entry for entry in self.hidden if entry.declared]
+    def deciding(self) -> list[HiddenShift]:
+        """What keeps d33 from being quoted: hidden wrong declared numbers, and what would change it as much, the
+        largest first; none where no declared number does."""
+        least = min((abs(entry.log_factor) for entry in self.hidden if entry.declared), default=np.inf)
+        chosen = [entry for entry in self.hidden if abs(entry.log_factor) >= least]
         return sorted(chosen, key=lambda entry: -abs(entry.log_factor))
 
     def clause(self) -> str:
@@ -74,9 +76,9 @@ class StatedD33:
         assert self.document is not None
         low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
         lies = f"it lies from {low} to {high} {self.document['unit']}{self._beside_declared()}"
-        if self.declared:
-            each = " and ".join(f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.declared)
-            return f"{lies}, but what would not show here would change it, {each}"
+        deciding = [f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.deciding[:_MOST_NAMED]]
+        if deciding:
+            return f"{lies}, but what would not show here would change it, {listed(deciding)}"
         over = " over the answers that remain" if _ANSWERS in self.why_not else ""
         others = " and ".join(words for words in self.why_not if words != _ANSWERS)
         return f"{lies}{over}" + (f", {'and' if over else 'but'} {others}" if others else "")
@@ -86,7 +88,7 @@ class StatedD33:
         """Why it is not to be quoted; none where it is."""
         if self.document is None:
             return list(self.why_not) or ["no answer explains its recordings"]
-        hidden = in_words([one.mechanism for one in self.declared])
+        hidden = in_words([one.mechanism for one in self.deciding[:_MOST_NAMED]])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
@@ -142,7 +144,7 @@ def stated_d33(
     # Beside other reasons not to quote it, a hidden one would not be what decides.
     quotable = {**d33, "quotable": not why_not}
     stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
-    return replace(stated, document={**d33, "quotable": False}) if stated.declared else stated
+    return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
 
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:

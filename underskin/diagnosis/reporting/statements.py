@@ -7,7 +7,7 @@ import numpy as np
 from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.localisation.effect_size import EffectSize
-from underskin.diagnosis.localisation.permutation_test import SIGNIFICANT, AxisResult, Undecidable
+from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
 from underskin.diagnosis.localisation.residual_shape import ALONG_CURVES, FormKind, Shape, ShapeForm
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.identifiability import Likeness
@@ -75,12 +75,24 @@ def _round(value: float) -> str:
     return f"{float(f'{value:.1g}'):.0f}" if value >= 10 else f"{value:.1g}"
 
 
-UNDECIDABLE: Mapping[Undecidable, str] = {
+_UNDECIDABLE: Mapping[Undecidable, str] = {
     Undecidable.FEW_EXCHANGEABLE: "too few recordings that could be exchanged",
     Undecidable.FEW_RECORDINGS: "too few recordings to tell it from the other axes",
-    Undecidable.ALIASED: "the other axes determine it in this design",
+    Undecidable.ALIASED: "the other axes together determine it in this design",
     Undecidable.FEW_SIGNS: "fewer than 6 recordings, whose signs could be changed",
 }
+
+
+_DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # as in `WORDS` else
+
+
+def undecidable(entry: AxisResult) -> str:
+    """Why it cannot be decided whether the residual depends on an axis; empty where it can."""
+    if not entry.determined_by:
+        return "" if entry.reason is None else _UNDECIDABLE[entry.reason]
+    named = listed([_DETERMINING.get(name, WORDS[name][0]) for name in entry.determined_by])
+    determine = "determines" if len(entry.determined_by) == 1 else "together determine"
+    return f"{named} {determine} it in this design"
 
 
 CONFOUNDED: Mapping[Likeness, str] = {
@@ -102,21 +114,37 @@ def location_statement(
 ) -> str:
     """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
     that recordings and model agree within the noise."""
-    telling = [entry for entry in axes if entry.p_value is not None and entry.p_value < SIGNIFICANT]
-    undecidable = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
-    tail = f"; whether it depends on {listed(undecidable)}, this design cannot tell" if undecidable else ""
-    if len(undecidable) == len(axes) and undecidable:
-        return f"Whether the misfit depends on {listed(undecidable)}, this design cannot tell."
-    if not telling:
+    unknown = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
+    tail = f"; whether it depends on {listed(unknown)}, this design cannot tell" if unknown else ""
+    if len(unknown) == len(axes) and unknown:
+        return f"Whether the misfit depends on {listed(unknown)}, this design cannot tell."
+    beyond_chance = [entry for entry in axes if entry.significant]
+    if not beyond_chance:
         return f"The misfit changes with nothing that was varied, beyond chance{tail}."
-    names = listed([WORDS[entry.axis][0] for entry in sorted(telling, key=lambda entry: entry.p_value or 0.0)])
+    telling = [entry for entry in beyond_chance if entry.telling]
+    named = sorted(telling or beyond_chance, key=lambda entry: entry.p_value or 0.0)
+    names = listed([WORDS[entry.axis][0] for entry in named])
+    if not telling and not agrees:
+        return (
+            f"The misfit changes with {names} beyond chance, but no more than a trace of it goes along with that{tail}."
+        )
     if agrees:
         return (
             f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
         )
-    parts = [_range(name, ends) for name, ends in region.items() if not whole[name]]
-    where = f"most of it lies at {listed(parts)}, where" if parts else "it is spread over all of the recordings, where"
-    return f"The misfit depends on {names}; {where} {_size(effect)}{tail}."
+    return f"The misfit depends on {names}; {_where(region, whole)}, where {_size(effect)}{tail}."
+
+
+def _where(region: Mapping[str, Sequence[float | str]], whole: Mapping[str, bool]) -> str:
+    """Along which ranges most of it lies, and at which sensor or on which day it is largest."""
+    ranges: list[str] = []
+    levels: list[str] = []
+    for name, ends in region.items():
+        if not whole[name]:
+            (levels if isinstance(ends[0], str) else ranges).append(_range(name, ends))
+    parts = [f"most of it lies at {listed(ranges)}"] if ranges else []
+    parts += [f"it is largest at {listed(levels)}"] if levels else []
+    return listed(parts) if parts else "it is spread over all of the recordings"
 
 
 def _size(effect: EffectSize) -> str:

@@ -23,6 +23,7 @@ from underskin.units import Floats
 _RIVALS, _LEAST_RIVAL = 5, 0.01
 _PLACES = 41  # along the axis, at which a course is looked at
 _STATED = 21  # of these, at which a smooth one is stated
+_LEVEL = 0.1  # of a phase, that it may change along the band and still be called constant
 _STEP = 1e-4  # of fit coordinates, for a course's band
 _OUTWEIGHED = 3.0  # nats
 SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
@@ -100,6 +101,12 @@ class LeadingLaw:
     def is_phase(self) -> bool:
         """Whether it turns the phase alone."""
         return isinstance(self.law, FrequencyLaw) and self.law.variant in ("phase", "delay")
+
+    @property
+    def is_constant_phase(self) -> bool:
+        """Whether it turns the phase alone, by nearly the same angle all along the band."""
+        ends = self.change(np.array(self.ends)) if self.is_phase else np.zeros(2)
+        return bool(np.ptp(ends) < _LEVEL * np.abs(ends).max())
 
     @property
     def is_constant(self) -> bool:

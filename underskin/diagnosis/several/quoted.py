@@ -40,12 +40,12 @@ def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Map
 
 
 def not_identifiable(each: Mapping[str, StatedD33]) -> list[dict[str, str]]:
-    """Wrong declared numbers that would not show in a campaign, or in a skin's, and would change its d33."""
+    """What would not show in a campaign, or in a skin's, and keeps its d33 from being quoted."""
     return [
         {**entry, "reason": f"{name} alone: {entry['reason']}"}
         for name, own in each.items()
         for entry in own.not_identifiable([])
-        if entry["mechanism"] in {one.mechanism for one in own.declared}
+        if entry["mechanism"] in {one.mechanism for one in own.deciding}
     ]
 
 

@@ -4,8 +4,9 @@ Re FRF of each recording, over its own level, is gathered in bins of equal width
 recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
 bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
 slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
-stand out of their neighbours are left out, and so are bins in which the charge does not follow the force: noise that
-was not excited there may be flat, too.
+stand out of their neighbours are left out, and so are lines at which the charge does not follow the force: noise that
+was not excited there may be flat, too. Those are the lines of bins whose median coherence is low, but for the few among
+them whose own is high: a force of a few sines excites one line in many.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
-from underskin.recordings.frf.flat_zone_reason import levels_of, reason_of
+from underskin.recordings.frf.flat_zone_reason import Idle, levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.recordings.frf.stacks import Stack
 from underskin.units import Floats, Indices, Mask
@@ -26,25 +27,28 @@ _BINS_PER_DECADE = 12
 _BEYOND_NOISE = 3.0
 _OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
 _NEIGHBOURS = 11
-_LEAST_COHERENCE = 0.5  # of lines that count as excited
+_LEAST_COHERENCE = 0.5  # of bins whose lines count as excited
+_CLEAR_COHERENCE = 0.9  # of a line that does among others that do not: noise alone hardly reaches it
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
 
 @dataclass(frozen=True)
 class FlatZone:
-    """A band, limits included, the reason for it in words, and the lines inside it that are left out."""
+    """A band, limits included, the reason for it in words, and the lines inside it that are left out: those that mains
+    spoil, and those that were not excited."""
 
     low_hz: float
     high_hz: float
     reason: str
     left_out_hz: tuple[float, ...] = ()
+    idle_hz: tuple[float, ...] = ()
     chosen_by_user: bool = False
 
     def holds(self, frequency: Floats) -> Mask:
         """Which lines are averaged."""
         inside = (frequency >= self.low_hz) & (frequency <= self.high_hz)
-        return inside & ~np.isin(np.round(frequency, 6), self.left_out_hz)
+        return inside & ~np.isin(np.round(frequency, 6), (*self.left_out_hz, *self.idle_hz))
 
 
 def flat_zone(
@@ -85,8 +89,8 @@ def flat_zone(
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
     decades = float(np.log10(frequencies[-1] / frequencies[0]))
     edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
-    excited = _excited(stacks, edges)
-    followed = [stack.at(excited[_bin_of(stack.frequency, edges)]) for stack in stacks]
+    excited = _excited(stacks, frequencies, edges)
+    followed = [stack.at(np.isin(stack.frequency, frequencies[excited])) for stack in stacks]
     ratio = _binned(followed, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
@@ -96,30 +100,45 @@ def flat_zone(
     middle = np.sqrt(edges[1:] * edges[:-1])[filled]
     curves, noise = curves[:, filled], noise[:, filled]
     first, last, slope = _widest(np.log(middle), curves, noise)
-    low = frequencies[frequencies >= edges[filled[first]] * (1 - 1e-12)][0]
-    high = frequencies[frequencies <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
+    followed_hz = frequencies[excited]
+    low = followed_hz[followed_hz >= edges[filled[first]] * (1 - 1e-12)][0]
+    high = followed_hz[followed_hz <= edges[filled[last] + 1] * (1 + 1e-12)][-1]
     left_out = tuple(line for line in mains if low <= line <= high)
-    idle = (not excited[: filled[0]].all(), not excited[filled[-1] + 1 :].all())
+    idle_hz = frequencies[~excited]
+    idle = Idle(
+        bool((idle_hz < low).any()), bool((idle_hz > high).any()), int(((idle_hz > low) & (idle_hz < high)).sum())
+    )
     reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, idle)
-    return FlatZone(float(low), float(high), reason, left_out)
+    return FlatZone(float(low), float(high), reason, left_out, tuple(np.round(idle_hz, 6).tolist()))
 
 
 def _bin_of(frequency: Floats, edges: Floats) -> Indices:
     return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
 
 
-def _excited(stacks: Sequence[Stack], edges: Floats) -> Mask:
-    """In which bins (bins,) the charge follows the force, by the median coherence; also where none is known, and in all
-    where it follows in none."""
-    bins = np.concatenate(
-        [np.broadcast_to(_bin_of(one.frequency, edges), one.coherence.shape).ravel() for one in stacks]
+def _excited(stacks: Sequence[Stack], frequencies: Floats, edges: Floats) -> Mask:
+    """At which lines (lines,) the charge follows the force, by the median coherence of their bin, or clearly by that of
+    their own; also where none is known, and at all where it follows at none."""
+    line = np.concatenate(
+        [np.broadcast_to(np.searchsorted(frequencies, one.frequency), one.coherence.shape).ravel() for one in stacks]
     )
     coherence = np.concatenate([one.coherence.ravel() for one in stacks])
-    known = np.isfinite(coherence)
-    follows = np.ones(len(edges) - 1, bool)
-    for number in np.unique(bins[known]):
-        follows[number] = np.median(coherence[known & (bins == number)]) >= _LEAST_COHERENCE
-    return follows if follows[np.unique(bins)].any() else np.ones_like(follows)
+    line, coherence = line[np.isfinite(coherence)], coherence[np.isfinite(coherence)]
+    bins = _bin_of(frequencies, edges)
+    of_bins = _medians(bins[line], coherence, len(edges) - 1)
+    of_lines = _medians(line, coherence, len(frequencies))
+    follows = ~(of_bins[bins] < _LEAST_COHERENCE) | (of_lines >= _CLEAR_COHERENCE)
+    return follows if follows.any() else np.ones_like(follows)
+
+
+def _medians(group: Indices, values: Floats, groups: int) -> Floats:
+    """The median of the values of each group (groups,); NaN of those without any."""
+    medians = np.full(groups, np.nan)
+    order = np.argsort(group, kind="stable")
+    known, first = np.unique(group[order], return_index=True)
+    parts = np.split(values[order], first[1:])
+    medians[known] = [np.median(part) for part in parts] if len(known) else []
+    return medians
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
