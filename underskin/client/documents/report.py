@@ -169,7 +169,7 @@ class ReportMechanism(Document):
     """How strong it is."""
 
     explains_percent: float | None
-    """Share of the misfit beyond noise that it takes away [%]; null where that says nothing."""
+    """Share of the misfit beyond noise that comes back without it [%]; null where that says nothing."""
 
     scope: Scope | None
     """Of several campaigns or skins: where it acts."""
