@@ -12,6 +12,8 @@ from underskin.findings.formatting import in_digits, in_percent, significant
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
+_LOPSIDED = 1.1  # how many times as far up as down: less is not seen in the digits of an interval
+
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
     """A computed number to so many digits, with its unit; the pointer shows all its digits."""
@@ -31,6 +33,11 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
         ' <span class="quiet" title="with a probability of 95 % it lies between these">(95 %: {} to {})</span>'
     )
     return text + ends.format(*shown[1:])
+
+
+def reaches_up(value: float | None, low: float | None, high: float | None) -> bool:
+    """Whether an interval reaches clearly further above its value than below."""
+    return value is not None and low is not None and high is not None and high - value > _LOPSIDED * (value - low)
 
 
 def end_of(value: float | None, low: float | None, high: float | None) -> Markup:
@@ -122,5 +129,5 @@ def recordings(kinds: Sequence[str]) -> str:
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
-    "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings,
+    "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings, "reaches_up": reaches_up,
 }  # fmt: skip
