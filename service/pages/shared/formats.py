@@ -59,7 +59,7 @@ def _to_places(value: float, places: int) -> str:
 
 def given(value: float | None, unit: str = "") -> Markup:
     """A number as somebody gave it, with its unit."""
-    return _with_unit("–" if value is None else f"{value:.6g}", "" if value is None else repr(value), unit)
+    return _with_unit("–", "", "") if value is None else _with_unit(f"{value:.6g}", repr(value), unit)
 
 
 def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, str]:

@@ -98,7 +98,7 @@ def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> No
         try:
             pending.rig, pending.rig_label = sent_rig(sent), sent.label
         except (FileError, InvalidInput) as error:
-            pending.refused = field_errors(error)
+            pending.refused = [{**entry, RIG: sent.label or RIG} for entry in field_errors(error)]
     elif pending.skin is not None:
         pending.rig = store.read(kept_rig, pending.skin)
         origin = store.read(skins.rig_origin, pending.skin)

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from service.pages.shared.formats import end_of, interval
+from service.pages.shared.formats import end_of, given, interval
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support.store_server import Server, campaign
@@ -44,6 +44,10 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: 
     page.get_by_text("Why this band").click()
     assert page.get_by_text("no resonance in any recording").is_visible()
     reader.require_accessible()
+
+
+def test_what_was_not_given_has_no_unit() -> None:
+    assert [re.sub("<[^>]*>", "", given(value, "mm")) for value in (2.5, None)] == ["2.5&nbsp;mm", "–"]
 
 
 @pytest.mark.parametrize("second", [1.0, 0.7])
