@@ -1,6 +1,7 @@
 """Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
 
 import httpx
+from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, token_of
@@ -66,7 +67,10 @@ def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -
     exclude.get_by_label("Recording").fill("s9")
     exclude.get_by_label("Reason").fill("a guess")
     exclude.get_by_role("button", name="Exclude").click()
-    assert "s9" in page.get_by_role("alert").inner_text()
+    said = page.get_by_role("alert")
+    assert "s9" in said.inner_text()
+    expect(said).to_be_focused()  # far below the top of the page
+    expect(said).to_be_in_viewport()
     reader.require_accessible()
     reader.wrong.clear()  # the browser says so of every 404
     page.go_back()
