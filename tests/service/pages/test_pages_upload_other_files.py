@@ -81,6 +81,7 @@ def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not
     look_at(visitor, [file("good.json", as_json(campaign("whole", id="both"))), curve])
     lost = page.get_by_role("region", name="What will not be kept")
     expect(lost).to_contain_text("afm.txt, the whole file: nobody has said yet what its channels are")
+    expect(page.get_by_label("Name of the campaign")).to_have_value("good.json")
     lost.get_by_role("link", name="afm.txt").click()
     expect(page.get_by_role("heading", name="afm.txt")).to_be_visible()
     expect(page.get_by_text("What the channels are")).to_be_visible()
