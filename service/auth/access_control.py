@@ -42,8 +42,9 @@ class AccessControl:
         self._hosts = frozenset(name.encode() for name in self.host_names | LOOPBACK_NAMES)
         self._damage = ""  # of keys.json, as it was logged last
 
-    def check(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
-        """The key that came with the request, None where none is needed; raises Refusal."""
+    def check(self, method: str, path: str, headers: Mapping[bytes, bytes], query: bytes = b"") -> Key | None:
+        """The key that came with the request, None where none is needed; raises Refusal. `query`: of the address, to
+        which a browser comes back once it is logged in."""
         host = headers.get(b"host", b"")
         if _name(host) not in self._hosts:
             raise Refusal(
@@ -52,7 +53,7 @@ class AccessControl:
         if method not in SAFE:
             _check_origin(headers.get(b"origin"), host)
             self.check_size(_number(headers.get(b"content-length", b"")), path, headers)
-        return None if path in OPEN else self._check_key(method, path, headers)
+        return None if path in OPEN else self._check_key(method, path, headers, query)
 
     def keys_needed(self) -> bool:
         """Whether a request without a key is refused."""
@@ -83,7 +84,7 @@ class AccessControl:
         with self._readable_keys():
             return self.keys.find(token.strip().encode())
 
-    def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes]) -> Key | None:
+    def _check_key(self, method: str, path: str, headers: Mapping[bytes, bytes], query: bytes) -> Key | None:
         if not self.keys_needed():
             return None
         is_open = path.startswith(_OPEN_PAGES)
@@ -97,7 +98,7 @@ class AccessControl:
             raise
         if key is None and not is_open:
             browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
-            raise _login_first(method, path) if browsing else _key_first(authorization, self.keys_missing())
+            raise _login_first(method, path, query) if browsing else _key_first(authorization, self.keys_missing())
         return key
 
     @contextmanager
@@ -138,8 +139,9 @@ def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
     return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
 
 
-def _login_first(method: str, path: str) -> Refusal:
-    back = quote(path) if method == "GET" else "/"
+def _login_first(method: str, path: str, query: bytes) -> Refusal:
+    asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
+    back = quote(asked) if method == "GET" else "/"
     return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
 
 

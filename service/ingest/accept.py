@@ -42,6 +42,7 @@ class IngestOptions:
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
     by_kept_rig: bool = True  # whether the rig description kept with the skin counts where none is sent
+    signed: str | None = None  # who corrects a campaign, as typed on a page; None: the sender
 
     def __post_init__(self) -> None:
         """Raises InvalidInput."""
@@ -190,7 +191,10 @@ def _kept(
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
     result["findings"] = [finding.sentence for finding in plausibility.implausible(campaign)]
     notes += [*_other_skin(connection, campaign, options), *_repeats(connection, campaign, options)]
-    arrival = campaigns.NewCampaign(campaign, options.skin, refused, notes, checked.file, options.sender)
+    corrected_from = options.signed or options.sender
+    arrival = campaigns.NewCampaign(
+        campaign, options.skin, refused, notes, checked.file, options.sender, corrected_from
+    )
     campaign_id, skin_id = campaigns.add(connection, arrival, corrects=options.corrects, reason=options.reason)
     if checked.by_rig and rig is not None:
         skins.keep_rig(connection, skin_id, instruments.of_skin(rig))

@@ -99,7 +99,7 @@ class AsgiMiddleware:
             raise Refusal(503, busy, headers={**RETRY_LATER, "Connection": "close"})
         if sum(name == b"host" for name, _ in scope["headers"]) > 1:  # a proxy may have checked the other one
             raise Refusal(400, "The request has several Host headers; it must have one.")
-        scope["key"] = self._access.check(method, path, headers)
+        scope["key"] = self._access.check(method, path, headers, scope["query_string"])
         with self._held.one() as hold:
             await self._answer_body(scope, headers, self._limited(receive, path, headers, hold), exchange)
 

@@ -107,7 +107,7 @@ def campaign_changes(campaign_id: CampaignId, store: Store) -> models.Changes:
 
 @router.get("/skins/{skin_id}/changes", operation_id="skin_changes", summary="What was changed of it", tags=["skins"])
 def skin_changes(skin_id: SkinId, store: Store) -> models.Changes:
-    """Of the skin itself and of those joined to it, not of its campaigns."""
+    """Of the skin itself and of those joined to it, withdrawn models among them, not of its campaigns."""
 
     def read(connection: Connection) -> models.Changes:
         return models.Changes(changes=usecase.of_skin(connection, skins.require_root(connection, skin_id)))

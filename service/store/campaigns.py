@@ -31,7 +31,7 @@ _IN_STATE = {
 
 @dataclass(frozen=True)
 class NewCampaign:
-    """A campaign as it came: what was refused of it, what its reader remarked, where it came from."""
+    """A campaign as it came: what was refused, what its reader remarked, where it came from, who corrects with it."""
 
     campaign: Campaign
     skin_id: str | None
@@ -39,6 +39,7 @@ class NewCampaign:
     notes: Sequence[str] = ()
     source: str | None = None
     received_from: str | None = None
+    corrected_from: str | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def add(
     keep(connection, row, campaign.recordings, [{}] * len(campaign.recordings))
     if replaced is not None:
         _change(connection, replaced.number, corrected_by=campaign_id)
-        changes.record(connection, "correct", skin_id, arrival.received_from, campaign_id=campaign_id, reason=reason)
+        changes.record(connection, "correct", skin_id, arrival.corrected_from, campaign_id=campaign_id, reason=reason)
     return campaign_id, skin_id
 
 
@@ -254,9 +255,7 @@ def withdraw(connection: Connection, campaign_id: str, reason: str, withdrawn_fr
     changes.record(connection, "withdraw", row.skin_id, withdrawn_from, campaign_id=campaign_id, reason=reason)
 
 
-def exclude(
-    connection: Connection, campaign_id: str, recording_id: str, reason: str, excluded_from: str | None
-) -> None:
+def exclude(connection: Connection, campaign_id: str, recording_id: str, reason: str, made_from: str | None) -> None:
     """Leave a recording out of all figures; raises Missing, Conflict."""
     row = _changeable(connection, campaign_id)
     this = (recordings.c.campaign == row.number) & (recordings.c.id == recording_id)
@@ -265,17 +264,11 @@ def exclude(
         raise Missing(f"Campaign {campaign_id!r} has no recording {recording_id!r}.")
     if recording.excluded_at is not None:
         raise Conflict(f"Recording {recording_id!r} is excluded already: {recording.exclude_reason}")
-    values = {"excluded_at": now(), "exclude_reason": reason, "excluded_from": excluded_from}
+    values = {"excluded_at": now(), "exclude_reason": reason, "excluded_from": made_from}
     connection.execute(update(recordings).where(this).values(**values))
     _change(connection, row.number, excluded=campaigns.c.excluded + 1)
     changes.record(
-        connection,
-        "exclude",
-        row.skin_id,
-        excluded_from,
-        campaign_id=campaign_id,
-        recording=recording_id,
-        reason=reason,
+        connection, "exclude", row.skin_id, made_from, campaign_id=campaign_id, recording=recording_id, reason=reason
     )
 
 

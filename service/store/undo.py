@@ -10,6 +10,7 @@ from service.store import campaigns as kept_campaigns
 from service.store import changes as kept
 from service.store import skins
 from service.store.diagnosed_together import has_one_of
+from service.store.engine import holds
 from service.store.errors import Conflict
 from service.store.skin_changes import numbers_of
 from service.store.tables import AnyRow, campaigns, diagnoses, models, recordings
@@ -21,6 +22,8 @@ _FIGURES = ("withdraw", "exclude", "correct", "join")  # what changes figures; s
 
 def undo(connection: Connection, change_id: str, made_from: str | None) -> AnyRow:
     """Take a change back and keep that it was; the change. Raises Missing, Conflict."""
+    if holds(connection, models, id=change_id):
+        raise Conflict("This cannot be undone: a model that was withdrawn is adopted again from its diagnosis.")
     change = kept.find(connection, change_id)
     if change.campaign_id is not None:  # before the skin, as all that change a campaign
         row = kept_campaigns.find(connection, change.campaign_id, lock=True)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from sqlalchemy import Connection
 
 from service.schemas.changes import Change
-from service.store import AnyRow, changes, undo
+from service.store import AnyRow, changes, models, undo
 
 _MOST = 20  # the latest, of which it is said whether they can be undone
 _NAMES = ("name", "title")
@@ -19,8 +19,10 @@ def of_campaign(connection: Connection, campaign_id: str) -> list[Change]:
 
 
 def of_skin(connection: Connection, root: str) -> list[Change]:
-    """The latest changes of a skin itself."""
-    return _shown(connection, changes.of_skin(connection, root))
+    """The latest changes of a skin itself, and its models that were withdrawn, of which rows of models tell."""
+    withdrawn = [_withdrawn(row) for row in models.of_skin(connection, root) if row.model_withdrawn_at is not None]
+    recorded = _shown(connection, changes.of_skin(connection, root))
+    return sorted([*recorded, *withdrawn], key=lambda change: change.at, reverse=True)[:_MOST]
 
 
 def one(connection: Connection, change_id: str) -> Change:
@@ -42,6 +44,26 @@ def _shown(connection: Connection, rows: Sequence[AnyRow], most: int = _MOST) ->
         )
         for row in rows[:most]
     ]
+
+
+def _withdrawn(row: AnyRow) -> Change:
+    """An adopted model withdrawn: it comes back by another adoption, and not by undoing that."""
+    return Change(
+        id=row.model_id,
+        action="withdraw",
+        statement=f"adopted model, version {row.model_version}, withdrawn",
+        skin_id=row.model_skin_id,
+        campaign_id=None,
+        recording=None,
+        at=row.model_withdrawn_at,
+        made_from=row.model_withdrawn_from,
+        reason=row.model_withdraw_reason,
+        before={},
+        after={},
+        undoes=None,
+        undone=False,
+        may_be_undone=False,
+    )
 
 
 def _words(row: AnyRow) -> str:

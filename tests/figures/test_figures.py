@@ -106,6 +106,18 @@ def test_the_axis_of_a_single_campaign_spans_days() -> None:
     assert history().layout.xaxis.range is None
 
 
+def test_intervals_of_a_long_history_are_faint_and_keep_their_length() -> None:
+    def line(days: int) -> go.Scatter:
+        times = [f"2026-{1 + day // 28:02d}-{1 + day % 28:02d}T09:00:00Z" for day in range(days)]
+        (trace,) = d33_history([SensorPoints("s01", times, [14.0] * days, [0.1] * days, "")]).data
+        np.testing.assert_allclose(trace.error_y.array, 0.196)
+        return trace
+
+    few, many = line(60), line(61)
+    assert (few.error_y.color, few.error_y.width, few.marker.size) == (None, 3, 8)
+    assert (many.error_y.color, many.error_y.width, many.marker.size) == ("rgba(0,114,178,0.25)", 0, 4)
+
+
 def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_stand_apart() -> None:
     random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
     d33 = 14.0 + 0.4 * random.normal(size=(60, 2))

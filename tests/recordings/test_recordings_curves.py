@@ -148,7 +148,7 @@ def test_a_channel_may_tell_curves_or_segments_apart() -> None:
     each_is_the_curve(read(by_segment, SIMPLE, curves={"segments": "Segment"}), ["curve 1", "curve 2"])
     with pytest.raises(FileError, match=r"channel 'Force \(uN\)': changes \d+ times in 34 samples: it must tell"):
         read(by_segment, SIMPLE, curves={"channel": "Force (uN)"})
-    with pytest.raises(FileError, match="no part holds all of the rig's channels: Cycle is missing"):
+    with pytest.raises(FileError, match="no part holds all channels that the rig description names: it lacks Cycle"):
         read(by_segment, SIMPLE, curves={"channel": "Cycle"})
 
 

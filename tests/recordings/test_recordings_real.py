@@ -141,6 +141,6 @@ def test_other_universal_files() -> None:
     assert frequency.values == pytest.approx(np.arange(3201.0))
     with pytest.raises(
         FileError,
-        match=r"no part holds all of the rig's channels: force, amplifier is missing; it has .*Pressure|Mic|Hz",
+        match=r"no part holds all channels that .* names: it lacks force, amplifier; it has .*Pressure|Mic|Hz",
     ):
         read_file(spectrum, spectrum.name, rig())

@@ -139,7 +139,7 @@ def test_what_json_has_not_is_no_number(number: str) -> None:
         ),
         (
             {"channel": "charge", "unit": "pC"},
-            r"no part holds all .*: charge is missing; it has force \[mN\], amplifier \[\?\]",
+            r"no part holds all .*: it lacks charge; it has force \[mN\], amplifier \[\?\]",
         ),
     ],
 )
@@ -201,7 +201,7 @@ def test_a_channel_may_be_named_without_the_unit_in_brackets_behind_it() -> None
     assert recording.force_n == pytest.approx([0, 0.25, 0.25])
     both = rows.replace(";0", ";0;1").replace(";2.5", ";2.5;1")
     with pytest.raises(
-        FileError, match=r"no part holds .*: load is missing; it has depth \[um\], load \[V\], load \[mV\]"
+        FileError, match=r"no part holds .*: it lacks load; it has depth \[um\], load \[V\], load \[mV\]"
     ):
         read_file(f"depth [um];load [V];load [mV]\n{both}".encode(), "a.csv", described)
     (exact,) = read_file(f"depth [um];load;load [mV]\n{both}".encode(), "a.csv", described).campaign.recordings

@@ -12,6 +12,7 @@ from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 
 _MOST_POINTS = 600  # of a history that shows each sensor
+_MOST_APART = 60  # points of a line, whose intervals can be told apart
 _MOST_FAINT = 6000  # of a history that shows their median and spread
 _CHOSEN = COLOURS[2]
 _DAY, _DAY_MS = timedelta(days=1), 86_400_000
@@ -48,18 +49,26 @@ def d33_history(sensors: Sequence[SensorPoints], chosen: str | None = None) -> g
 
 def _one(number: int, entry: SensorPoints) -> go.Scatter:
     bars = [SDS_OF_95 * value for value in entry.d33_uncertainty_pc_per_n]
+    colour = LINE_COLOURS[number % len(LINE_COLOURS)]
+    dense = len(entry.times) > _MOST_APART
     return go.Scatter(
         x=list(entry.times),
         y=list(entry.d33_pc_per_n),
         customdata=[entry.sensor] * len(entry.times),
-        error_y={"type": "data", "array": bars, "thickness": 1, "width": 3},
+        error_y={"type": "data", "array": bars, "thickness": 1, **(_faint(colour) if dense else {"width": 3})},
         mode="lines+markers",
         name=label(entry.sensor),
-        line={"color": LINE_COLOURS[number % len(LINE_COLOURS)], "width": 1.5},
-        marker={"symbol": MARKERS[(number + number // len(LINE_COLOURS)) % len(MARKERS)], "size": 8},
+        line={"color": colour, "width": 1.5},
+        marker={"symbol": MARKERS[(number + number // len(LINE_COLOURS)) % len(MARKERS)], "size": 4 if dense else 8},
         hovertemplate=f"{label(entry.sensor)}, %{{x|%d %b %Y %H:%M}} UTC<br>d33 %{{y:.5g}} "
         f"± %{{error_y.array:.2g}} pC/N (95 %)<br>{label(entry.trend)}<extra></extra>",
     )
+
+
+def _faint(colour: str) -> dict[str, str | int]:
+    """Error bars of points that lie close to each other: without ends, and with what they cross seen through them."""
+    red, green, blue = (int(colour[place : place + 2], 16) for place in (1, 3, 5))
+    return {"width": 0, "color": f"rgba({red},{green},{blue},0.25)"}
 
 
 def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:

@@ -75,9 +75,8 @@ def _with_channels(rig: RigDescription, contents: Contents, file: str) -> list[B
         return blocks
     nearest = max(contents.blocks, key=lambda block: sum(map(bool, map(block.headed, names))), default=Block("", ()))
     missing = ", ".join(name for name in names if not nearest.headed(name))
-    raise FileError(
-        file, "", f"no part holds all of the rig's channels: {missing} is missing; it has {contents.described()}"
-    )
+    lacks = f"no part holds all channels that the rig description names: it lacks {missing}"
+    raise FileError(file, "", f"{lacks}; it has {contents.described()}")
 
 
 def _trimmed(block: Block, trim: Trim | None, file: str) -> Block:

@@ -52,7 +52,8 @@ def compare(
     kind = kind or _kind(store, table, skin, first)
     with store.reading() as connection:
         offered = [one for one in KINDS if campaigns.current_by_time(connection, skin or None, 1, kind=one)]
-        listed = list(campaigns.current_by_time(connection, skin or None, _MOST_LISTED, kind=kind))
+        latest = campaigns.current_by_time(connection, skin or None, _MOST_LISTED + 1, kind=kind)
+        listed = list(latest[:_MOST_LISTED])
         if listed:
             first, second = _pair(connection, skin, kind, listed, first, second)
         both = [campaigns.find(connection, one) for one in (first, second) if one]
@@ -71,6 +72,7 @@ def compare(
         offered=offered,
         words=WORDS,
         listed=listed,
+        most_listed=_MOST_LISTED if len(latest) > _MOST_LISTED else None,
         first=first,
         second=second,
         both=both,

@@ -12,6 +12,8 @@ from underskin.findings.formatting import in_digits, in_percent, significant
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
+_LOPSIDED = 1.1  # how many times as far up as down: less is not seen in the digits of an interval
+
 
 def number(value: float | None, unit: str = "", digits: int = 3) -> Markup:
     """A computed number to so many digits, with its unit; the pointer shows all its digits."""
@@ -33,6 +35,11 @@ def interval(value: float | None, low: float | None, high: float | None, unit: s
     return text + ends.format(*shown[1:])
 
 
+def reaches_up(value: float | None, low: float | None, high: float | None) -> bool:
+    """Whether an interval reaches clearly further above its value than below."""
+    return value is not None and low is not None and high is not None and high - value > _LOPSIDED * (value - low)
+
+
 def end_of(value: float | None, low: float | None, high: float | None) -> Markup:
     """One of the three numbers of `interval`, to the same digits."""
     if value is None or low is None or high is None or not all(map(math.isfinite, (value, low, high))):
@@ -52,7 +59,7 @@ def _to_places(value: float, places: int) -> str:
 
 def given(value: float | None, unit: str = "") -> Markup:
     """A number as somebody gave it, with its unit."""
-    return _with_unit("–" if value is None else f"{value:.6g}", "" if value is None else repr(value), unit)
+    return _with_unit("–", "", "") if value is None else _with_unit(f"{value:.6g}", repr(value), unit)
 
 
 def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, str]:
@@ -122,5 +129,5 @@ def recordings(kinds: Sequence[str]) -> str:
 FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
-    "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings,
+    "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings, "reaches_up": reaches_up,
 }  # fmt: skip

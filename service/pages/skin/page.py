@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy import Connection
@@ -118,6 +118,7 @@ def shown(
         figures.append(drawn_map(root, last, map_rows(last, mapped, history), show, by, sensor))
     if history.sensors:
         figures.append(drawn_history(root, history, sensor, by))
+    chosen = {"show": show, **({"model": by} if serves else {}), **({} if sensor is None else {"sensor": sensor})}
     frfs = [] if sensor is None or last is None or answer is None else _frfs(store, last, answer, sensor)
     path = f"/v1/skins/{quote(root, safe='')}"
     made = page(
@@ -141,7 +142,8 @@ def shown(
         measured=measured,
         diagnosed_together=list(of_several.values()),
         may_be_together=may_be_together,
-        following=rows[_ON_A_PAGE - 1].number if len(rows) > _ON_A_PAGE else None,
+        latest=None if before is None else urlencode(chosen),
+        earlier=urlencode({"before": rows[_ON_A_PAGE - 1].number, **chosen}) if len(rows) > _ON_A_PAGE else None,
         history=history,
         model=model,
         withdrawn=last_model if model is None else None,

@@ -61,6 +61,6 @@ def logout(request: Request) -> Response:
 
 
 def _own(path: str) -> str:
-    """A path of this server, whatever the form said."""
+    """An address of this server, its parts quoted already, whatever the form said."""
     plain = path.startswith("/") and not path.startswith("//") and "\\" not in path and path.isprintable()
-    return quote(path, safe="/?=&") if plain else "/"
+    return quote(path, safe="/?=&%+,;:@!$'()*") if plain else "/"

@@ -47,7 +47,8 @@ function filterable(table) {
   const told = document.createElement("span");
   told.className = "quiet";
   told.setAttribute("role", "status");
-  label.append("Filter ", field);
+  const part = "part" in table.dataset; // of a list that goes on on other pages
+  label.append(part ? "Filter this page " : "Filter ", field);
   const line = document.createElement("p");
   line.className = "filter";
   line.append(label, " ", told);
@@ -57,7 +58,7 @@ function filterable(table) {
     const rows = [...table.tBodies[0].rows];
     for (const row of rows) row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word));
     const left = rows.filter((row) => !row.hidden).length;
-    told.textContent = field.value ? `${left} of ${rows.length}` : "";
+    told.textContent = field.value ? `${left} of ${rows.length}${part ? " on this page" : ""}` : "";
   });
 }
 

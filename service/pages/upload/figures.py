@@ -96,7 +96,7 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
     if not measured_frfs:
         return []
     lines = [
-        summary.lines_of(f"{one.id}: {one.sensor}, {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
+        summary.lines_of(f"{one.id}: {one.sensor}, R {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
         for one, frf in measured_frfs[:_MOST_FRF]
     ]
     some = (
@@ -104,5 +104,5 @@ def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
         if len(measured_frfs) > _MOST_FRF
         else " of each recording"
     )
-    about = f"Magnitude, phase and coherence{some}."
+    about = f"Magnitude, phase and coherence{some}. R is the sphere's radius."
     return [drawn("frf", frf_recordings(lines, None), about, f"{place}frf.csv")]

@@ -15,6 +15,7 @@ from service.ingest import repeats
 from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
 from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
+from service.pages.shared.forms import signed
 from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
@@ -33,6 +34,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         together = sent.get("together", "").strip() if sent.get("as") == "one" else None
         pending.skin = sent.get(SKIN_FIELD, "").strip() or None
         pending.reason = sent.get("reason", "").strip()
+        pending.who = sent.get("who", "").strip()
         reason = pending.reason or None if pending.corrects is not None else None
         most = request.app.state.settings.max_body_bytes
         try:
@@ -48,6 +50,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 pending.estimator,
                 turn_curves=pending.turned,
                 by_kept_rig=False,  # what the page showed is kept, and no more
+                signed=signed(request, sent) if pending.corrects is not None else None,
             )
             answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
@@ -95,7 +98,7 @@ def take_rig(store: Database, pending: PendingUpload, sent: Upload | None) -> No
         try:
             pending.rig, pending.rig_label = sent_rig(sent), sent.label
         except (FileError, InvalidInput) as error:
-            pending.refused = field_errors(error)
+            pending.refused = [{**entry, RIG: sent.label or RIG} for entry in field_errors(error)]
     elif pending.skin is not None:
         pending.rig = store.read(kept_rig, pending.skin)
         origin = store.read(skins.rig_origin, pending.skin)

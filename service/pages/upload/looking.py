@@ -96,6 +96,16 @@ def channels_of(pending: PendingUpload) -> list[ChannelSummary]:
     return list(reversed(by_name.values()))
 
 
+def held_by_some(pending: PendingUpload) -> dict[str, list[str]]:
+    """Of channels that not all files with channels have, by name: which files have them."""
+    files = [(one.label, {channel.name for channel in one.channels}) for one in pending.seen if one.channels]
+    holders: dict[str, list[str]] = {}
+    for label, names in files:
+        for name in names:
+            holders.setdefault(name, []).append(label)
+    return {name: labels for name, labels in holders.items() if len(labels) < len(files)}
+
+
 def used_twice(pending: PendingUpload, channels: Sequence[ChannelSummary]) -> dict[str, str]:
     """Channels that the form took for what another one is already, and that."""
     names = {channel.name for channel in channels}

@@ -1,6 +1,7 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -29,7 +30,7 @@ from service.pages.upload import (
 from service.pages.upload import mapping as mappings
 from service.pages.upload.file_summary import MOST_LISTED, listed
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
-from service.pages.upload.looking import channels_of, draw, is_unsaid, look_at_all, looked, used_twice
+from service.pages.upload.looking import channels_of, draw, held_by_some, is_unsaid, look_at_all, looked, used_twice
 from service.pages.upload.of_session import Pending
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Database, Missing, campaigns, skins
@@ -60,6 +61,7 @@ def form(
 
 def _form(request: Request, store: Database, skin: str, corrects: str, error: str | None = None) -> Response:
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
+    corrected = store.read(campaigns.find, corrects) if corrects else None
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
     return page(
@@ -70,7 +72,7 @@ def _form(request: Request, store: Database, skin: str, corrects: str, error: st
         status=200 if error is None else 422,
         error=error,
         skin=skin,
-        corrects=corrects,
+        corrected=corrected,
         known=known,
         estimators=_ESTIMATORS,
         most_mb=request.app.state.settings.max_upload_mb,
@@ -133,19 +135,24 @@ def understood(
     channels = channels_of(pending)
     stated = pending.draft or (pending.rig.document if pending.rig is not None else None)
     seen = pending.seen[file]
+    good = sum(one.recordings for one in pending.seen)
     document = stated or mappings.guessed(channels, seen.properties, about, dated=seen.began is not None)
     return page(
         request,
         "understood.html",
         pending=pending,
+        corrected=None if pending.corrects is None else store.read(campaigns.find, pending.corrects),
         number=file,
         file=pending.seen[file],
         groups=similar_errors.of_files(pending.seen),
         refusals=similar_errors.of_recordings(pending.seen[file]),
         figures=pending.drawn[file],
-        good=sum(one.recordings for one in pending.seen),
+        good=good,
         refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not is_unsaid(pending, one)),
         unsaid=is_unsaid(pending, pending.seen[file]),
+        is_unsaid=partial(is_unsaid, pending),
+        lost=[(at, one) for at, one in enumerate(pending.seen) if good and not one.recordings and not one.refused],
+        held_by_some=held_by_some(pending),
         recordings=recordings,
         conditions=condition_columns(one.conditions for one in recordings),
         first=first,

@@ -64,6 +64,7 @@ class PendingUpload:
     estimator: Estimator | None = None  # of FRFs from time series, whatever files or rig say
     corrects: str | None = None  # the campaign whose place it takes
     reason: str = ""  # why it does
+    who: str = ""  # that says so, as typed
     skin_summary: SkinSummary | None = None  # where it is an exported skin
     negative: bool = False  # whether curves of it count pressing negative
     turned: bool = False  # whether those were turned

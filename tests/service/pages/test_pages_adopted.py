@@ -166,6 +166,7 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
     assert page.get_by_label("Reason").first.evaluate("field => field.validity.valueMissing")
     assert idle.http.get("/v1/skins/palm-d/model").status_code == 200
     page.get_by_label("Reason").first.fill("the <b>wrong</b> diagnosis")
+    page.get_by_label("Your name").first.fill("Anna")
     button.click()
     page.wait_for_url("**/skins/palm-d")
     for address in ("/skins/palm-d", "/skins/palm-d?model=adopted"):
@@ -182,6 +183,11 @@ def test_a_model_is_withdrawn_on_its_skin_s_page(reader: Visit, idle: Server) ->
         assert today in str(said.locator("time").last.get_attribute("datetime"))
         assert "by the paper's model" in page.locator("#figure-map figcaption").inner_text()
         assert page.get_by_role("row", name="friday").locator("a.tag").inner_text() == "mismatch explained"
+        page.get_by_text("What was changed here: 1").click()
+        (change,) = page.locator(".changes li").all()
+        assert "adopted model, version 1, withdrawn: “the <b>wrong</b> diagnosis”" in change.inner_text()
+        assert "by Anna" in change.inner_text()
+        assert change.get_by_role("button").count() == 0
         reader.require_accessible()
     reader.go("/")
     assert "adopted" not in page.get_by_role("row", name="palm-d").inner_text()

@@ -1,6 +1,7 @@
 """Two campaigns side by side: the same colours, the difference and what of it is beyond chance."""
 
 import csv
+import html
 import re
 import time
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from playwright.sync_api import Page
 from service.pages.compare.page import drawn_maps
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
+from tests.support import store_server
 from tests.support.blocks import block
 from tests.support.diagnosed import sent, table
 from tests.support.diagnosis_campaigns import Made, campaign
@@ -124,6 +126,23 @@ def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_else
     warned = idle.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
     (said,) = re.findall(r"Sensors of the same id lie elsewhere in the two campaigns: (.*?)\. Their", warned)
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
+
+
+def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_pages(idle: Server) -> None:
+    many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
+    for number, document in enumerate(many):
+        (recorded, _) = document["recordings"]
+        recorded["recorded_at"] = f"20{number // 12:02d}-{number % 12 + 1:02d}-03T09:00:00Z"
+        document["recordings"] = [recorded]
+    kept = idle.http.post("/v1/campaigns?skin=long", json=many).raise_for_status().json()["campaigns"]
+    text = idle.http.get("/compare?skin=long", headers=BROWSING).text
+    assert "The 200 campaigns recorded last of this skin are offered" in text
+    second = kept[1]["id"]
+    assert second not in text
+    page = idle.http.get(f"/campaigns/{second}", headers=BROWSING).text
+    (place,) = re.findall(r'href="(/compare[^"]*)"', page)
+    chosen = idle.http.get(html.unescape(place), headers=BROWSING).text
+    assert re.findall(r'value="([^"]*)" selected', chosen) == [second, kept[-1]["id"]]
 
 
 def test_sensors_without_d33_leave_nothing_to_draw() -> None:

@@ -59,9 +59,15 @@ def test_older_campaigns_are_on_the_pages_behind(idle: Server, reader: Visit) ->
         month, day = 1 + number // 28, 1 + number % 28
         document = recorded(campaign(f"n{number:02d}", sensors=1, lines=3), f"2023-{month:02d}-{day:02d}")
         idle.http.post("/v1/campaigns?skin=many", json=document).raise_for_status()
-    reader.go("/skins/many")
+    reader.go("/skins/many?sensor=s0&show=trend")
+    first = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text()
     seen = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
     reader.page.get_by_role("link", name="Earlier campaigns").click()
     reader.page.wait_for_url("**before=*")
     seen += reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
     assert seen == [f"n{number:02d}" for number in reversed(range(52))]
+    reader.page.get_by_role("link", name="Latest campaigns").click()
+    reader.page.wait_for_url(lambda address: "before=" not in address)
+    assert reader.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text() == first
+    assert reader.page.get_by_label("Sensor", exact=True).input_value() == "s0"
+    assert reader.page.get_by_label("Colour by").input_value() == "trend"

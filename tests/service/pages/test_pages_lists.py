@@ -66,10 +66,17 @@ def test_all_recordings_are_listed_page_by_page(reader: Visit, place: str) -> No
     listed = page.get_by_role("region", name="Recordings").locator("tbody th")
     seen = listed.all_inner_texts()
     assert len(seen) == 60
+    table = page.locator("#recordings")
+    table.get_by_label("Filter this page").fill("s39")
+    assert table.locator(".filter [role=status]").inner_text() == "0 of 60 on this page"
     page.get_by_role("link", name="61 to 80").click()
     page.wait_for_url("**first=60*")
     seen += listed.all_inner_texts()
     assert sorted(seen) == sorted(f"s{sensor}-{preload}N" for sensor in range(SENSORS) for preload in (1, 2))
+    reader.go(f"{place}?band_low_hz=5&band_high_hz=50&first=0")
+    page.get_by_role("link", name="61 to 80").click()
+    page.wait_for_url("**first=60*")
+    assert "Averaged over your own band, 5 to 50" in page.get_by_role("main").inner_text()
     reader.require_accessible()
 
 

@@ -1,6 +1,7 @@
 """Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
 
 import httpx
+from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, token_of
@@ -66,11 +67,34 @@ def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -
     exclude.get_by_label("Recording").fill("s9")
     exclude.get_by_label("Reason").fill("a guess")
     exclude.get_by_role("button", name="Exclude").click()
-    assert "s9" in page.get_by_role("alert").inner_text()
+    said = page.get_by_role("alert")
+    assert "s9" in said.inner_text()
+    expect(said).to_be_focused()  # far below the top of the page
+    expect(said).to_be_in_viewport()
     reader.require_accessible()
     reader.wrong.clear()  # the browser says so of every 404
     page.go_back()
     assert "in use" in page.get_by_role("row", name="s0-1N").inner_text()
+
+
+def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(idle: Server) -> None:
+    kept = idle.http.post("/v1/campaigns?skin=bare", json=campaign("bare", sensors=1)).json()
+    place = f"/campaigns/{kept['id']}"
+
+    def page_after(path: str, **sent: str) -> str:
+        idle.http.post(f"/v1{path}", json=sent).raise_for_status()
+        return idle.http.get(place, headers=BROWSING).text
+
+    assert "Where there is no Undo" not in page_after(f"{place}/exclusions", recording="s0-1N", reason="cable")
+    both = page_after(f"{place}/exclusions", recording="s0-2N", reason="cable")
+    assert "No d33 and no modulus: all its recordings are excluded." in both
+    assert "Where there is no Undo, something builds on it: a later change" in both
+    assert "An excluded recording comes back with a corrected version" in both
+    latest, _ = idle.http.get(f"/v1{place}/changes").json()["changes"]
+    one = page_after(f"/changes/{latest['id']}/undo")
+    assert "are excluded" not in one
+    assert "Where there is no Undo" not in one
+    assert "Where there is no Undo" in page_after(f"{place}/diagnosis")
 
 
 def test_an_excluded_recording_takes_the_model_out_of_force(reader: Visit, idle: Server) -> None:

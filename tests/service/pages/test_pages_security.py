@@ -88,8 +88,8 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
     server, keys = locked
     for somebody in visit(browser, server):
         page = somebody.page
-        somebody.go("/skins/example")
-        page.wait_for_url("**/login?next=/skins/example")
+        somebody.go("/skins/example?sensor=s%2B1&show=a+b%20c")
+        page.wait_for_url("**/login?next=/skins/example%3Fsensor%3Ds%252B1%26show%3Da%2Bb%2520c")
         somebody.require_accessible()
         page.get_by_label("Key").fill("us_wrong")
         page.get_by_role("button", name="Log in").click()
@@ -97,7 +97,7 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         assert somebody.wrong.pop().startswith("Failed to load resource")
         page.get_by_label("Key").fill(keys["write"])
         page.get_by_role("button", name="Log in").click()
-        page.wait_for_url("**/skins/example")
+        page.wait_for_url("**/skins/example?sensor=s%2B1&show=a+b%20c")
         somebody.wrong.clear()  # there is no such skin yet
         somebody.go("/")
         page.get_by_role("button", name="Load the example skin").click()

@@ -112,7 +112,9 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
 
 def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
     sent_to(idle, "fleet-9", "nine")
+    idle.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
     reader.go("/fleets")
+    assert reader.page.get_by_label("left <palm> fleet-9").get_attribute("value") == "fleet-9"
     reader.require_accessible()
     reader.go("/fleets?find=nothing-is-called-so")
     assert "No skin is called so" in reader.page.get_by_role("main").inner_text()

@@ -145,25 +145,36 @@ def test_a_campaign_is_corrected_by_a_newer_file(visitor: Visit, server: Server)
     visitor.go(f"/campaigns/{wrong}")
     page.get_by_text("or correct or withdraw").click()
     page.get_by_role("link", name="Upload a corrected version").click()
+    assert "takes the place of campaign slip, which stays readable" in page.get_by_role("status").first.inner_text()
     page.get_by_label("Files").set_input_files([file("right.json", as_json(campaign("right", id="corrected")))])
     page.get_by_role("button", name="Look at them").click()
     page.wait_for_url("**/upload/*")
-    assert wrong in page.locator("form.keep").inner_text()
+    assert "It takes the place of campaign slip," in page.locator("form.keep").inner_text()
+    assert str(page.get_by_role("link", name="slip").get_attribute("href")).endswith(wrong)
+    assert ": s0, R 4 mm, 1 N" in page.locator("#figure-frf script").inner_text()
     visitor.require_accessible()
-    page.get_by_label("Why").fill("the modulus of another batch")
+    page.get_by_label("Reason").fill("the modulus of another batch")
+    page.get_by_label("Your name").fill("Anna")
     page.get_by_role("button", name="Keep 6 recordings").click()
     page.wait_for_url("**/campaigns/*")
     right = page.url.rpartition("/")[2]
     found = server.http.get(f"/v1/campaigns/{wrong}").json()
     assert (found["corrected_by"], found["state"]) == (right, "corrected")
+    earlier = page.get_by_text("It takes the place of an earlier version, which stays readable: the modulus of")
+    assert str(earlier.get_by_role("link").get_attribute("href")).endswith(wrong)
+    page.get_by_text("What was changed here: 1").click()
+    assert "by Anna" in page.get_by_role("listitem").filter(has_text="“the modulus of another batch”").inner_text()
+    assert "from Anna" not in page.locator("dl.facts").inner_text()  # which names keys
     visitor.go(f"/upload?skin=corrected&corrects={wrong}")  # once more, though it is corrected already
     page.get_by_label("Files").set_input_files([file("again.json", as_json(campaign("again", id="corrected")))])
     page.get_by_role("button", name="Look at them").click()
     page.wait_for_url("**/upload/*")
-    page.get_by_label("Why").fill("another slip")
+    page.get_by_label("Reason").fill("another slip")
+    page.get_by_label("Your name").fill("Bea")
     page.get_by_role("button", name="Keep 6 recordings").click()
     assert "corrected" in page.get_by_role("alert").inner_text()
-    assert page.get_by_label("Why").input_value() == "another slip"
+    assert page.get_by_label("Reason").input_value() == "another slip"
+    assert page.get_by_label("Your name").input_value() == "Bea"
     assert campaigns_of(server, "corrected") == [right]
 
 

@@ -66,6 +66,42 @@ def test_a_shaker_s_file_is_not_read_with_the_settings_of_a_force_microscope(vis
     expect(page.get_by_text("less 3")).to_have_count(0)
 
 
+def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not_be_kept(visitor: Visit) -> None:
+    page = visitor.page
+    curve = file("afm.txt", text_of_raw_curve(above="# both"))
+    look_at(visitor, [file("shaker.tdms", shaker()), curve])
+    expect(page.get_by_text("These files differ in their channels.")).to_be_visible()
+    channels = page.get_by_role("region", name="Channels")
+    expect(channels.get_by_role("row", name="Charge")).to_contain_text("only in shaker.tdms")
+    expect(channels.get_by_role("row", name="Height (nm)")).to_contain_text("only in afm.txt")
+    files = page.get_by_role("region", name="Files")
+    expect(files.get_by_role("row", name="afm.txt")).to_contain_text("what its channels are is not said yet")
+    visitor.require_accessible()
+
+    look_at(visitor, [file("good.json", as_json(campaign("whole", id="both"))), curve])
+    lost = page.get_by_role("region", name="What will not be kept")
+    expect(lost).to_contain_text("afm.txt, the whole file: nobody has said yet what its channels are")
+    expect(page.get_by_label("Name of the campaign")).to_have_value("good.json")
+    lost.get_by_role("link", name="afm.txt").click()
+    expect(page.get_by_role("heading", name="afm.txt")).to_be_visible()
+    expect(page.get_by_text("What the channels are")).to_be_visible()
+    expect(page.get_by_text("These files differ")).to_have_count(0)  # one file alone has channels
+    visitor.require_accessible()
+
+
+def test_a_rig_description_that_cannot_be_used_is_named_and_not_what_was_typed(visitor: Visit) -> None:
+    page = visitor.page
+    curve = file("afm.txt", text_of_raw_curve(above="# rig"))
+    look_at(visitor, [curve], rig="schema: rig/1\nkind: indentation\n")
+    alert = page.get_by_role("alert")
+    expect(alert).to_contain_text("The rig description rig.yaml cannot be used: put it right and send it again, or say")
+    expect(alert).not_to_contain_text("What you typed")
+    fill_in(page)
+    page.get_by_label("Formula of derived channel 1", exact=True).fill("depth +")
+    read_it(page)
+    expect(alert).to_contain_text("What you typed is still in the form")
+
+
 def test_a_second_file_of_the_instrument_says_what_it_is_read_by_and_can_start_without(visitor: Visit) -> None:
     page = visitor.page
     keep_curve(visitor, "pdms-8")

@@ -4,8 +4,9 @@ import re
 
 import pytest
 
-from service.pages.shared.formats import end_of, interval
+from service.pages.shared.formats import end_of, given, interval
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING
 from tests.support.store_server import Server, campaign
 
 
@@ -43,6 +44,26 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: 
     page.get_by_text("Why this band").click()
     assert page.get_by_text("no resonance in any recording").is_visible()
     reader.require_accessible()
+
+
+def test_what_was_not_given_has_no_unit() -> None:
+    assert [re.sub("<[^>]*>", "", given(value, "mm")) for value in (2.5, None)] == ["2.5&nbsp;mm", "–"]
+
+
+@pytest.mark.parametrize("second", [1.0, 0.7])
+def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(idle: Server, second: float) -> None:
+    skin, document = f"second sensor {second}", campaign("two sensors", sensors=2)
+    for recording in document["recordings"][2:]:
+        recording["frf_re_pc_per_n"] = [second * value for value in recording["frf_re_pc_per_n"]]
+    kept = idle.http.post("/v1/campaigns", json=document, params={"skin": skin}).raise_for_status().json()["id"]
+    array = idle.http.get(f"/v1/campaigns/{kept}/d33").json()["array"]
+    value, low, high = (array[f"d33{part}_pc_per_n"] for part in ("", "_low", "_high"))
+    lopsided = second == 1
+    assert ((high - value) / (value - low) > 1.14) == lopsided
+    assert ((high - value) / (value - low) < 1.05) != lopsided
+    for path in (f"/campaigns/{kept}", f"/skins/{skin}"):
+        page = idle.http.get(path, headers=BROWSING).text
+        assert page.count("The interval reaches further up than down: a sphere that misses the middle") == lopsided
 
 
 def test_a_load_that_looks_wrong_is_named_by_its_line(reader: Visit) -> None:

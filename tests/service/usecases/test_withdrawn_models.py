@@ -63,6 +63,13 @@ def test_without_it_the_skin_answers_as_one_that_never_had_a_model(server: Serve
     assert client.skins.models("palm") == [{**first, **gone}]  # nothing else of it has changed
     with pytest.raises(ServiceError, match=r"404.*no adopted model"):
         client.skins.withdraw_model("palm", "again")
+    client.skins.annotate("palm", title="left palm")
+    renamed, change = client.skins.changes("palm")
+    assert renamed["may_be_undone"]
+    assert (change["at"], change["reason"]) == (gone["withdrawn_at"], "wrong diagnosis")
+    assert (change["statement"], change["may_be_undone"]) == ("adopted model, version 1, withdrawn", False)
+    with pytest.raises(ServiceError, match=r"409.*adopted again from its diagnosis"):
+        client.undo(change["id"])
     again = client.skins.adopt("palm", diagnosis_id)
     assert (again["version"], again["withdrawn_at"]) == (2, None)
     assert again["id"] != first["id"]
