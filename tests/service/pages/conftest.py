@@ -2,12 +2,13 @@
 
 import shutil
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Page, Request, WebError, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, ConsoleMessage, Error, Page, Request, WebError, sync_playwright
 
 from tests.support.store_server import Place, Server, running
 
@@ -98,13 +99,20 @@ def visit(browser: Browser, server: Server) -> Iterator[Visit]:
     try:
         yield seen
     finally:
-        for page in context.pages[1:]:
-            page.close()
         context.remove_listener("console", warned)
         context.remove_listener("weberror", failed)
         context.remove_listener("request", asked)
+        for page in context.pages[1:]:
+            _close(page)
         context.clear_cookies()
     assert seen.wrong == []
+
+
+def _close(page: Page) -> None:
+    """Close a page, after what it is still loading was ended: Chromium may never answer that it closed one before."""
+    with suppress(Error):  # where that came first
+        page.goto("about:blank")
+    page.close()
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ def mistuned() -> dict[str, Any]:
 
 NOT_QUOTED = (
     "Not to be quoted yet: d33 of the campaign that was diagnosed is not settled; it lies from 13.8 to 14.4 pC/N, but "
-    "what would not show here would change it, thickness error by 8.5 % (its report)."
+    "what would not show here would change it, misalignment by 14 % and interface slip by 11 % (its report)."
 )
 
 

@@ -171,6 +171,7 @@ def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Se
     page.get_by_role("button", name="Diagnose it again").click()
     page.get_by_text("It waits for its turn").wait_for()
     page.get_by_role("button", name="Cancel").click()
+    page.get_by_text("It was cancelled").wait_for()
 
 
 def test_hostile_names_in_a_report_stay_text(reader: Visit, idle: Server, made: Made) -> None:
