@@ -283,8 +283,8 @@ def test_a_fall_that_load_cycles_explain_is_ageing(good: Campaign, table: SigmaT
 
 @pytest.mark.parametrize("hidden", ["none", "single"])
 def test_physics_is_no_slip(hidden: str, table: SigmaTable) -> None:
-    """The rig's own effects, from subtle to strong, on 40 campaigns in `make soak`, else on 10."""
-    for number in first(10, range(40)):
+    """The rig's own effects, from subtle to strong, on 40 campaigns in `make soak`, else on 6."""
+    for number in first(6, range(40)):
         made, _ = from_dict(recorded_campaign(record(drawn(77, number, hidden))))
         assert named(inspect(made, table)) == [], number
 
