@@ -16,7 +16,7 @@ from tests.support.diagnosis_campaigns import Made, campaign
 from underskin.recordings.campaign import to_dict
 from underskin.surrogate.sigma_table import load_table
 
-SMALL = Made(("contact_resonance",), (6.0, 0.05), sensors=1, highest_hz=1000.0, lines=10, modulus_mpa=16.0)
+SMALL = Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.6, 2.4), lines=8)
 SLEEPING = """
 import time
 from pathlib import Path

@@ -167,7 +167,7 @@ def test_a_refusal_by_a_proxy_is_no_final_one(server: Server, tmp_path: Path, st
 @pytest.mark.slow
 def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_path: Path) -> None:
     """Two files are saved for each watch that is killed: in the end there is each of them, once."""
-    kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 6
+    kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 3
     moments = np.random.default_rng(900_013).uniform(SETTLE_S, SETTLE_S + 1.5, kills)
     with bench(tmp_path, address(server), "random") as at:
         for number, moment in enumerate(moments.tolist()):

@@ -11,6 +11,7 @@ from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves
 from tests.support.kinds_campaigns import SPHERE, curves, lines
+from tests.support.lean_reports import lean_report
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.inference import least_squares
@@ -18,7 +19,6 @@ from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.diagnosis.inference.starts import Beginning, best_starts
-from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.priors import PRIORS
 from underskin.diagnosis.validation.cross_validation import PredictionScore, groups, hold_out
@@ -37,7 +37,7 @@ def stiffening_on_a_stage() -> Campaign:
 
 @pytest.fixture(scope="module")
 def report(stiffening_on_a_stage: Campaign, table: SigmaTable) -> dict[str, Any]:
-    return diagnosis_report(stiffening_on_a_stage, table)
+    return lean_report(stiffening_on_a_stage, table, "adhesion", "contact_creep")
 
 
 def test_two_mechanisms_that_share_a_bend_are_found_from_starts_over_both(report: dict[str, Any]) -> None:

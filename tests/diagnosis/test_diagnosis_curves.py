@@ -10,6 +10,7 @@ import pytest
 from proof.real import recorded
 from tests.diagnosis.rig_pads import pressed
 from tests.support.cases import first
+from tests.support.lean_reports import lean_report
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import load_table
@@ -53,7 +54,7 @@ def pressed_pad(seed: int, bump: float) -> dict[str, Any]:
 def test_a_bump_that_no_mechanism_describes_is_found_where_it_is(bump: float) -> None:
     document = pressed_pad(4, bump)
     largest = max(max(recording["force_n"]) for recording in document["recordings"])
-    report = diagnosis_report(parse(document), load_table())
+    report = lean_report(parse(document), load_table(), "adhesion", "contact_creep")
     assert report["verdict"] == "unexplained"  # no all-clear over a remainder above the noise
     assert report["mechanisms"] == []
     law = report["unnamed"]

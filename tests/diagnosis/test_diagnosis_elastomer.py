@@ -8,6 +8,7 @@ from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from tests.support.cases import first
 from tests.support.kinds_campaigns import BLOCK, LINES, SKIN, SPHERE, Effects, curves, lines, modulus_of, named, report
+from tests.support.lean_reports import COSTLY
 from underskin.diagnosis.data.dataset import lines as frf_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
@@ -33,7 +34,7 @@ def test_relaxation_that_short_curves_tell_as_a_rate_alone_is_the_skins(table: S
     described = {**LINES, "design": dwells, "noise": {**LINES["noise"], "gain": 0.01}, "seed": 4, "effects": creep}
     measured = campaign_of_lines(record_lines(experiment(described)))
     brief = {**SPHERE, "speeds_mm_per_s": [0.25], "retract": True, "repeats": 1, "force_noise_n": 1e-3}
-    document = report(measured, curves("indentation", brief, effects=creep), table)
+    document = report(measured, curves("indentation", brief, effects=creep), table, "adhesion", "compressible_layer")
     assert document["contradictions"] == []
     assert (document["verdict"], named(document)) == ("explained", ["contact_creep"])
     fraction, time = document["mechanisms"][0]["parameters"]
@@ -54,7 +55,7 @@ def test_relaxation_that_curves_tell_better_than_frfs_is_theirs(
     described = {**LINES, "design": design, "noise": {**LINES["noise"], "gain": 0.04}, "seed": 4, "effects": creep}
     measured = campaign_of_lines(record_lines(experiment(described)))
     held = {**SPHERE, "hold_s": hold, "repeats": 2}
-    document = report(measured, curves("indentation", held, effects=creep), table)
+    document = report(measured, curves("indentation", held, effects=creep), table, "adhesion", "compressible_layer")
     assert document["contradictions"] == []
     assert (document["verdict"], named(document)) == ("explained", ["contact_creep"])
     told, time = document["mechanisms"][0]["parameters"]
@@ -68,7 +69,7 @@ def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wro
     deep = {**SPHERE, "largest_displacement_mm": 0.8, "indenters_mm": [3]}
     measured = lines(effects=both)
     pressed = curves("indentation", deep, effects={"layered_contact": {}}, thickness=0.87 * SKIN["thickness_mm"])
-    document = report(measured, pressed, table)
+    document = report(measured, pressed, table, *COSTLY)
     assert document["contradictions"] == []
     assert {"layered_contact", "thickness_error"} <= set(named(document))
     told = modulus_of(document, "indentation")
@@ -96,7 +97,8 @@ def test_a_wrong_modulus_and_a_wrong_thickness_are_both_told_beside_a_resonance(
     described |= {"seed": 9, "effects": wrong, "skin": {**LINES["skin"], "youngs_modulus_mpa": 9.0}}
     measured = campaign_of_lines(record_lines(experiment({**described, "schema": "experiment/1"})))
     measured["skin"]["youngs_modulus_mpa"] = 16.0
-    document = report(measured, curves("compression", BLOCK, 9.0), table)
+    others = ("crosstalk", "ageing", "mains_pickup", "sensor_relaxation", *COSTLY)
+    document = report(measured, curves("compression", BLOCK, 9.0), table, *others)
     assert {"modulus_error", "thickness_error", "contact_resonance"} <= set(named(document))
     told = {mechanism["name"]: mechanism["parameters"][0] for mechanism in document["mechanisms"]}
     assert told["modulus_error"]["low"] < 9 / 16 < told["modulus_error"]["high"]

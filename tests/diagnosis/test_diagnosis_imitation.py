@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.lean_reports import COSTLY, lean_report
 from tests.support.pressed_curves import explained, pressed
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.diagnosis.selection.answers import Search
@@ -34,7 +35,7 @@ def test_a_stronger_effect_and_several_spheres_leave_fewer_imitated_laws(table: 
 @pytest.mark.slow
 def test_what_is_imitated_takes_from_the_probability_and_is_said(table: SigmaTable) -> None:
     weak = diagnosis_report(pressed(60.0, (5.0,)), table)
-    strong = diagnosis_report(pressed(3.0, (5.0,)), table)
+    strong = lean_report(pressed(3.0, (5.0,)), table, *COSTLY)
     for report in (weak, strong):
         assert [entry["name"] for entry in report["mechanisms"]] == ["instrument_compliance"]
     assert weak["probability"] < strong["probability"]
@@ -76,7 +77,7 @@ def test_without_times_no_law_follows_time(table: SigmaTable) -> None:
 
 @pytest.mark.slow
 def test_a_cantilever_that_gives_is_named_under_a_sphere_of_micrometres(table: SigmaTable) -> None:
-    report = diagnosis_report(pressed(2.5e-3, (5e-3,), depth=2e-4), table)
+    report = lean_report(pressed(2.5e-3, (5e-3,), depth=2e-4), table, "contact_creep", "compressible_layer")
     assert [entry["name"] for entry in report["mechanisms"]] == ["instrument_compliance"]
     (stiffness,) = report["mechanisms"][0]["parameters"]
     assert stiffness["low"] < 2.5e-3 < stiffness["high"]

@@ -12,6 +12,7 @@ from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
 from tests.support.cases import first
 from tests.support.kinds_campaigns import BLOCK, LINES, SPHERE, Effects, curves, lines, modulus_of, named, report
+from tests.support.lean_reports import COSTLY
 from underskin.diagnosis.selection.curve_knowledge import OtherKind, of_curves
 from underskin.diagnosis.selection.search import search
 from underskin.mechanisms.parameter import HeavyTailed
@@ -26,7 +27,9 @@ def of_frfs_alone(table: SigmaTable) -> dict[str, Any]:
     return report(lines(9.0), [], table)
 
 
-@pytest.mark.parametrize(("kind", "design", "width"), [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
+@pytest.mark.parametrize(
+    ("kind", "design", "width"), first(1, [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
+)
 def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     kind: str, design: Mapping[str, Any], width: float, of_frfs_alone: dict[str, Any], table: SigmaTable
 ) -> None:
@@ -89,7 +92,7 @@ def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: Sig
     """Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both."""
     layer: Effects = {"layered_contact": {}}
     deep = {**SPHERE, "largest_displacement_mm": 0.8}
-    document = report(lines(9.0, layer), curves("indentation", deep, 9.0, layer), table)
+    document = report(lines(9.0, layer), curves("indentation", deep, 9.0, layer), table, *COSTLY)
     assert set(named(document)) == {"layered_contact", "modulus_error"}
     assert document["contradictions"] == []
     told = modulus_of(document, "indentation")
@@ -100,7 +103,8 @@ def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTabl
     sticky = {"adhesion": {"work_j_per_m2": 2.0}}
     measured = lines(effects=sticky)
     assert report(measured, [], table)["verdict"] == "no_mismatch"
-    document = report(measured, curves("indentation", SPHERE, effects=sticky), table)
+    pressed = curves("indentation", SPHERE, effects=sticky)
+    document = report(measured, pressed, table, "contact_creep", "compressible_layer")
     assert (document["verdict"], named(document)) == ("explained", ["adhesion"])
     (work,) = document["mechanisms"][0]["parameters"]
     assert work["low"] < 2.0 < work["high"]
@@ -134,7 +138,7 @@ def test_kinds_that_contradict_each_tell_the_modulus_by_what_explains_them_alone
     described = {**LINES, "noise": exact, "seed": 3, "design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}
     measured = campaign_of_lines(record_lines(experiment(described)))
     deep = {**SPHERE, "largest_displacement_mm": 0.8}
-    document = report(measured, curves("indentation", deep, 48.0, effects={"layered_contact": {}}), table)
+    document = report(measured, curves("indentation", deep, 48.0, effects={"layered_contact": {}}), table, *COSTLY)
     assert len(document["contradictions"]) == 1
     assert document["verdict"] == "no_mismatch"
     told = modulus_of(document, "indentation")
@@ -144,7 +148,7 @@ def test_kinds_that_contradict_each_tell_the_modulus_by_what_explains_them_alone
 def test_indentations_and_a_block_are_one_data_set_too(table: SigmaTable) -> None:
     document = {"schema": "campaign/1", "name": "curves", "skin": {**lines()["skin"], "youngs_modulus_mpa": None}}
     both = [*curves("indentation", SPHERE, 9.0), *curves("compression", BLOCK, 9.0)]
-    found = report({**document, "recordings": []}, both, table)
+    found = report({**document, "recordings": []}, both, table, *COSTLY)
     assert found["verdict"] == "no_mismatch"
     assert {entry["kind"] for entry in found["by_kind"]} == {"indentation", "compression"}
     for kind in ("indentation", "compression"):
@@ -200,8 +204,8 @@ def test_the_likelihood_of_the_curves_counts_heavy_tailed_priors_once(scales: fl
     assert hypothesis.knowledge is not None
     names = [entry.name for entry in hypothesis.model.parameters]
     deviations = np.sqrt(np.diag(told.covariance)[:2] + np.array([told.tolerance**2, 0.0]))
-    log_e, log_w = (mean[axis] + deviations[axis] * np.linspace(-8, 8, 161) for axis in (0, 1))
-    log_density = np.empty((161, 161))
+    log_e, log_w = (mean[axis] + deviations[axis] * np.linspace(-8, 8, 81) for axis in (0, 1))
+    log_density = np.empty((81, 81))
     for row, at in enumerate(log_e):
         for column, work in enumerate(log_w):
             fit = np.zeros(len(names))

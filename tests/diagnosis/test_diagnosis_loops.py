@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.rig_pads import pressed
+from tests.support.lean_reports import lean_report
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import parse
 from underskin.recordings.curve_jumps import jumps
@@ -25,7 +26,8 @@ def standard_errors(report: dict[str, Any], name: str, truth: float) -> float:
 
 @pytest.mark.slow
 def test_a_loop_with_a_hold_gives_creep_and_no_more() -> None:
-    report = diagnosis_report(parse(loops({"contact_creep": {"fraction": 0.3, "time_s": 8}}, hold_s=10)), load_table())
+    made = parse(loops({"contact_creep": {"fraction": 0.3, "time_s": 8}}, hold_s=10))
+    report = lean_report(made, load_table(), "adhesion", "compressible_layer")
     assert report["verdict"] == "explained"
     assert [entry["name"] for entry in report["mechanisms"]] == ["contact_creep"]
     assert standard_errors(report, "relaxed_fraction", 0.3) < 3
@@ -34,7 +36,8 @@ def test_a_loop_with_a_hold_gives_creep_and_no_more() -> None:
 
 @pytest.mark.slow
 def test_a_loop_that_snaps_and_tears_off_gives_the_work_of_adhesion() -> None:
-    report = diagnosis_report(parse(loops({"adhesion": {"work_j_per_m2": 0.3}})), load_table())
+    made = parse(loops({"adhesion": {"work_j_per_m2": 0.3}}))
+    report = lean_report(made, load_table(), "contact_creep", "compressible_layer")
     assert "adhesion" in [entry["name"] for entry in report["mechanisms"]]
     assert standard_errors(report, "work_of_adhesion", 0.3) < 3
 
@@ -45,7 +48,7 @@ def test_a_curve_that_cannot_be_used_is_named_and_the_others_are_diagnosed() -> 
     short = campaign["recordings"][1]
     for column in ("displacement_mm", "force_n", "time_s"):
         short[column] = short[column][:6]
-    report = diagnosis_report(parse(campaign), load_table())
+    report = lean_report(parse(campaign), load_table(), "adhesion", "compressible_layer")
     (finding,) = [entry for entry in report["findings"] if entry["code"] != "imitated"]
     assert (finding["code"], finding["recording"], finding["field"]) == ("curve_not_usable", short["id"], "force_n")
     assert "at least 8 entries" in finding["statement"]

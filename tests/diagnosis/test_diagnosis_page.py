@@ -15,6 +15,7 @@ import pytest
 
 from tests.support.adhesive_curves import adhesive_figure
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import COSTLY, lean_diagnosis
 from tests.support.mechanism_campaigns import indentation_campaign
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting import wording
@@ -237,7 +238,7 @@ KINDS = [
 @pytest.mark.parametrize(("make", "verdict", "names"), KINDS, ids=["nothing", "off centre", "too little", "curves"])
 def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict: str, names: set[str]) -> None:
     whole = make()
-    found = diagnose(whole, load_table())
+    found = lean_diagnosis(whole, load_table(), *COSTLY)
     document = report(found)
     drawn = figures(found, document)
     assert (document["verdict"], set(drawn)) == (verdict, names)

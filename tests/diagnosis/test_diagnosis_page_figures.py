@@ -8,6 +8,7 @@ import pytest
 
 from tests.support.adhesive_curves import adhesive_curves
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import COSTLY, lean_diagnosis
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.figures import explanations, figures
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
@@ -111,7 +112,7 @@ def test_a_long_explanation_is_broken_into_lines_that_an_axis_has_room_for() -> 
 
 @pytest.mark.slow
 def test_a_map_of_curves_that_agree_is_pale_and_its_labels_differ() -> None:
-    found = diagnose(parse(adhesive_curves(0.0)[0]), load_table())
+    found = lean_diagnosis(parse(adhesive_curves(0.0)[0]), load_table(), *COSTLY)
     every = figures(found, report(found))
     largest = max(max(one["force_n"]) for one in adhesive_curves(0.0)[0]["recordings"])
     assert every["before_after"].layout.xaxis.title.text == f"predicted force [{readable_unit('force_n', largest)[0]}]"

@@ -15,6 +15,7 @@ from rig.description import parse as rig_experiment
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.adhesive_curves import MODULUS_MPA, WORK_J_PER_M2, adhesive_curves
 from tests.support.cases import first
+from tests.support.lean_reports import lean_report
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.data.names import NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
@@ -138,7 +139,8 @@ def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_
     effect: dict[str, dict[str, float]], noisy: dict[str, float], table: SigmaTable
 ) -> None:
     experiment = rig_experiment({**_RIG, "curves": {**_RIG["curves"], **noisy}, "effects": effect})
-    report = diagnosis_report(parse(campaign_of_curves(experiment, record_curves(experiment))), table)
+    made = parse(campaign_of_curves(experiment, record_curves(experiment)))
+    report = lean_report(made, table, "contact_creep", "compressible_layer")
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
     plain = report["fit"]["before"]
@@ -273,7 +275,7 @@ def test_a_sensor_s_radius_is_no_matter_of_an_indentation(table: SigmaTable) -> 
 @pytest.mark.slow
 @pytest.mark.skipif(CAMPAIGNS is None, reason="UNDERSKIN_CAMPAIGNS names no folder of concealed campaigns")
 @pytest.mark.parametrize(
-    "name", first(3, ["v1x2sxf5n", "v48jbeq3p", "v4j8zegt1", "v7bb8mnv4", "vb2c4z9ma", "v0w0qva2y"])
+    "name", first(2, ["v1x2sxf5n", "v48jbeq3p", "v4j8zegt1", "v7bb8mnv4", "vb2c4z9ma", "v0w0qva2y"])
 )
 def test_curves_of_an_independent_rig_are_named_with_their_modulus(table: SigmaTable, name: str) -> None:
     assert CAMPAIGNS is not None

@@ -25,7 +25,8 @@ from underskin.recordings.campaign import Campaign, from_dict, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 SEED = 940501
-ROUNDS = {"curves": 3, "several": 2} if SOAK else {"curves": 2, "several": 1}
+SEVERAL = 2 if SOAK else 1
+CURVES = {"indentation": [0, 1, 2], "compression": [1, 0, 2]}  # of those first run, one brings long statements
 
 # Those that make the longest statements, one of each kind, stand first.
 TELLING = [
@@ -53,7 +54,7 @@ def with_slips(table: SigmaTable) -> Iterator[Report]:
         recorded = record(drawn(SEED, number, "single"))
         made, _ = from_dict(rig_campaign(recorded))
         case = Case(made, recorded, np.full(len(recorded.exact), 0.02))
-        for slip in first(len(TELLING), [*TELLING, *sorted(SLIPS.keys() - TELLING)]):
+        for slip in first(6, [*TELLING, *sorted(SLIPS.keys() - TELLING)]):
             wrong = SLIPS[slip][0](case, np.random.default_rng(3))
             if wrong is not None:
                 report = diagnosis_report(wrong.campaign, table)
@@ -61,14 +62,14 @@ def with_slips(table: SigmaTable) -> Iterator[Report]:
 
 
 def of_curves(table: SigmaTable) -> Iterator[Report]:
-    for kind in ("indentation", "compression"):
-        for number in range(ROUNDS["curves"]):
+    for kind, numbers in CURVES.items():
+        for number in first(1, numbers):
             ((document,), _) = documents_and_truth(SEED, number, kind, None)
             yield diagnosis_report(parse(document), table)
 
 
 def of_several(table: SigmaTable) -> Iterator[Report]:
-    for number in range(ROUNDS["several"]):
+    for number in range(SEVERAL):
         for what in ("compression", "dates", "skins"):
             campaigns = [parse(document) for document in drawn_joint(SEED, number, what)[0]]
             if what == "dates":
@@ -93,7 +94,7 @@ def made(table: SigmaTable) -> Callable[[Making], list[Report]]:
 @pytest.mark.parametrize("making", [of_lines, with_slips, of_curves, of_several])
 def test_a_statement_has_three_sentences_at_most(making: Making, made: Callable[[Making], list[Report]]) -> None:
     seen = made(making)
-    assert len(seen) >= (6 if SOAK else 3)
+    assert len(seen) >= (6 if SOAK else 2)
     long = [report["statement"] for report in seen if not 1 <= len(sentences(report["statement"])) <= 3]
     assert long == []
 

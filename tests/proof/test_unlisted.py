@@ -9,6 +9,7 @@ from proof.left_out import compared
 from proof.stored import Work
 from proof.text_unlisted import alarms, hidden, left_out
 from proof.unlisted import judge_unlisted, judged
+from tests.support.cases import first
 
 
 def entry(
@@ -108,7 +109,8 @@ def test_a_law_stands_for_a_mechanism_on_its_axis_where_it_enters_or_predicts_as
 
 @pytest.mark.slow
 def test_campaigns_of_the_rig_are_read_and_diagnosed(tmp_path: Path) -> None:
-    result = judge_unlisted(Work(tmp_path, count=2), lambda *_: None)
-    assert [one["name"] for one in result["judged"]] == ["0001", "0002"]
+    names = first(1, ["0001", "0002"])
+    result = judge_unlisted(Work(tmp_path, count=len(names)), lambda *_: None)
+    assert [one["name"] for one in result["judged"]] == names
     assert all(one["statement"] for one in result["judged"])
     assert hidden(result)

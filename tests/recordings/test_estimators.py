@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, known_frf
 from tests.support.campaign_documents import document
 from tests.support.instrument_files import rig
@@ -82,7 +83,7 @@ def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
     H2, which is too large there."""
     force = dwelling([10.0, 125.0], cycles=600)
     charge, true = answer_to(force), np.abs(known_frf(np.array([10.0, 125.0])))
-    random, noise, repeats = np.random.default_rng(910_001), 0.007, 40
+    random, noise, repeats = np.random.default_rng(910_001), 0.007, 40 if SOAK else 20
     found: dict[str, list[Floats]] = {name: [] for name in ESTIMATORS}
     uncertainty = []
     for _ in range(repeats):

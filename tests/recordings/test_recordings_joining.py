@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.recordings.real_files import read, real
+from tests.support.cases import first
 from tests.support.instrument_files import rig, tdms
 from underskin.errors import InvalidInput
 from underskin.recordings import Reading, join, read_file
@@ -194,7 +195,8 @@ def test_a_campaign_needs_a_name_and_a_file() -> None:
 
 
 def test_wells_of_two_runs_of_a_real_instrument() -> None:
-    files = real("sphere-in-well/run_044*/well_*.csv") + real("sphere-in-well/run_045*/well_*.csv")
+    runs = [real(f"sphere-in-well/run_{number}*/well_*.csv") for number in ("044", "045")]
+    files = [file for run in runs for file in first(4, run)]
     found = join("two runs", [(file.name, read(file, "sphere-in-well")) for file in files])
     wells = [file.name.split("_")[1] for file in files]
     assert ids(found) == [f"{file.stem} {well}" for file, well in zip(files, wells, strict=True)]

@@ -142,7 +142,7 @@ def test_line_noise_and_coherence_are_as_described() -> None:
 
 @pytest.mark.slow
 def test_d33_comes_back_within_the_stated_uncertainty() -> None:
-    runs = 200 if SOAK else 40
+    runs = 200 if SOAK else 20
     table = underskin.load_table()
     inside, off = np.array([covered(number, table) for number in range(runs)]).T
     assert inside.sum() >= (0.95 * runs if SOAK else binom.ppf(0.001, runs, 0.95))

@@ -6,6 +6,7 @@ import pytest
 from rig.description import parse
 from rig.recorded import record_lines
 from rig.wrong_modulus import drawn_wrong_modulus, wrong_modulus
+from tests.support.cases import first
 
 
 def test_the_declared_modulus_is_wrong_by_a_factor_of_two_to_four() -> None:
@@ -50,10 +51,9 @@ def test_the_truth_has_the_contacts_as_declared() -> None:
 def test_some_contacts_are_computed_beyond_what_was_made() -> None:
     """By the declared E wider or harder pressed than the rig can calculate, and than the tables hold."""
     beyond = 0
-    for number in range(20):
-        joint = wrong_modulus(3, number)
+    for number in first(8, range(20)):
         _, truth = drawn_wrong_modulus(3, number)
         largest = max(truth["as_declared"]["load_parameter"])
         beyond += largest > 0.1
-        assert largest / truth["factor"] <= 0.1 + 1e-9, joint.name
+        assert largest / truth["factor"] <= 0.1 + 1e-9, number
     assert beyond >= 3

@@ -1,4 +1,7 @@
-"""Every store test runs on SQLite and on a real PostgreSQL."""
+"""Store tests run on SQLite and on a real PostgreSQL; those of a module that names one `BACKEND` so in `make soak`.
+
+Such modules are about what lies above any store: clients, commands, sessions, files that come and go.
+"""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -7,11 +10,23 @@ from pathlib import Path
 
 import pytest
 
+from bench.soak import SOAK
 from service.store import database
 from service.store.tables import metadata
 from tests.service.backends import BACKENDS
 from tests.support import postgres
 from tests.support.store_server import Place, Server, running
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run the tests of a module that names a `BACKEND` on that alone, but for those that name theirs (backends.py)."""
+    backend = getattr(metafunc.module, "BACKEND", None)
+    if backend is None or SOAK:
+        return
+    named = {mark.args[0] for mark in metafunc.definition.iter_markers("parametrize")}
+    for fixture in {"place", "server"} & set(metafunc.fixturenames) - named:
+        metafunc.definition.add_marker(pytest.mark.parametrize(fixture, [backend], indirect=True))
 
 
 @pytest.fixture(scope="session")

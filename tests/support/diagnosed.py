@@ -109,11 +109,13 @@ def found(server: Server, diagnosis_id: str) -> dict[str, Any]:
 def awaited(server: Server, diagnosis_id: str, *states: str) -> dict[str, Any]:
     """The diagnosis once it is in one of these states; else once it has ended."""
     deadline = time.monotonic() + 240  # a machine may be busy
+    pause = 0.1
     while time.monotonic() < deadline:
         diagnosis = found(server, diagnosis_id)
         if diagnosis["state"] in (states or ("done", "failed", "cancelled")):
             return diagnosis
-        time.sleep(0.1)
+        time.sleep(pause)
+        pause = min(1.2 * pause, 1.0)  # asking takes the server and the test longer than waiting
     raise AssertionError(f"still {diagnosis}")
 
 

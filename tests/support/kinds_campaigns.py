@@ -8,7 +8,7 @@ from rig.description import parse as experiment
 from rig.elastomer import campaign_of_curves, record_curves
 from rig.recorded import campaign as campaign_of_lines
 from rig.recorded import record_lines
-from underskin.diagnosis.pipeline import diagnosis_report
+from tests.support.lean_reports import lean_report
 from underskin.recordings.campaign import Campaign, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -74,10 +74,11 @@ def of_block(modulus: float, name: str = "block") -> Campaign:
     return parse({"schema": "campaign/1", "name": name, "skin": skin, "recordings": recordings})
 
 
-def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable) -> dict[str, Any]:
+def report(document: Mapping[str, Any], further: list[Any], table: SigmaTable, *left_out: str) -> dict[str, Any]:
+    """With further recordings; outside `make soak` without the mechanisms left out."""
     whole = deepcopy(dict(document))
     whole["recordings"] = [*whole["recordings"], *further]
-    return diagnosis_report(parse(whole), table)
+    return lean_report(parse(whole), table, *left_out)
 
 
 def named(document: Mapping[str, Any]) -> list[str]:

@@ -39,7 +39,7 @@ def test_an_independent_code_finds_the_same_contact(radius: float, load: float) 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("a", "radius"), [(0.06, 0.7), (0.47, 1.3), (0.9, 5.3)])
+@pytest.mark.parametrize(("a", "radius"), first(2, [(0.9, 5.3), (0.47, 1.3), (0.06, 0.7)]))
 def test_fresh_solves_agree_within_the_reported_error(a: float, radius: float) -> None:
     (sphere,) = press_spheres(a, np.array([radius]), np.array(RHO), 5)
     load = sphere.cbrt_load**3

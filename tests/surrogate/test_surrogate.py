@@ -47,7 +47,7 @@ def test_point_load_knows_no_finite_strain() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(50 if SOAK else 2))
+@pytest.mark.parametrize("number", range(50 if SOAK else 1))
 def test_fresh_solves_on_a_finer_mesh_agree_within_the_reported_error(number: int) -> None:
     generator = np.random.default_rng([50, number])
     a = generator.uniform(0.02, 0.5) if number % 3 == 0 else generator.uniform(0, 3)

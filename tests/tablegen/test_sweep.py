@@ -78,7 +78,7 @@ def all_but(count: int, solved: Path, folder: Path) -> None:
 
 @pytest.mark.slow
 def test_killed_at_any_moment_it_resumes_to_the_same_table(solved: Path, uninterrupted: Path, tmp_path: Path) -> None:
-    all_but(3, solved, tmp_path)
+    all_but(2, solved, tmp_path)
     script = tmp_path / "make.py"
     script.write_text(SCRIPT)
     path = tmp_path / "sigma.h5"

@@ -1,6 +1,6 @@
 """Every reader on damaged files: cut, shuffled, overwritten, random. An error that names the file, never another one.
 
-500 files a format, and 3 in the process apart that real files are read in; 100,000 and 2,000 with UNDERSKIN_SOAK=1.
+200 files a format, and 2 in the process apart that real files are read in; 100,000 and 2,000 with UNDERSKIN_SOAK=1.
 """
 
 import io
@@ -40,8 +40,8 @@ pytestmark = [
 
 # In parts, so that an interrupted soak goes on with the next one.
 PARTS = 10 if SOAK else 1
-COUNT = 10_000 if SOAK else 500
-COUNT_APART = 200 if SOAK else 3
+COUNT = 10_000 if SOAK else 200
+COUNT_APART = 200 if SOAK else 2
 # Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
 FOREIGN = ("HDF5", "MATLAB")
 CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")

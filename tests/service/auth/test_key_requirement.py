@@ -12,6 +12,7 @@ import pytest
 from service.store import database, key_requirement, open_store
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "sqlite"
 on_sqlite = pytest.mark.parametrize("place", ["sqlite"], indirect=True)  # what no database does otherwise
 QUIET = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
 

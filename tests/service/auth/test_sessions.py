@@ -17,6 +17,7 @@ from service.store import sessions as noted
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Place, Server, running
 
+BACKEND = "sqlite"
 LOGIN_FIRST = 303  # a page sends who is not logged in to the login
 
 Browser = Callable[..., httpx.Client]

@@ -12,6 +12,7 @@ from tests.support.store_server import Server, campaign
 from underskin import Client
 from underskin.recordings.campaign import FrfRecording
 
+BACKEND = "sqlite"
 ESTIMATORS = ("H1", "H2", "Hv")
 
 

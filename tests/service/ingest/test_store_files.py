@@ -14,6 +14,7 @@ from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.campaign import parse
 from underskin.recordings.readers import hdf5_file
 
+BACKEND = "postgresql"
 RIG = """\
 schema: rig/1
 kind: indentation

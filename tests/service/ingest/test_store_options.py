@@ -8,6 +8,7 @@ import pytest
 
 from tests.support.store_server import Server, campaign
 
+BACKEND = "sqlite"
 Fields = list[tuple[str, Any]]
 
 

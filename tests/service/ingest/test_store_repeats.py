@@ -8,6 +8,7 @@ import orjson
 from tests.service.usecases.test_store_skins import history, points
 from tests.support.store_server import Server, campaign
 
+BACKEND = "postgresql"
 Document = dict[str, Any]
 
 

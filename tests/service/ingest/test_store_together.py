@@ -11,6 +11,7 @@ from tests.support.instrument_files import CHARGE, FORCE, lvm, tdms
 from tests.support.store_server import Server, campaign
 from underskin import Client, ServiceError
 
+BACKEND = "sqlite"
 WHOLE = campaign("whole")
 RIG = """\
 schema: rig/1

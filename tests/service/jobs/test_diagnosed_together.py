@@ -13,6 +13,7 @@ from tests.support.diagnosed import awaited, found, resonant, sent
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError
 
+BACKEND = "postgresql"
 ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
 SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 

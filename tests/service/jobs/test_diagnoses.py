@@ -53,7 +53,7 @@ def await_workers(server: Server, count: int, name: str = "underskin-works") -> 
         pids = workers_of(server, name)
         if len(pids) == count:
             return pids
-        time.sleep(0.02)
+        time.sleep(0.1)
     raise AssertionError(f"{len(workers_of(server, name))} processes {name}")
 
 
@@ -63,7 +63,7 @@ def is_gone(pid: int) -> bool:
     while time.monotonic() < deadline:
         with suppress(FileNotFoundError, ProcessLookupError):
             if (Path("/proc") / str(pid) / "stat").read_text().rpartition(")")[2].split()[0] != "Z":
-                time.sleep(0.02)
+                time.sleep(0.1)
                 continue
         return True
     return False

@@ -13,6 +13,7 @@ from playwright.sync_api import FloatRect, Page, expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import Made, keep, made_of
+from tests.support.cases import first
 from tests.support.diagnosed import resonant
 from tests.support.store_server import Server
 
@@ -94,7 +95,7 @@ def test_the_summary_of_a_saved_file_is_one_sheet(reader: Visit, idle: Server, p
     reader.wrong.clear()  # the file itself is not of the server
 
 
-@pytest.mark.parametrize("width", [1180, 390])
+@pytest.mark.parametrize("width", first(1, [390, 1180]))
 def test_a_folded_part_is_opened_with_keys_and_draws(reader: Visit, idle: Server, made: Made, width: int) -> None:
     page = reader.page
     page.set_viewport_size({"width": width, "height": 800})

@@ -9,6 +9,7 @@ from playwright.sync_api import Page, expect
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.uploads import campaigns_of, file, look_at
+from tests.support.cases import first
 from tests.support.raw_curves import DEPTH_MM, FORCE_N, OFFSET_NM, RADIUS_MM, text_of_raw_curve
 from tests.support.store_server import Server
 
@@ -25,6 +26,12 @@ def fill_in(page: Page) -> None:
     page.get_by_label("force is 0 over the first").fill("10")
     page.get_by_label("sphere radius R [mm]").fill(f"{RADIUS_MM}")
     page.get_by_label("These values are right").check()
+
+
+# What shows as on a desktop, but for its width; in `make soak` on both.
+ON_A_PHONE = pytest.mark.parametrize(
+    "sized", first(1, [(390, 844), (1280, 900)]), ids=first(1, ["phone", "desktop"]), indirect=True
+)
 
 
 def read_it(page: Page) -> None:
@@ -65,6 +72,7 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     np.testing.assert_allclose(recording["displacement_mm"], DEPTH_MM - 1e-6 * OFFSET_NM, atol=1e-9)
 
 
+@ON_A_PHONE
 def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     page = sized.page
     look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
@@ -148,6 +156,7 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     expect(page.get_by_text("of each curve, samples 11 to 380 are used")).to_be_visible()
 
 
+@ON_A_PHONE
 def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Server) -> None:
     page = sized.page
     width = page.viewport_size["width"] if page.viewport_size else 0

@@ -1,5 +1,6 @@
 """The lab's own mechanisms over HTTP: kept, known to diagnoses by name, refused, discarded; and what is left out."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from tests.support.diagnosed import sent
 from tests.support.diagnosis_campaigns import Made
 from tests.support.diagnosis_campaigns import campaign as made_campaign
-from tests.support.store_server import Place, running
+from tests.support.store_server import Place, Server, running
 from underskin import Client, ServiceError
 from underskin.recordings.campaign import FrfRecording, to_dict
 from underskin.surrogate.sigma_table import load_table
@@ -35,6 +36,13 @@ def own_place(tmp_path: Path) -> Place:
     folder = tmp_path / "data"
     folder.mkdir()
     return Place(folder)
+
+
+@pytest.fixture(scope="module")
+def refusing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server for what it refuses, none of which stays."""
+    with running(Place(tmp_path_factory.mktemp("refusing")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
+        yield started
 
 
 def warmed() -> dict[str, object]:
@@ -124,14 +132,13 @@ def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(own_place: Pl
         ("x" * 100_001, 413, "100000 bytes"),
     ],
 )
-def test_what_cannot_be_kept_is_refused_with_its_reason(own_place: Place, body: str, status: int, said: str) -> None:
-    with running(own_place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        kind = "application/json" if body.startswith("{") else "application/yaml"
-        address = f"{server.http.base_url}/v1/mechanisms"
-        answer = httpx.post(address, content=body.encode(), headers={"Content-Type": kind})
+def test_what_cannot_be_kept_is_refused_with_its_reason(refusing: Server, body: str, status: int, said: str) -> None:
+    kind = "application/json" if body.startswith("{") else "application/yaml"
+    address = f"{refusing.http.base_url}/v1/mechanisms"
+    answer = httpx.post(address, content=body.encode(), headers={"Content-Type": kind})
     assert answer.status_code == status
     assert said in answer.text
-    folder = own_place.folder / "mechanisms"
+    folder = refusing.place.folder / "mechanisms"
     assert not folder.exists() or not list(folder.iterdir())
 
 

@@ -12,6 +12,7 @@ from tests.support.diagnosed import joint_reports, report, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.document_schemas import report_validator
 from tests.support.kinds_campaigns import BLOCK, curves, lines
+from tests.support.lean_reports import COSTLY, lean_report
 from tests.support.mechanism_campaigns import compression_campaign, indentation_campaign
 from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import Campaign, FrfRecording, parse
@@ -85,7 +86,7 @@ def test_a_report_of_every_verdict_is_described(verdict: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_report_on_every_kind_of_recording_is_described(kind: str) -> None:
-    require_described(diagnosis_report(KINDS[kind](), table()))
+    require_described(lean_report(KINDS[kind](), table(), *COSTLY))
 
 
 @pytest.mark.slow

@@ -12,6 +12,8 @@ from tests.service.pages.forms import BROWSING
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
 
+BACKEND = "postgresql"
+
 
 @pytest.fixture
 def client(server: Server) -> Iterator[underskin.Client]:

@@ -14,6 +14,7 @@ from tests.support.store_server import Server, campaign
 from underskin import Client
 from underskin.client.documents.diagnoses import Diagnosis
 
+BACKEND = "sqlite"
 Rows = list[dict[str, Any]]
 
 

@@ -12,9 +12,11 @@ from typing import Any
 import pytest
 
 from service.usecases.scheduled_backups import kept
+from tests.service.backends import BACKENDS
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "sqlite"
 _NONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "0"}
 _SECOND = str(1 / 3600)  # in hours
 
@@ -53,6 +55,7 @@ def metric(server: Server, name: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
 def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     with running(place, **_NONE) as server:

@@ -19,6 +19,7 @@ from underskin import load_table
 from underskin.inversion.invert import invert
 from underskin.recordings.campaign import parse
 
+BACKEND = "sqlite"
 # Of each version: the digest of the answer's fields, and the array's d33 with its uncertainty [pC/N].
 KNOWN = {
     1: ("6feb4e2d51f904c6", 13.402, 0.105487),

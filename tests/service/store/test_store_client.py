@@ -11,6 +11,8 @@ from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError
 from underskin.recordings.campaign import parse, to_dict
 
+BACKEND = "sqlite"
+
 
 @pytest.fixture
 def client(server: Server) -> Iterator[Client]:

@@ -13,6 +13,8 @@ from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.server import free_port
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "sqlite"
+
 
 def told(server: Server, *arguments: str) -> str:
     """What a command prints that succeeds."""

@@ -14,6 +14,7 @@ import pytest
 from service.store import Database, campaigns, open_store
 from service.store.tables import AnyRow
 from service.usecases import campaigns as usecase
+from tests.service.backends import on
 from tests.support.store_server import Place, Server, campaign
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.readers import hdf5_file
@@ -57,6 +58,7 @@ def consume(store: Database, row: AnyRow) -> None:
 
 
 @pytest.mark.slow
+@on("postgresql")
 def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path: Path) -> None:
     store = open_store(place.database_url, place.folder)
     sent = parse(large())

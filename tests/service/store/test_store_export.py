@@ -14,6 +14,8 @@ from tests.service.conftest import emptied
 from tests.service.ingest.test_store_files import CSV, RIG
 from tests.support.store_server import Server, campaign
 
+BACKEND = "postgresql"
+
 
 def fill(server: Server) -> None:
     """A skin with everything that can happen to it."""

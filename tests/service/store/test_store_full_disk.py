@@ -16,9 +16,9 @@ from tests.support.store_server import Place, Server, campaign, running
 
 @pytest.fixture
 def small_disk() -> Iterator[Path]:
-    """A folder with room for 16 MB."""
+    """A folder with room for 8 MB."""
     folder = Path(tempfile.mkdtemp(prefix="underskin-small-"))
-    mount = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(folder)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(folder)]
     if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
         folder.rmdir()
         pytest.skip("mounting a small disk takes root")
@@ -69,7 +69,7 @@ def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place) -> N
 
 def test_an_upload_that_does_not_fit_is_refused_as_it_streams(small_disk: Path) -> None:
     with running(Place(small_disk)) as server:
-        document = orjson.dumps(campaign("one")) + b" " * 20_000_000
+        document = orjson.dumps(campaign("one")) + b" " * 10_000_000
         answer = server.http.post("/v1/campaigns", files={"file": ("big.json", document)})
         assert answer.status_code == 507
         assert server.http.post("/v1/campaigns", json=campaign("small")).status_code == 201

@@ -15,6 +15,7 @@ from underskin import Client, ServiceError
 from underskin.client.answers import Adopted
 from underskin.recordings.campaign import FrfRecording, parse
 
+BACKEND = "postgresql"
 PRESSED: dict[str, Any] = {
     "thickness_mm": SKIN.thickness_mm,
     "youngs_modulus_mpa": SKIN.youngs_modulus_mpa,

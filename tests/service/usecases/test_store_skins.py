@@ -8,6 +8,8 @@ import pytest
 from tests.support.blocks import block
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "postgresql"
+
 
 def post(server: Server, skin: str, name: str, d33: float = 14.0, year: int = 2017) -> str:
     document = campaign(name, d33=d33)

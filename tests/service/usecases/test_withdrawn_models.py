@@ -17,6 +17,7 @@ from tests.support.diagnosed import D33, diagnosed, report, resonant
 from tests.support.store_server import Place, Server, running
 from underskin import Client, ServiceError
 
+BACKEND = "sqlite"
 ASKED = {**PRESSED, "model": "adopted", "skin_id": "palm", "frequency_hz": FREQUENCY}
 LINES = {"band_hz": [1, 1000], "frf_re_pc_per_n": [[7.0, 7.0, 7.0]], "frf_im_pc_per_n": [[0.0, 0.0, 0.0]]}
 
