@@ -216,9 +216,12 @@ def too_near(sensors: Sequence[str], radius_mm: float, pitch_mm: float, in_metre
 
 def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
     """Lines where the force has little power."""
-    text = f"{faint} of {measured} lines of {recordings} recordings are left out: the force has little power there"
-    shared = f", and {beside} that share their noise with the next one" if beside else ""
-    return f"{text} and charge does not follow it{shared}"
+    of = "one recording" if recordings == 1 else f"{recordings} recordings"
+    text = (
+        f"{faint} of {measured} lines of {of} are left out: the force has little power there, and the charge does not"
+    )
+    shared = f"; so are {beside} whose noise the next line shares" if beside else ""
+    return f"{text} follow it{shared}"
 
 
 def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: float) -> str:

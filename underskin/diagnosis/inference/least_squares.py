@@ -13,6 +13,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import least_squares
 
+from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
 from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT
 from underskin.diagnosis.noise.noise_priors import START_GAIN
@@ -191,6 +192,19 @@ def plain_least_squares(hypothesis: Hypothesis, start: Floats) -> tuple[Floats, 
     best, cost = _solved(residuals, jacobian, begin, (low, high), _units(model, precision), _TOLERANCE)
     left = 2 * cost * unit**2 + lines.smooth.within(model.forces(best[None])[0], lines.spans)
     return best, 100 * float(np.sqrt(left / (count * measured**2).sum()))
+
+
+def least_squares_reading(lines: Lines, force: Floats) -> Floats:
+    """What the cells show of a force (rows,) [N] by plain least squares: with the zero that leaves least of each curve,
+    and its drift where that is plain in the air."""
+    assert lines.smooth is not None
+    root, measured = np.sqrt(lines.smooth.count), lines.value.real
+    reading = force.copy()
+    for own in lines.spans:
+        taken = _cell_columns(lines.smooth.columns[own], root[own], measured[own])
+        rest = root[own] * (measured[own] - force[own])
+        reading[own] += taken @ (taken.T @ rest) / root[own]
+    return reading
 
 
 def _cell_columns(columns: Floats, root: Floats, force: Floats) -> Floats:

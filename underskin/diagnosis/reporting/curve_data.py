@@ -1,7 +1,9 @@
 """What the figure of a curve shows: its samples, what two explanations predict of it, and the marks on its course.
 
 Forces are less the zero that the samples in the air tell. Predicted ones are what the cell would show of the law's: the
-fit grants it the rest of a zero, a drift and a gain, of each curve its own.
+fit grants it the rest of a zero, a drift and a gain, of each curve its own. The base model alone is drawn by plain
+least squares, by which the report says what it leaves: weighed by noise that has to hold all that it lacks, it may lie
+far from every sample.
 """
 
 from dataclasses import dataclass
@@ -12,6 +14,7 @@ from underskin.diagnosis.data.curve_samples import finite_samples
 from underskin.diagnosis.data.thinning import way_along
 from underskin.diagnosis.inference.curve_nuisances import CellResponse, cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.reporting.numbers import place_of
 from underskin.recordings.campaign import Campaign, CurveRecording
 from underskin.recordings.curve_course import course
@@ -83,17 +86,29 @@ def shown_curves(
     return sorted(curves, key=lambda curve: -curve.left_percent)
 
 
+def base_reading(problem: FittingProblem, explanation: Explanation) -> tuple[Floats, Floats] | None:
+    """Of indentations by the base model alone: the fit (parameters,) by plain least squares, and what the cells would
+    show by it (rows,) [N]; None of other explanations."""
+    if explanation.names or problem.kind != "indentation":
+        return None
+    fit, _ = explanation.least_squares
+    return fit, least_squares_reading(problem.lines, explanation.model.predict(fit).value.real)
+
+
 def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
     """Of each curve."""
-    lines = problem.lines
-    force = explanation.model.predict(explanation.point.fit).value.real
+    lines, fit = problem.lines, explanation.point.fit
+    force = explanation.model.predict(fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
     reading = cell.reading(lines, force)
+    plain = base_reading(problem, explanation)
+    if plain is not None:
+        fit, reading = plain
     deviation = _deviation(problem, explanation, cell)
     predicted = []
     for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
         assert isinstance(entry, CurveRecording)
-        contact = float(explanation.point.fit[place_of(explanation, f"contact_point {entry.id}")])
+        contact = float(fit[place_of(explanation, f"contact_point {entry.id}")])
         # What the cell shows in the air just before, a drift included, whatever describes it
         in_air = np.flatnonzero(entry.displacement_mm[: int(entry.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[own][in_air[-1]] if len(in_air) else cell.offset[own][0]

@@ -46,11 +46,11 @@ def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
 def _statement(plan: NextRecordings) -> str:
     first = plan.first
     assert first is not None
-    count = f"{len(plan.recordings)} recordings, first" if len(plan.recordings) > 1 else "One recording"
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
-    how = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
+    one = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
+    several = f"{len(plan.recordings)} recordings, of which that {one} tells most,"
     return (
-        f"{count} {how}, should tell whether "
+        f"{several if len(plan.recordings) > 1 else f'One recording {one}'} should tell whether "
         f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
 

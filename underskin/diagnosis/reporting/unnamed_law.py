@@ -80,10 +80,7 @@ class LeadingLaw:
         Of a place it is the distance, over frequency the magnitude less 1, or where that hardly changes the phase.
         """
         low, high = self.ends
-        if self.axis is not None:
-            x = self.axis.levels if len(self.axis.levels) <= _PLACES else np.linspace(low, high, _PLACES)
-        else:
-            x = np.geomspace(low, high, 8 * _PLACES)
+        x = np.geomspace(low, high, 8 * _PLACES) if self.axis is None else _places(self.axis, _PLACES)
         sizes = self.change(x, self.values)
         place = int(np.argmax(np.abs(sizes)))
         return float(x[place]), float(sizes[place]), float(np.sqrt(self.variance(x[[place]])[0]))
@@ -162,8 +159,7 @@ def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
     if leading.axis is None:
         x = np.geomspace(low, high, _STATED)
     else:
-        words = leading.axis.words
-        x = leading.axis.levels if len(leading.axis.levels) <= _STATED else np.linspace(low, high, _STATED)
+        words, x = leading.axis.words, _places(leading.axis, _STATED)
     change, half = leading.change(x), SDS_OF_95 * np.sqrt(leading.variance(x))
     ends = zip(x.tolist(), change.tolist(), (change - half).tolist(), (change + half).tolist(), strict=True)
     return [
@@ -175,6 +171,12 @@ def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
         }
         for at, middle, least, most in ends
     ]
+
+
+def _places(axis: Axis, most: int) -> Floats:
+    """At which a course is looked at: all levels of words, which have nothing between them, or of a few."""
+    few = axis.words or len(axis.levels) <= most
+    return axis.levels if few else np.linspace(axis.low, axis.high, most)
 
 
 def _range_name(leading: LeadingLaw) -> str:
