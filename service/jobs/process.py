@@ -24,7 +24,9 @@ from underskin.recordings.readers import json_file
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
-_LOADING_S = 60.0  # within which a fork server must have loaded everything
+_LOADING_S = (
+    300.0  # within which a fork server must have loaded everything: 4 s, at low priority on a busy machine far more
+)
 
 
 class ForkServer:
@@ -69,10 +71,15 @@ class ForkServer:
             try:
                 socket.send_fds(self._socket, [b"f"], descriptors)
                 _, forked, _, _ = socket.recv_fds(self._socket, 1, 1)
-            except (ConnectionError, TimeoutError):
+            except ConnectionError:
                 forked = []
+            except TimeoutError as error:
+                raise OSError(
+                    f"no process for the diagnosis could be started within {_LOADING_S:g} s, because this computer is "
+                    "too busy: diagnose it again when other work on it has ended"
+                ) from error
             if not forked:
-                raise OSError(f"no worker could be started: {_end_of(self._stderr)}")
+                raise OSError(f"no process for the diagnosis could be started: {_end_of(self._stderr) or 'it ended'}")
             ours.callback(os.close, forked[0])
             return WorkerProcess(forked[0], stdin, stdout, stderr, status, ours.pop_all())
 

@@ -102,7 +102,7 @@ def test_a_rig_description_is_used_and_one_that_makes_sense_of_a_file_has_it_sen
         (at.folder / "block.csv").write_bytes(Path("examples/campaigns/block.csv").read_bytes())
         at.start()
         at.wait_for("block.csv: 422")
-        assert "Depth [mm] is missing" in at.told
+        assert "it lacks Depth [mm]" in at.told
         rig.write_text(described)
         at.end()
         at.start()
