@@ -19,6 +19,7 @@ from underskin.units import to_lab
 
 MOST_LISTED = 60
 _MOST_CHANNELS = 60
+_LEAST_COHERENCE = 0.5  # of lines at which the charge follows the force
 _MOST_PROPERTIES = 40
 MOST_SENSORS = 300  # listed of a skin
 _MOST_SKINS = 2
@@ -38,7 +39,7 @@ class ChannelSummary:
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """A recording that can be kept; `frf_pc_per_n` is the median magnitude over its lines."""
+    """A recording that can be kept; `frf_pc_per_n` is the median magnitude over lines at which charge follows force."""
 
     id: str
     kind: str
@@ -206,8 +207,10 @@ def _level(recording: FrfRecording) -> float | None:
     from underskin.recordings.frf.estimation import lines_of
 
     try:
-        values = lines_of(recording).values
+        lines = lines_of(recording)
     except InvalidInput:
         return None
+    coherent = ~(lines.coherence_or_nan < _LEAST_COHERENCE)
+    values = lines.values[coherent] if coherent.any() else lines.values
     finite = values[np.isfinite(values)]
     return float(np.median(to_lab("frf_pc_per_n", np.abs(finite)))) if len(finite) else None
