@@ -228,10 +228,21 @@ class MappedBlock:
             formula = self.rig.derived.get(depth)
             if formula is not None and formula.is_sum:
                 turn = f"turn the terms of {formula.text} that fall as it is pressed"
-                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}")
+                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}{self._also_used(depth)}")
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
             raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))
+
+    def _also_used(self, derived: str) -> str:
+        """In words, each channel of a formula that others use too, and these."""
+        rest = {name: formula for name, formula in self.rig.derived.items() if name != derived}
+        told = ""
+        for name in filter(self.block.headed, self.rig.derived[derived].names):
+            others = [one for one, formula in rest.items() if name in formula.names]
+            if others:
+                of = " and of ".join(others)
+                told += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
+        return told
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

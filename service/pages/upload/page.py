@@ -174,6 +174,7 @@ def understood(
         carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
         workbench=workbench,
         recorded_time=recorded_time,
+        in_formulas=workbench.in_formulas(document, channels),
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(
