@@ -11,6 +11,7 @@ from underskin.recordings import tare
 from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, SignalMapping
 from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
+from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
@@ -135,7 +136,7 @@ class MappedBlock:
         tared = column[: max(1, round(percent / _PERCENT * len(column)))]
         zero = float(tared.mean())
         part = f"the first {percent:g} % of all samples"
-        self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over {part}"
+        self.taken[field] += f", less {readable(field, zero)}, its mean over {part}"
         words = field.rpartition("_")[0]
         self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
         rise = tare.rise(column, len(tared)) if field == "force_n" and self.rig.kind != "frf" else None
@@ -208,10 +209,8 @@ class MappedBlock:
 
     def _say_ranges(self, columns: Mapping[str, Any]) -> None:
         for field, column in columns.items():
-            finite = column[np.isfinite(column)]
-            if field in LAB and field in self.taken and len(finite):
-                low, high = finite.min() + 0.0, finite.max() + 0.0  # 0 instead of -0
-                self.taken[field] += f": {low:.4g} to {high:.4g} {LAB[field].unit}"
+            if field in LAB and field in self.taken and np.isfinite(column).any():
+                self.taken[field] += f": {range_of(field, column)}"
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
         """Force must rise with displacement, unless the rig says a sign for both."""
