@@ -15,11 +15,20 @@ def said_of(rig: RigDescription) -> list[str]:
     """A sentence for each channel, one for all that is said of the recordings, and one for what a curve is, if that is
     said. Of formulas, tare and trim the reading's own notes tell."""
     channels = [f"{CHANNELS[field]}: {_channel(rig, mapping)}" for field, mapping in rig.channels.items()]
-    words = {field: (words.partition(", if ")[0], unit) for field, words, unit, _ in RECORDING}
-    values = [_value(*words.get(field, (field, "")), value) for field, value in rig.recording.items()]
+    values = _values(rig.recording)
     recordings = [f"said of its recordings: {'; '.join(values)}"] if values else []
     checked = ["unusual magnitudes were said to be right"] if rig.units_checked else []
     return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]
+
+
+def typed_of(rig: RigDescription) -> list[str]:
+    """What was typed of all recordings alike, a value each, and is not read from each file."""
+    return _values({field: value for field, value in rig.recording.items() if not isinstance(value, Property)})
+
+
+def _values(recording: Mapping[str, Any]) -> list[str]:
+    words = {field: (words.partition(", if ")[0], unit) for field, words, unit, _ in RECORDING}
+    return [_value(*words.get(field, (field, "")), value) for field, value in recording.items()]
 
 
 def _instrument(document: Mapping[str, Any]) -> list[str]:

@@ -11,6 +11,7 @@ from underskin.recordings import tare
 from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, SignalMapping
 from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
+from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.unit_labels import unit
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
@@ -135,7 +136,7 @@ class MappedBlock:
         tared = column[: max(1, round(percent / _PERCENT * len(column)))]
         zero = float(tared.mean())
         part = f"the first {percent:g} % of all samples"
-        self.taken[field] += f", less {zero:.4g} {LAB[field].unit}, its mean over {part}"
+        self.taken[field] += f", less {readable(field, zero)}, its mean over {part}"
         words = field.rpartition("_")[0]
         self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
         rise = tare.rise(column, len(tared)) if field == "force_n" and self.rig.kind != "frf" else None
@@ -208,10 +209,8 @@ class MappedBlock:
 
     def _say_ranges(self, columns: Mapping[str, Any]) -> None:
         for field, column in columns.items():
-            finite = column[np.isfinite(column)]
-            if field in LAB and field in self.taken and len(finite):
-                low, high = finite.min() + 0.0, finite.max() + 0.0  # 0 instead of -0
-                self.taken[field] += f": {low:.4g} to {high:.4g} {LAB[field].unit}"
+            if field in LAB and field in self.taken and np.isfinite(column).any():
+                self.taken[field] += f": {range_of(field, column)}"
 
     def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
         """Force must rise with displacement, unless the rig says a sign for both."""
@@ -228,10 +227,21 @@ class MappedBlock:
             formula = self.rig.derived.get(depth)
             if formula is not None and formula.is_sum:
                 turn = f"turn the terms of {formula.text} that fall as it is pressed"
-                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}")
+                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}{self._also_used(depth)}")
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
             raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))
+
+    def _also_used(self, derived: str) -> str:
+        """In words, each channel of a formula that others use too, and these."""
+        rest = {name: formula for name, formula in self.rig.derived.items() if name != derived}
+        told = ""
+        for name in filter(self.block.headed, self.rig.derived[derived].names):
+            others = [one for one, formula in rest.items() if name in formula.names]
+            if others:
+                of = " and of ".join(others)
+                told += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
+        return told
 
     def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """Without the line at 0 Hz; time series with their sample rate."""

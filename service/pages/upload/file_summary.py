@@ -8,6 +8,7 @@ import numpy as np
 
 from service.ingest.reading import InspectedFile, checked
 from service.ingest.uploads import Upload
+from service.pages.upload import stated_preload
 from service.store.codec import recorded_at
 from underskin import InvalidInput
 from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording
@@ -198,7 +199,9 @@ def _measured(recording: Recording) -> RecordingSummary:
         size = f"sphere, radius {recording.indenter_radius_mm:g} mm"
         return RecordingSummary(recording.id, recording.kind, recording.sensor, size, len(recording.force_n), None)
     column = recording.force_n if recording.force_n is not None else recording.frequency_hz
-    pressed = f"{recording.preload_n:g} N, sphere radius {recording.indenter_radius_mm:g} mm"
+    measured = stated_preload.measured_otherwise(recording)
+    beside = "" if measured is None else f" (its force: {stated_preload.in_words(measured)})"
+    pressed = f"{recording.preload_n:g} N{beside}, sphere radius {recording.indenter_radius_mm:g} mm"
     points = 0 if column is None else len(column)
     return RecordingSummary(recording.id, recording.kind, recording.sensor, pressed, points, _level(recording))
 

@@ -16,6 +16,7 @@ from service.ingest.accept import RIG, IngestOptions, accept, kept_rig, sent_rig
 from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import signed
+from service.pages.upload import stated_preload
 from service.pages.upload.pending_uploads import PendingUpload, Remembered
 from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
@@ -124,7 +125,7 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
                 f"the file names skin {one.campaign.skin.id}, not {kept_on}, that of the campaign that it corrects: "
                 "the name below decides."
             )
-        sentences += d33_cache.foreseen(table, one.campaign)
+        sentences += [*stated_preload.doubts(one.campaign), *d33_cache.foreseen(table, one.campaign)]
     return sentences
 
 

@@ -9,7 +9,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.auth import session
 from service.dependencies import WRITE, Store, Table
-from service.ingest import field_words, skin_imports
+from service.ingest import field_words, rig_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
 from service.ingest.uploads import received
@@ -171,8 +171,10 @@ def understood(
         field_words=field_words,
         is_stated=lambda name: name == rig_description.BLOCK_NAME or file_summary.may_state(pending.seen, name),
         spring=spring_mapping,
+        carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
         workbench=workbench,
         recorded_time=recorded_time,
+        in_formulas=workbench.in_formulas(document, channels),
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
         offered=templates.offered(store, pending, pending.seen[file]),
         same=same_request.files(

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from underskin.recordings.curve_signs import falling
+from underskin.recordings.readable_values import range_of
 from underskin.recordings.rig_mapping import MappedFile
-from underskin.units import LAB
 
 
 def counted_negative(recording: Mapping[str, Any]) -> Sequence[str]:
@@ -30,6 +30,6 @@ def with_curves_turned(mapped: MappedFile) -> MappedFile:
     recordings = [turned(one, counted_negative(one)) for one in before]
     taken = dict(mapped.taken)
     for field in counted_negative(before[0]) if before else ():
-        low, high = np.nanmin(recordings[0][field]), np.nanmax(recordings[0][field])
-        taken[field] += f"; turned round: {low + 0.0:.4g} to {high + 0.0:.4g} {LAB[field].unit}"
+        channel = taken[field].rpartition(": ")[0]  # before the range that it came in
+        taken[field] = f"{channel}, turned round: {range_of(field, recordings[0][field])}"
     return replace(mapped, document={**mapped.document, "recordings": recordings}, taken=taken)

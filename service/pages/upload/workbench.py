@@ -2,13 +2,16 @@
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 from service.pages.shared.forms import number_or_text
-from service.pages.upload.file_summary import FileSummary
+from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import InvalidInput, not_unique
 from underskin.recordings.channel_mapping import AUTOMATIC
+from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.derived_channels import FIELD
+from underskin.recordings.readers.unit_labels import in_brackets
 
 SIGNS = {"": "as it is", "1": "+", "-1": "−", AUTOMATIC: "automatic"}
 TARES = {
@@ -36,6 +39,15 @@ def rows(document: Mapping[str, Any]) -> list[tuple[str, Any, str]]:
     by_channel = {how.get("channel"): field for field, how in document.get("channels", {}).items()}
     derived = document.get(FIELD) or {}
     return [*((name, text, by_channel.get(name, "")) for name, text in derived.items()), *[("", "", "")] * _ROWS_FREE]
+
+
+def in_formulas(document: Mapping[str, Any], channels: Sequence[ChannelSummary]) -> set[str]:
+    """The channels, by name, that derived ones are made of, with or without the unit in their heading."""
+    names: set[str] = set()
+    for name, text in (document.get(FIELD) or {}).items():
+        with suppress(InvalidInput):  # which is told beside it
+            names |= set(channel_arithmetic.parse(name, text).names)
+    return {one.name for one in channels if {one.name, (in_brackets(one.name) or ("",))[0]} & names}
 
 
 def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[str, Any]) -> dict[str, str] | None:

@@ -16,6 +16,7 @@ def test_force_and_travel_are_flipped_on_demand(reader: Visit, width: int) -> No
     page.set_viewport_size({"width": width, "height": 844})
     look_at(reader, [file("block.json", as_json(block("flipped", force=-1, travel=-1)))], skin=f"block-{width}")
     assert "force and displacement are counted negative" in page.get_by_role("main").inner_text()
+    assert "the sign -1" not in page.get_by_role("main").inner_text()
     reader.require_accessible()
     flip = page.get_by_role("button", name="Flip what is counted negative")
     flip.focus()
@@ -36,5 +37,6 @@ def test_a_force_left_negative_gives_no_modulus(reader: Visit) -> None:
     shown = page.get_by_role("main").inner_text()
     assert MODULUS not in shown
     assert "force is counted negative" in shown
+    assert "the sign -1" not in shown
     page.get_by_text("Left out of the figures: 1").click()
     page.get_by_text("no modulus follows from a fall").wait_for()

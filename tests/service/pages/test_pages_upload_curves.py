@@ -96,7 +96,7 @@ def test_a_curve_is_drawn_before_anything_else_is_known(client: httpx.Client) ->
     assert force == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)
     said = html.unescape(upload.page)
     assert "rows of 2 numbers from line 4 to 20, separated by tabs, with decimal points; names from line 2" in said
-    assert "<b>displacement</b>: 'Depth (um)' in um: -0.0005 to 0.0015 mm" in said
+    assert "<b>displacement</b>: 'Depth (um)' in um: -0.5 to 1.5 µm" in said
     assert upload.page.index('id="figure-curves"') < upload.page.index('id="mapping"')
 
 
@@ -141,13 +141,14 @@ def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     force = np.concatenate([FORCE_UN, FORCE_UN[-2::-1]])
     upload = Upload(client, table({"Depth (um)": -depth, "Force (uN)": -force}))
     upload.say(indenter_radius_mm="0.0075", units_checked="yes")
-    assert "-0.002 to 0 mm" in html.unescape(upload.page)
+    assert "-2 to 0 µm" in html.unescape(upload.page)
     token = {"form_token": token_of(upload.page)}
     assert client.post(f"{upload.address}/signs", data={"turned": "yes"} | token).status_code == 303
     upload.look()
     said = html.unescape(upload.page)
-    assert "-0.002 to 0 mm; turned round: 0 to 0.002 mm" in said
-    assert re.search(r"<b>force</b>: [^<]*; turned round: 0 to 3\.67\de-05 N", said)
+    assert "'Depth (um)' in um, turned round: 0 to 2 µm" in said
+    assert "-2 to 0 µm" not in said
+    assert re.search(r"<b>force</b>: [^<]*, turned round: 0 to 36\.7\d µN", said)
     course = upload.figure("course")
     assert {trace["name"] for trace in course["data"]} == {"loading", "way back"}
     assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])

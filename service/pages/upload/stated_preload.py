@@ -1,0 +1,48 @@
+"""The preload that is stated of a recording beside the one that its own force channel measured."""
+
+import numpy as np
+
+from underskin.findings.sentences import more_alike
+from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.frf.signal_checks import mean_of
+from underskin.units import readable_unit
+
+_ALIKE = 0.2  # of the stated preload: what a measured one may differ by
+_TOLD_ANYWAY = 3.0  # times the stated preload: beyond that, the findings of a campaign's d33 say so
+_PARTS, _STEADY = 4, 0.2  # of a recording, in which the means of a static force are alike, as a part of its mean
+
+
+def measured_otherwise(recording: FrfRecording) -> float | None:
+    """The static force [N] that the recording holds, where the stated preload is another one; None where they agree,
+    or where its force holds none: that of a piezo sensor goes to 0."""
+    force = recording.force_n
+    mean = None if force is None or len(force) < _PARTS else mean_of(force)
+    if force is None or mean is None:
+        return None
+    means = [float(part.mean()) for part in np.array_split(force, _PARTS)]
+    is_steady = max(means) - min(means) <= _STEADY * abs(mean)
+    return abs(mean) if is_steady and abs(abs(mean) / recording.preload_n - 1) > _ALIKE else None
+
+
+def in_words(force_n: float) -> str:
+    """A force in the unit in which it reads well."""
+    unit, count = readable_unit("force_n", force_n)
+    return f"{count * force_n:#.3g} {unit}"
+
+
+def doubts(campaign: Campaign) -> list[str]:
+    """In a sentence, the first recording of a campaign whose stated preload is not the one that it measured, and how
+    many more there are."""
+    frfs = [one for one in campaign.recordings if isinstance(one, FrfRecording)]
+    measured = [(one, mean) for one in frfs if (mean := measured_otherwise(one)) is not None]
+    found = [(one, mean) for one, mean in measured if 1 / _TOLD_ANYWAY <= mean / one.preload_n <= _TOLD_ANYWAY]
+    if not found:
+        return []
+    (first, mean), *others = found
+    which = f"{first.id}: " if len(campaign.recordings) > 1 else ""
+    alike = more_alike(len(others), "recording")
+    said = (
+        f"{which}pressed by {first.preload_n:g} N as stated, but its force is {in_words(mean)} on average{alike}: "
+        "is this the preload of this recording, and is its force measured from 0?"
+    )
+    return [said]
