@@ -121,7 +121,7 @@ def test_intervals_of_a_long_history_are_faint_and_keep_their_length() -> None:
 def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_stand_apart() -> None:
     random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
     d33 = 14.0 + 0.4 * random.normal(size=(60, 2))
-    d33[17, 1] = 9.0
+    d33[17, 1], d33[[21, 20, 22, 23], 0] = 9.0, [20.0, 20.1, 20.2, 20.3]
     sensors = [SensorPoints(f"s{number:02}", times, own.tolist(), [0.2, 0.2], "") for number, own in enumerate(d33)]
     figure = d33_history(sensors)
     assert figure.layout.showlegend is False
@@ -134,7 +134,12 @@ def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_sta
     for number in range(2):
         inside = (d33[:, number] > lower.y[number]) & (d33[:, number] < upper.y[number])
         assert inside.sum() == 54  # 90 %
-    assert (list(apart.text), list(apart.x), list(apart.y)) == (["s17"], [times[1]], [9.0])
+    written = dict(
+        zip(apart.hovertext, zip(apart.text, apart.textposition, apart.x, apart.y, strict=True), strict=True)
+    )
+    assert written["s17"] == ("s17", "middle left", times[1], 9.0)  # within the axes, as the last of them
+    assert written["s21"] == ("s20, s21, s22 and 1 more", "middle right", times[0], 20.0)  # as they lie too close
+    assert [written[name][0] for name in ("s20", "s22", "s23")] == [""] * 3
     np.testing.assert_allclose(apart.error_y.array, 1.96 * 0.2)
     *_, chosen = d33_history(sensors, "s03").data
     assert (chosen.name, list(chosen.y)) == ("s03", d33[3].tolist())

@@ -77,13 +77,13 @@ def array_map(
     plain = np.array([not reason for reason in reasons])
     radius, apart = _radius(x, y, sensor_radius_mm), _apart(x, y)
     inside = radius >= _WITH_ROOM * apart
-    figure = go.Figure()
+    figure, below = go.Figure(), []
     for name, own in (("differs", coloured & plain), ("alike", ~coloured & plain), ("stands out", ~plain)):
         if own.any():
             rows = np.flatnonzero(own).tolist()
             figure.add_scatter(
-                x=x[own],
-                y=y[own],
+                x=x[own].tolist(),
+                y=y[own].tolist(),
                 ids=[sensors[row] for row in rows],
                 mode="markers+text" if len(sensors) <= _MOST_WITH_ID and inside else "markers",
                 name=_names(quantity)[name],
@@ -105,9 +105,13 @@ def array_map(
                     "symbol": "circle" if name != "stands out" else "x",
                     "line": {"width": 0},
                 },
+                meta=name,
             )
-    if not inside and len(sensors) <= _MOST_WITH_ID:
-        figure.add_scatter(**_below(sensors, x, y - radius))
+            if not inside and len(sensors) <= _MOST_WITH_ID:
+                below.append({**_below([sensors[row] for row in rows], x[own], y[own] - radius), "meta": name})
+    figure.add_traces(
+        [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
+    )
     discs = []
     for row, name in enumerate(sensors):
         ring = (
@@ -119,10 +123,13 @@ def array_map(
         )
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
         line = ring or {"color": "#5b6670", "width": 1}
-        discs.append({"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", **disc})
+        discs.append(
+            {"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", "name": "sensor", **disc}
+        )
     if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
         discs.append(_ring(x[sensors.index(chosen)], y[sensors.index(chosen)], _AROUND * radius))
     figure.update_layout(shapes=discs, showlegend=sum(trace.mode != "text" for trace in figure.data) > 1)
+    figure.update_layout(meta={"alike": _ALIKE, "unknown": _UNKNOWN})  # for a page, which has others in the dark
     for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
         edge = 1.3 * max(radius, _SHARE * apart)
         update(range=[float(along.min()) - edge, float(along.max()) + edge])
@@ -226,12 +233,11 @@ def _radius(x: Floats, y: Floats, sensor_radius_mm: float | None) -> float:
 def _below(sensors: Sequence[str], x: Floats, y: Floats) -> dict[str, Any]:
     """Ids below discs that have no room for them."""
     return {
-        "x": x,
-        "y": y,
+        "x": x.tolist(),
+        "y": y.tolist(),
         "mode": "text",
         "text": list(map(_id, sensors)),
         "textposition": "bottom center",
-        "textfont": {"size": 11 if len(sensors) <= 16 else 9, "color": INK},
         "hoverinfo": "skip",
         "showlegend": False,
     }

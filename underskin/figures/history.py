@@ -14,6 +14,8 @@ from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 _MOST_POINTS = 600  # of a history that shows each sensor
 _MOST_APART = 60  # points of a line, whose intervals can be told apart
 _MOST_FAINT = 6000  # of a history that shows their median and spread
+_LINE = 0.06  # of the span of all values: what the name of a point takes up
+_MOST_BESIDE = 3  # names beside a point
 _CHOSEN = COLOURS[2]
 _DAY, _DAY_MS = timedelta(days=1), 86_400_000
 
@@ -102,13 +104,30 @@ def _most(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
             error_y={"type": "data", "array": [SDS_OF_95 * row[3] for row in apart], "thickness": 1, "width": 3},
             mode="markers+text",
             name="stands apart",
-            text=[label(sensor) for _, sensor, *_ in apart],
-            textposition="middle right",
+            text=_names(apart, float(np.ptp([value for rows in at.values() for _, value, _ in rows]))),
+            textposition=["middle right" if time == times[0] else "middle left" for time, *_ in apart],
+            hovertext=[label(sensor) for _, sensor, *_ in apart],
             marker={"color": COLOURS[1], "symbol": "square", "size": 8},
-            hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
+            hovertemplate="%{hovertext}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
         ),
         *_each(sensors),
     ]  # fmt: skip
+
+
+def _names(apart: Sequence[tuple[str, str, float, float]], span: float) -> list[str]:
+    """What is written beside each point that stands apart: of points of one time that lie too close to each other for
+    a line each the first has the names of all, the others have none. `span`: of all values."""
+    written = [""] * len(apart)
+    close: list[int] = []
+    for place in sorted(range(len(apart)), key=lambda each: (apart[each][0], apart[each][2])):
+        before = apart[close[-1]] if close else None
+        if before is None or before[0] != apart[place][0] or apart[place][2] - before[2] > _LINE * span:
+            close = []
+        close.append(place)
+        names = [label(apart[one][1]) for one in sorted(close, key=lambda one: apart[one][1])[:_MOST_BESIDE]]
+        more = len(close) - len(names)
+        written[close[0]] = ", ".join(names) + (f" and {more} more" if more else "")
+    return written
 
 
 def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:

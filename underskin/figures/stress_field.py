@@ -23,12 +23,13 @@ _STEPS = 24  # of the colours' scale
 
 
 def stress_section(field: StressField, row: int) -> go.Figure:
-    """σ_zz in the plane through the axis, at the force of `row`; the colours' scale is that of the largest force."""
+    """Compression (−σ_zz) in the plane through the axis, at the force of `row`; the colours' scale is that of the
+    largest force."""
     heat, contact, sphere = _section(field, row)
     depth = to_lab("depth_mm", field.depth)
     half, h, sensor = _half_width(field), float(depth[-1]), _sensor(field)
-    figure = go.Figure(_heatmap(heat, float(np.nanmin(to_lab("sigma_zz_mpa", field.sigma_zz[:, 0]))), power=2.0))
-    figure.update_traces(y=depth, hovertemplate="x %{x:.3g} mm, depth %{y:.3g} mm<br>σ<sub>zz</sub> %{z:.4g} MPa")
+    figure = go.Figure(_heatmap(heat, _largest(field, 0), power=2.0))
+    figure.update_traces(y=depth, hovertemplate="x %{x:.3g} mm, depth %{y:.3g} mm<br>compression %{z:.4g} MPa")
     figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 5})
     figure.add_scatter(**sphere, name="sphere", line={"color": SPHERE, "width": 2})
     figure.add_scatter(x=[-sensor, sensor], y=[h, h], name="sensor", line={"color": SENSOR, "width": 5})
@@ -39,11 +40,12 @@ def stress_section(field: StressField, row: int) -> go.Figure:
 
 
 def stress_on_base(field: StressField, row: int) -> go.Figure:
-    """σ_zz on the base from above, at the force of `row`; the colours' scale is that of the largest force."""
+    """Compression (−σ_zz) on the base from above, at the force of `row`; the colours' scale is that of the largest
+    force."""
     heat, contact = _base(field, row)
     half = _half_width(field)
-    figure = go.Figure(_heatmap(heat, float(np.nanmin(to_lab("sigma_zz_mpa", field.sigma_zz[:, -1]))), power=1.0))
-    figure.update_traces(y=heat["x"], hovertemplate="x %{x:.3g} mm, y %{y:.3g} mm<br>σ<sub>zz</sub> %{z:.4g} MPa")
+    figure = go.Figure(_heatmap(heat, _largest(field, -1), power=1.0))
+    figure.update_traces(y=heat["x"], hovertemplate="x %{x:.3g} mm, y %{y:.3g} mm<br>compression %{z:.4g} MPa")
     figure.add_scatter(**contact, name="contact", line={"color": CONTACT, "width": 2, "dash": BOUND})
     figure.add_scatter(**_circle(_sensor(field)), name="sensor", line={"color": SENSOR, "width": 3})
     figure.update_traces(mode="lines", hoverinfo="skip", selector={"type": "scatter"})
@@ -60,10 +62,10 @@ def frames(field: StressField, row: int) -> dict[str, Sequence[dict[str, Any]]]:
 
 
 def _section(field: StressField, row: int) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """The stress, the contact and the sphere; what is symmetric, mirrored."""
+    """The compression, the contact and the sphere; what is symmetric, mirrored."""
     r = to_lab("r_mm", field.r)
     drawn = r <= _half_width(field) * (1 + 1e-9)
-    x, stress = r[drawn], to_lab("sigma_zz_mpa", field.sigma_zz[row][:, drawn])
+    x, stress = r[drawn], to_lab("sigma_zz_mpa", -field.sigma_zz[row][:, drawn])
     heat = {"x": np.append(-x[:0:-1], x), "z": _rounded(np.hstack([stress[:, :0:-1], stress]))}
     a, h = float(to_lab("contact_radius_mm", field.contact.contact_radius[row])), float(to_lab("r_mm", field.depth[-1]))
     sphere = float(to_lab("indenter_radius_mm", field.indenter_radius))
@@ -78,27 +80,32 @@ def _section(field: StressField, row: int) -> tuple[dict[str, Any], dict[str, An
 
 
 def _base(field: StressField, row: int) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The stress and the edge of the contact."""
+    """The compression and the edge of the contact."""
     x = np.linspace(-1.0, 1.0, _GRID) * _half_width(field)
     distance = np.hypot(x[:, None], x)
-    stress = np.interp(distance, to_lab("r_mm", field.r), to_lab("sigma_zz_mpa", field.sigma_zz[row, -1]))
+    stress = np.interp(distance, to_lab("r_mm", field.r), to_lab("sigma_zz_mpa", -field.sigma_zz[row, -1]))
     edge = _circle(float(to_lab("contact_radius_mm", field.contact.contact_radius[row])))
     return {"x": x, "z": _rounded(stress)}, edge
 
 
-def _heatmap(heat: dict[str, Any], lowest: float, power: float) -> go.Heatmap:
+def _largest(field: StressField, depth: int) -> float:
+    """The largest compression at a depth, of all forces [MPa]."""
+    return float(np.nanmax(to_lab("sigma_zz_mpa", -field.sigma_zz[:, depth])))
+
+
+def _heatmap(heat: dict[str, Any], largest: float, power: float) -> go.Heatmap:
     """Compression in colours; with a power of 2 they go with its square root, so that what is below a small contact
     can be seen."""
-    shade = np.linspace(1.0, 0.0, _STEPS + 1)
+    shade = np.linspace(0.0, 1.0, _STEPS + 1)
     colours = sample_colorscale("Cividis", shade.tolist())
     return go.Heatmap(
         **heat,
-        zmin=lowest,
-        zmax=0.0,
+        zmin=0.0,
+        zmax=largest,
         zsmooth="best",
-        colorscale=[[float(1 - part**power), colour] for part, colour in zip(shade, colours, strict=True)],
+        colorscale=[[float(part**power), colour] for part, colour in zip(shade, colours, strict=True)],
         colorbar={
-            "title": {"text": "σ<sub>zz</sub> [MPa]"},
+            "title": {"text": "compression −σ<sub>zz</sub> [MPa]", "side": "top"},
             "orientation": "h",
             "y": -0.2,
             "yanchor": "top",

@@ -152,8 +152,9 @@ def _figures(field: StressField, query: str) -> Sequence[Drawn]:
         drawn(
             "section",
             stress_section(field, 0),
-            "Normal stress in the plane through the sphere's axis; compression is negative. The colours go with the "
-            "square root of the stress.",
+            "Normal stress in the plane through the sphere's axis; compression is positive, as in the numbers "
+            "above. The colours go with the square root of the stress. The CSV has σ_zz, in which compression is "
+            "negative.",
             numbers,
         ),
         drawn(

@@ -55,7 +55,7 @@ def _places(low: float, high: float) -> int:
 
 
 def _to_places(value: float, places: int) -> str:
-    return f"{value:.{places}f}".replace("-", "−")
+    return f"{value:z.{places}f}".replace("-", "−")  # without a sign where 0 is shown
 
 
 def given(value: float | None, unit: str = "") -> Markup:

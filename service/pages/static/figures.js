@@ -82,8 +82,11 @@ function in_legend(data, layout) {
 async function redraw(plot) {
   const { data, layout } = document_of(plot);
   paint(colours_of({ data, layout }));
+  dim_map(data, layout);
   const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
-  const height = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout) : 0);
+  const with_legend = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout) : 0);
+  const height = fit_map(plot, data, layout, margin, with_legend);
+  plot.style.minHeight = `${height}px`;
   // The caption above says the title.
   await Plotly.react(plot, data, { ...layout, title: undefined, height, margin, autosize: true }, CONFIG);
   plot.dispatchEvent(new CustomEvent("drawn", { bubbles: true }));

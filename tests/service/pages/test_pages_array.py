@@ -1,5 +1,7 @@
 """The array as navigation: a sensor that is clicked is the one that FRF, history, table and map show."""
 
+import re
+
 import pytest
 from playwright.sync_api import Locator
 
@@ -111,3 +113,31 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit,
     for sensor in ("s4", "s9"):
         page.mouse.move(*place_of(page.locator("#figure-map"), sensor))
         page.wait_for_function(f"{pointed}.customdata?.[0] === {sensor!r}")
+
+
+def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_in_the_dark(
+    reader: Visit, idle: Server
+) -> None:
+    document = to_dict(campaign(Made(sensors=40, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6), table()))
+    for number, sensor in enumerate(document["skin"]["sensors"]):  # in two rows
+        sensor["x_mm"], sensor["y_mm"] = 8.0 * (number % 20), 8.0 * (number // 20)
+    for one in document["recordings"]:
+        one.pop("position_mm", None)
+        if one["sensor"] == "s7":
+            one["frf_re_pc_per_n"] = [0.7 * value for value in one["frf_re_pc_per_n"]]
+    sent(idle, document, "forty")
+    page = reader.page
+    page.emulate_media(color_scheme="dark")
+    for width, named in ((1180, 40), (390, 1)):
+        page.set_viewport_size({"width": width, "height": 800})
+        reader.go("/skins/forty")
+        reader.drawn(2)
+        ids = [text for text in page.locator("#figure-map .textpoint").all_text_contents() if text]
+        assert (len(ids), "s7" in ids) == (named, True)
+        discs = page.locator("#figure-map .plot").evaluate("plot => plot.layout.shapes")
+        grey, coloured = discs[0], discs[7]
+        assert max(map(int, re.findall(r"\d+", grey["fillcolor"]))) < 100  # near the ground
+        assert min(map(int, re.findall(r"\d+", coloured["line"]["color"]))) > 200  # ringed, however dark it is
+        reader.require_accessible()
+    page.emulate_media(color_scheme="light")
+    page.wait_for_function("document.querySelector('#figure-map .plot').layout.shapes[0].fillcolor === '#cfd4d9'")

@@ -65,9 +65,18 @@ def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle
         for name in ("first", "second")
     ]
     assert ends[0] == ends[1]
+    across, bar = page.locator("#figure-map-first .plot").evaluate(
+        "plot => [plot._fullLayout.xaxis._length, plot._fullData.find((one) => one.marker?.colorbar).marker.colorbar"
+        ".orientation]"
+    )
+    assert bar == ("h" if width == 390 else "v")
+    assert across > 240 or width != 390  # the scale of colours leaves the width to the map
     values = page.get_by_role("region", name="d33 of each sensor")
     row = values.get_by_role("row", name=re.compile("^s2")).locator("td")
-    assert re.fullmatch(r"−4\.\d", row.first.inner_text())  # 30 % less, right after the sensor
+    gap, half = row.nth(0).inner_text(), row.nth(1).inner_text()
+    assert re.fullmatch(r"−[34]\.\d+", gap)  # 30 % less, right after the sensor
+    assert re.fullmatch(r"0\.0*[1-9]\d", half)  # two digits, which say how many the difference has
+    assert len(gap.partition(".")[2]) == len(half.partition(".")[2])
     assert re.fullmatch(r"1\d\.\d+\n\(1\d\.\d+ to 1\d\.\d+\)", row.nth(2).inner_text())
     box = row.first.bounding_box()
     assert box is not None

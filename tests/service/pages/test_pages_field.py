@@ -53,11 +53,13 @@ def test_section_and_base_are_what_the_interface_serves(reader: Visit, width: in
     section, base = trace(reader, "section"), trace(reader, "base")
     assert section["y"] == pytest.approx(served["depth_mm"])
     middle = section["x"].index(0.0)
-    on_axis = [row[0] for row in served["sigma_zz_mpa"]]
+    on_axis = [-row[0] for row in served["sigma_zz_mpa"]]  # compression is positive on pages
     assert [row[middle] for row in section["z"]] == pytest.approx(on_axis, abs=2e-3)
     assert [row[:middle] for row in section["z"]] == [row[:middle:-1] for row in section["z"]]  # symmetric
     assert base["z"][20][20] == pytest.approx(on_axis[-1], abs=2e-4)
-    assert (section["zmin"], base["zmin"]) == pytest.approx((on_axis[0], on_axis[-1]))
+    assert (section["zmin"], base["zmin"]) == (0, 0)
+    assert (section["zmax"], base["zmax"]) == pytest.approx((on_axis[0], on_axis[-1]))
+    assert "compression is positive" in reader.page.locator("#figure-section figcaption").inner_text()
     a = served["contact_radius_mm"]
     assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(a, rel=1e-3)
     assert max(trace(reader, "base", "contact")["y"]) == pytest.approx(a, rel=1e-3)
@@ -91,12 +93,12 @@ def test_the_slider_moves_the_load_by_keys(reader: Visit, width: int) -> None:
         slider.press("ArrowLeft")
     reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '1.5 N'")
     reader.page.wait_for_function(
-        "() => document.querySelector('#figure-base .plot')._fullData[0].z[20][20] > -0.2"  # half of the stress or so
+        "() => document.querySelector('#figure-base .plot')._fullData[0].z[20][20] < 0.2"  # half of the stress or so
     )
     half = trace(reader, "base")
     served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY.replace('_n=3', '_n=1.5')}").json()
-    assert half["z"][20][20] == pytest.approx(served["sigma_zz_mpa"][-1][0], abs=3e-4)
-    assert half["zmin"] == full["zmin"]  # one scale of colours for all loads
+    assert half["z"][20][20] == pytest.approx(-served["sigma_zz_mpa"][-1][0], abs=3e-4)
+    assert half["zmax"] == full["zmax"]  # one scale of colours for all loads
     assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(served["contact_radius_mm"], rel=1e-3)
     assert slider.get_attribute("aria-valuetext") == "1.5 N"
     slider.press("End")
