@@ -137,6 +137,11 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     figure = page.locator("#figure-frf")
     assert "95 % of the noise" in figure.inner_text()
+    panel = figure.locator(".plot").evaluate(
+        "plot => plot.getBoundingClientRect().left + plot._fullLayout.xaxis._offset + plot._fullLayout.xaxis._length"
+    )
+    assert panel <= width  # all frequencies, without moving the figure sideways
+    assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
     rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
     names = list(dict.fromkeys(row["recording"] for row in rows))
     assert len(names) == 12
