@@ -254,7 +254,11 @@ def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str)
 
 
 @pytest.mark.parametrize(
-    ("written", "reason"), [("03/02/2025 09:30", "can be two days"), ("31.2.2025 09:30", "is no date and time")]
+    ("written", "reason"),
+    [
+        ("03/02/2025 09:30", "can be two days, 3 February 2025 or 2 March 2025"),
+        ("31.2.2025 09:30", "is no date and time"),
+    ],
 )
 def test_a_time_that_can_be_two_or_none_is_refused(written: str, reason: str) -> None:
     refused = refusal(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n"))

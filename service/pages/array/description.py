@@ -132,7 +132,7 @@ def charge_figure(
     if (np.abs(charge) <= error).any():
         about += " Grey: the charge is 0 within its ±."
     if np.isnan(charge).any():
-        about += " White: no load is within reach."
+        about += " Not filled: no load is within reach."
     return drawn("charge", figure, about, numbers)
 
 

@@ -182,7 +182,7 @@ def _not_kept(report: Mapping[str, Any]) -> str | None:
     try:
         document(report, "kept")
     except InvalidInput as refusal:
-        return refusal.allowed
+        return refusal.allowed.removesuffix(": it cannot be kept")  # as the page has said
     return None
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime
+from datetime import UTC, datetime, time
 from typing import Any
 
 import orjson
@@ -10,6 +10,7 @@ from markupsafe import Markup, escape
 
 from service.pages.shared.plain_sentences import in_readable_units, without_rig
 from underskin.findings.formatting import in_digits, in_percent, significant
+from underskin.recordings.time_zone import time_zone
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
@@ -87,10 +88,13 @@ def limit(value: float) -> str:
 
 
 def moment(text: str | None, *, date_only: bool = False) -> Markup:
-    """A time of the store; a script turns it to the viewer's zone."""
+    """A time of the store; a script turns it to the viewer's zone. A date without a time is that day everywhere."""
     if text is None:
         return Markup("–")
     when = datetime.fromisoformat(text)
+    in_lab = (when if when.tzinfo is not None else when.replace(tzinfo=UTC)).astimezone(time_zone())
+    if in_lab.time() == time():  # midnight to the microsecond is a date that was given without a time
+        return Markup('<time datetime="{0}" data-form="day">{0}</time>').format(in_lab.date())
     shown = when.strftime("%Y-%m-%d" if date_only else "%Y-%m-%d %H:%M UTC")
     form = Markup(' data-form="date"') if date_only else ""
     return Markup('<time datetime="{}"{}>{}</time>').format(text, form, shown)

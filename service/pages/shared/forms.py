@@ -27,6 +27,7 @@ from underskin.errors import (
     wrong_type,
 )
 from underskin.recordings.readers import text
+from underskin.units import LAB
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 UNLIKELY = "or tick “These values are right, unusual as they are”"
@@ -171,9 +172,15 @@ def in_form_words(
     the form takes an unlikely magnitude, where it does."""
     if not isinstance(error, InvalidInput):
         return str(error)
-    allowed = worded(error.allowed, lambda field: label_of(field, labels, lines), unlikely)
+    allowed = unsigned(error.field, worded(error.allowed, lambda field: label_of(field, labels, lines), unlikely))
     value = "" if error.value is None else f": {error.value}"
     return f"{label_of(error.field, labels, lines)}{value} – {allowed}"
+
+
+def unsigned(field: str, allowed: str) -> str:
+    """What is allowed, without the words on its magnitude where a field has no sign."""
+    known = LAB.get(field.rpartition(".")[2])
+    return allowed if known is None or known.signed else allowed.replace(" in magnitude", "")
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:

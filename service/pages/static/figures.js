@@ -71,11 +71,25 @@ function point_at(id) {
   }
 }
 
-// Where a figure is narrow its legend has a line an entry, which panels one above the other have no room for.
-const NARROW = 500, LEGEND_LINE = 19;
-function in_legend(data, layout) {
+// Where a figure is narrow its legend has a line an entry, of a long name several, which panels one above the other
+// have no room for, and which may be as wide as the figure. Returns how many lines.
+const NARROW = 500, LEGEND_LINE = 19, LONGEST_LINE = 34, RIGHT = 20;
+function in_legend(data, layout, margin) {
   if (!layout.yaxis2 || layout.yaxis2.matches || layout.showlegend === false) return 0;
-  return data.filter((trace) => trace.showlegend !== false && trace.visible !== false).length;
+  margin.r = Math.min(margin.r ?? RIGHT, RIGHT);
+  const entries = data.filter((trace) => trace.showlegend !== false && trace.visible !== false);
+  for (const trace of entries) trace.name = in_lines(trace.name ?? "");
+  return entries.flatMap((trace) => trace.name.split("<br>")).length;
+}
+
+function in_lines(text) {
+  const lines = [];
+  for (const word of text.split(" ")) {
+    const longer = `${lines.at(-1)} ${word}`;
+    if (lines.length && longer.length <= LONGEST_LINE) lines[lines.length - 1] = longer;
+    else lines.push(word);
+  }
+  return lines.join("<br>");
 }
 
 // With the JSON as it is now, in the reader's colours.
@@ -84,7 +98,7 @@ async function redraw(plot) {
   paint(colours_of({ data, layout }));
   dim_map(data, layout);
   const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
-  const with_legend = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout) : 0);
+  const with_legend = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout, margin) : 0);
   const height = fit_map(plot, data, layout, margin, with_legend);
   plot.style.minHeight = `${height}px`;
   // The caption above says the title.

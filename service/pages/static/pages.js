@@ -7,7 +7,8 @@ function show_times(root) {
     const when = new Date(time.dateTime);
     if (Number.isNaN(when.getTime())) continue;
     const date = { year: "numeric", month: "short", day: "numeric" };
-    const clock = time.dataset.form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
+    const { form } = time.dataset; // a day is the lab's, whatever the viewer's zone
+    const clock = form === "day" ? { timeZone: "UTC" } : form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
     time.title = time.dateTime;
     time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
   }

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from service.ingest.field_words import CHANNELS, RECORDING, SKIN
-from service.pages.shared.forms import UNLIKELY, worded
+from service.pages.shared.forms import UNLIKELY, unsigned, worded
 from service.pages.upload import spring_mapping, workbench
 from service.pages.upload.file_summary import ChannelSummary
 from service.pages.upload.mapping import CHOICES, RATE
@@ -50,7 +50,7 @@ def what_to_do(error: Error, channels: Channels) -> str:
     if error["code"] == ErrorCode.NOT_ONE_OF and error["field"] == "sensor":
         return "must be the name of a sensor in the layout: fill in the layout below, a line for each sensor"
     if error["code"] != ErrorCode.REQUIRED or field_words(error["field"]) == error["field"]:
-        return worded(error["allowed"], field_words, UNLIKELY)
+        return unsigned(error["field"], worded(error["allowed"], field_words, UNLIKELY))
     if error["field"] == RATE:
         return "required: fill it in below, or say which channel is the time"
     if error["field"] in CHANNELS:

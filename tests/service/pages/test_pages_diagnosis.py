@@ -137,6 +137,11 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     figure = page.locator("#figure-frf")
     assert "95 % of the noise" in figure.inner_text()
+    panel = figure.locator(".plot").evaluate(
+        "plot => plot.getBoundingClientRect().left + plot._fullLayout.xaxis._offset + plot._fullLayout.xaxis._length"
+    )
+    assert panel <= width  # all frequencies, without moving the figure sideways
+    assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
     rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
     names = list(dict.fromkeys(row["recording"] for row in rows))
     assert len(names) == 12
@@ -170,6 +175,17 @@ def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Se
     page.get_by_text("It waits for its turn").wait_for()
     page.get_by_role("button", name="Cancel").click()
     page.get_by_text("It was cancelled").wait_for()
+
+
+def test_a_law_that_no_expression_says_is_refused_in_one_sentence(idle: Server, made: Made) -> None:
+    free = Made(deepcopy(made.report), made.figures)
+    law = {"acts_on": "thickness", "axis": "sensor", "form": "step", "expression": "h = h0·(1 + 0.2·[sensor = s1])"}
+    seen = {"parameters": [], "probability": 1.0, "rivals": [], "range": {"sensor": ["s1", "s2"]}}
+    free.report["unnamed"] = law | seen
+    free.report["provenance"]["unnamed"] = {"law": "unnamed_thickness__sensor__step__s1", "parameters": {}}
+    place = f"/diagnoses/{keep(idle, resonant('free', lines=LINES), free, 'free')}"
+    text = idle.http.get(place, headers=BROWSING).text
+    assert "<p>It cannot be kept: a smooth course, or one of words, is no expression.</p>" in text
 
 
 def test_hostile_names_in_a_report_stay_text(reader: Visit, idle: Server, made: Made) -> None:

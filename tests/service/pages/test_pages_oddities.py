@@ -187,7 +187,7 @@ def test_a_sensor_out_of_reach_says_so(server: Server) -> None:
     assert "out of reach: no load within" in text.partition(">s02<")[2].partition("</tr>")[0]
     assert "out of reach" not in text.partition(">s01<")[2].partition("</tr>")[0]
     assert "± of the linear model [pC]" in text
-    assert "White: no load is within reach." in text
+    assert "Not filled: no load is within reach." in text
     assert '<a href="/d33">d33</a>' in text  # at the top of every page
 
 

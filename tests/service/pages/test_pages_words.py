@@ -47,6 +47,25 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: 
     reader.require_accessible()
 
 
+def test_a_date_without_a_time_is_that_day_whatever_the_zone(idle: Server, reader: Visit) -> None:
+    document = campaign("of a day", sensors=1)
+    for recording in document["recordings"]:
+        recording["recorded_at"] = "2026-05-03T00:00:00+00:00"
+    kept = idle.http.post("/v1/campaigns?skin=day", json=document).raise_for_status().json()["id"]
+    page = reader.page
+    reader.go(f"/campaigns/{kept}")
+    assert page.locator("dt:text-is('recorded') + dd").inner_text() == "3 May 2026"
+    assert ":" in page.locator("dt:text-is('received') + dd").inner_text()
+
+
+def test_a_length_that_has_no_sign_is_refused_without_words_on_magnitude(idle: Server) -> None:
+    asked = {"thickness_mm": "2.5", "youngs_modulus_mpa": "16", "poisson_ratio": "0.5", "sensor_radius_mm": "1.5"}
+    asked |= {"indenter_radius_mm": "0.001", "preload_n": "1"}
+    told = idle.http.get("/field", params=asked, headers=BROWSING).text
+    assert "must be 0.05 to 1000 mm" in told
+    assert "in magnitude" not in told
+
+
 def test_what_was_not_given_has_no_unit() -> None:
     assert [re.sub("<[^>]*>", "", given(value, "mm")) for value in (2.5, None)] == ["2.5&nbsp;mm", "–"]
 

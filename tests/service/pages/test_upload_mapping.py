@@ -169,7 +169,7 @@ def test_a_time_is_typed_in_the_lab_s_zone_and_shown_as_it_was_typed(monkeypatch
         "May",
     )
     (ambiguous,) = document_of({"recorded_at": "3/5/2026"}, {})[1]
-    assert "can be two days" in ambiguous.allowed
+    assert "two days, 3 May 2026 or 5 March 2026: write it as 2026-05-03 or 2026-03-05" in ambiguous.allowed
 
 
 def test_a_file_that_states_its_time_is_taken_at_its_word() -> None:

@@ -1,7 +1,7 @@
 """Dates and times as spreadsheets write them: 24.12.2025 09:30, 24/12/2025 9:30:15."""
 
 import re
-from datetime import datetime, tzinfo
+from datetime import date, datetime, tzinfo
 
 _WRITTEN = re.compile(
     r"(?P<one>\d{1,2})(?P<mark>[./])(?P<two>\d{1,2})(?P=mark)(?P<year>\d{4})"
@@ -23,7 +23,7 @@ def iso_time(cell: str, zone: tzinfo) -> str:
     day, month = int(found["one"]), int(found["two"])
     if found["mark"] == "/" and day != month:
         if max(day, month) <= _MONTHS:
-            raise ValueError("can be two days: write it as 2025-12-24T09:30")
+            raise ValueError(_two_days(found))
         day, month = (day, month) if month <= _MONTHS else (month, day)
     hour, minute, second = (int(found[part] or 0) for part in ("hour", "minute", "second"))
     try:
@@ -31,6 +31,15 @@ def iso_time(cell: str, zone: tzinfo) -> str:
         return datetime.fromisoformat(time).replace(tzinfo=zone).isoformat()
     except ValueError as error:
         raise ValueError(f"is no date and time: {error}") from None
+
+
+def _two_days(found: re.Match[str]) -> str:
+    """That a date can be two days, which, and how either is written so that it is one alone."""
+    numbers = int(found["one"]), int(found["two"])
+    clock = f"T{int(found['hour']):02}:{found['minute']}" if found["hour"] else ""
+    days = [date(int(found["year"]), month, day) for day, month in (numbers, numbers[::-1])]
+    named = " or ".join(f"{day.day} {day:%B %Y}" for day in days)
+    return f"can be two days, {named}: write it as {' or '.join(f'{day}{clock}' for day in days)}"
 
 
 def with_zone(text: str, zone: tzinfo) -> str:
