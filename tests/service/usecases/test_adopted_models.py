@@ -162,7 +162,7 @@ def test_histories_say_which_model_each_value_used(server: Server, client: Clien
         ("no_mismatch", "nothing to adopt; the paper's model serves"),
         ("ambiguous", r"several explanations remain.*recordings that it plans"),
         ("unexplained", "Look at the rig"),
-        ("insufficient_data", r"too little was recorded.*measure next"),
+        ("insufficient_data", r"too little was recorded.*Record what it says is lacking"),
     ],
 )
 def test_only_what_is_explained_is_adopted(server: Server, client: Client, verdict: str, what_to_do: str) -> None:
