@@ -10,7 +10,13 @@ import pytest
 
 from rig.unlisted.campaign import as_json, draw
 from tests.support.diagnosis_campaigns import Made, campaign
+from underskin.diagnosis.data.dataset import lines
+from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.diagnosis.pipeline import diagnosis_report
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.grammar import Grammar
+from underskin.mechanisms.unnamed.laws import RecordingLaw
 from underskin.recordings.campaign import FrfRecording, parse
 from underskin.surrogate.sigma_table import load_table
 
@@ -60,3 +66,27 @@ def test_a_constant_phase_beside_weak_sensors_is_told_apart_from_them() -> None:
     assert "the reference phase of a lock-in amplifier" in statement
     assert report["location"]["region"]["sensor"] == ["s4"]
     assert "it is largest at sensor s4, where the response is 4" in report["location"]["statement"]
+
+
+def test_a_law_over_many_sensors_is_largest_at_one_of_them() -> None:
+    """Between two sensors there is nothing: 41 places along 45 of them missed the one that changed."""
+    table = load_table()
+    made = campaign(Made(sensors=45, preloads_n=(0.5, 1.0), spheres_mm=(4.0,), lines=2, gain=0.01), table)
+    problem = FittingProblem(lines(made), table)
+    grammar = Grammar.of(
+        problem.collapsed.campaign, problem.lines.frequency, table, tuple(CATALOGUE.values()), CATALOGUE
+    )
+    laws = [
+        law for law in grammar.laws if law.spoken.acts_on == "thickness" and law.name.endswith("__sensor__step__s23")
+    ]
+    (law,) = laws
+    assert isinstance(law, RecordingLaw)
+    problem.lines.mechanisms.add(law)
+    (found,) = problem.explain([Request((law.name,), kept=True)])
+    assert found is not None
+    leading = LeadingLaw.of(problem, found)
+    assert leading is not None
+    at, size, deviation = leading.largest()
+    assert law.axis.words[round(at)] == "s23"
+    assert size != 0
+    assert deviation > 0

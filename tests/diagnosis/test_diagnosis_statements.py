@@ -101,16 +101,11 @@ def test_an_axis_with_a_trace_of_the_misfit_is_no_cause_to_look_for() -> None:
 def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:
     """Each sphere on a day of its own: what differs between the spheres may have come with the day."""
     plain = campaign(Made(sensors=4), table)
-    on_days = [
-        replace(
-            entry,
-            recorded_at=f"2020-01-{int(entry.indenter_radius_mm):02d}T10:{number:02d}:00Z",
-            load_cycles=None,
-            dwell_s=None,
-        )
-        for number, entry in enumerate(plain.recordings)
-        if isinstance(entry, FrfRecording)
-    ]
+    on_days = []
+    for number, entry in enumerate(plain.recordings):
+        assert isinstance(entry, FrfRecording)
+        time = f"2020-01-{int(entry.indenter_radius_mm):02d}T10:{number:02d}:00Z"
+        on_days.append(replace(entry, recorded_at=time, load_cycles=None, dwell_s=None))
     document = report(diagnose(replace(plain, recordings=tuple(on_days)), table))
     (entry,) = [one for one in document["location"]["axes"] if one["axis"] == "indenter_radius_mm"]
     assert entry["undecidable"] == "the time of recording determines it in this design"

@@ -217,11 +217,9 @@ def too_near(sensors: Sequence[str], radius_mm: float, pitch_mm: float, in_metre
 def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> str:
     """Lines where the force has little power."""
     of = "one recording" if recordings == 1 else f"{recordings} recordings"
-    text = (
-        f"{faint} of {measured} lines of {of} are left out: the force has little power there, and the charge does not"
-    )
-    shared = f"; so are {beside} whose noise the next line shares" if beside else ""
-    return f"{text} follow it{shared}"
+    beyond = f"; so are {beside} whose noise the next line shares" if beside else ""
+    why = "the force has little power there, and the charge does not follow it"
+    return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
 
 
 def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: float) -> str:
