@@ -79,8 +79,7 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Request:
-    """A set of mechanisms to explain, from the explanation of a set with one mechanism less, where one is given, and of
-    that mechanism `alone`."""
+    """A set of mechanisms to explain; `parent`: the explanation of a set with one less, `alone` that of the other."""
 
     names: tuple[str, ...]
     parent: Explanation | None = None
@@ -95,8 +94,7 @@ class Request:
         return self.parent is None or self.parent.placed < _DECIDED
 
     def target(self, placed: bool) -> float:
-        """The cost below which a fit with or without positioning scatter is better than the parent's, where that can be
-        compared; else ∞."""
+        """The cost below which a fit is better than the parent's of like scatter; ∞ where that cannot be compared."""
         if self.parent is None or self.kept or (self.parent.placed > 0.5) is not placed:
             return np.inf
         return self.parent.best.cost - _LEAST_GAIN
