@@ -112,7 +112,7 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit,
     assert page.evaluate(f"{pointed}.x.length") == 0
     for sensor in ("s4", "s9"):
         page.mouse.move(*place_of(page.locator("#figure-map"), sensor))
-        page.wait_for_function(f"{pointed}.customdata?.[0] === {sensor!r}")
+        page.wait_for_function(f"() => {pointed}.customdata?.[0] === {sensor!r}")
 
 
 def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_in_the_dark(

@@ -61,7 +61,7 @@ def test_the_saved_file_needs_nothing_else(reader: Visit, idle: Server, made: Ma
     asked_for: list[str] = []
     page.on("request", lambda request: asked_for.append(request.url))
     page.goto(file.as_uri())
-    page.wait_for_function("document.querySelectorAll('.main-svg').length >= 4")
+    page.wait_for_function("() => document.querySelectorAll('.main-svg').length >= 4")
     assert asked_for == [file.as_uri()]
     reader.wrong.clear()  # the file itself is not of the server
 
@@ -113,7 +113,7 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
         if key is not None:
             listed.focus()
             page.keyboard.press(key)
-            page.wait_for_function(f"{of_plot}[0] === {names[1].partition(':')[0]!r}")
+            page.wait_for_function(f"() => {of_plot}[0] === {names[1].partition(':')[0]!r}")
         seen.append(set(page.evaluate(of_plot)))
     assert seen == [{name.partition(":")[0]} for name in names]
     assert "the fitted contact point" in page.locator(".report").inner_text()
@@ -157,7 +157,7 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
             (on if key == "Next" else back).focus()
             page.keyboard.press("Enter")
         (first, *_) = [row for row in rows if row["recording"] == names[number]]
-        page.wait_for_function(f"Math.abs({of_plot} - {first['measured_pc_per_n']}) < 1e-9")
+        page.wait_for_function(f"() => Math.abs({of_plot} - {first['measured_pc_per_n']}) < 1e-9")
         assert listed.locator("option").nth(number).inner_text().startswith(f"{names[number]} ({first['sensor']}, ")
         assert listed.input_value() == str(number)
     listed.select_option(str(len(names) - 1))

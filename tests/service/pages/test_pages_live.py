@@ -25,7 +25,7 @@ def test_a_campaign_that_arrives_is_shown_without_a_reload(reader: Visit, idle: 
     page.get_by_label("Id of the other skin").fill("half ty")
     second = sent(idle, campaign("second", sensors=1, d33=11.0), "live")
     page.get_by_role("link", name="second", exact=True).wait_for(timeout=20_000)
-    page.wait_for_function("document.querySelectorAll('tbody tr').length === 2")
+    page.wait_for_function("() => document.querySelectorAll('tbody tr').length === 2")
     assert page.get_by_role("link", name="second", exact=True).get_attribute("href") == f"/campaigns/{second}"
     page.get_by_text("Renewed at").wait_for()
     assert page.get_by_label("Id of the other skin").input_value() == "half ty"

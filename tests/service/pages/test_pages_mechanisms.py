@@ -75,7 +75,7 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server,
     assert "the dynamic force" in twin.inner_text()
     for image in page.locator("img.picture").all():
         image.scroll_into_view_if_needed()
-    page.wait_for_function("[...document.images].every(one => one.complete && one.naturalWidth > 0)")
+    page.wait_for_function("() => [...document.images].every(one => one.complete && one.naturalWidth > 0)")
     assert page.locator("img.picture").count() == len(built_in())
     _require_accessible_at_both_widths(reader)
     page.get_by_role("row", name="ageing").get_by_role("link").press("Enter")  # the table leads to each by keyboard

@@ -132,7 +132,7 @@ def test_files_without_a_server_are_dark_too(
     for name, text in files.items():
         (downloads / name).write_text(text)
         dark.page.goto((downloads / name).as_uri())
-        dark.page.wait_for_function("document.querySelectorAll('.main-svg').length > 2")
+        dark.page.wait_for_function("() => document.querySelectorAll('.main-svg').length > 2")
         assert dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == f"rgb{GROUND}"
         require_dark(dark.page)
         dark.page.emulate_media(media="print")

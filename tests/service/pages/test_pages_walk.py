@@ -142,7 +142,7 @@ def test_who_chose_is_where_he_was(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_label("Colour by").select_option("trend")
     page.wait_for_url("**show=trend*")
-    page.wait_for_function("document.activeElement.id === 'show'")
+    page.wait_for_function("() => document.activeElement.id === 'show'")
 
 
 def test_the_numbers_of_the_map_hold_what_colours_it(newcomer: Visit) -> None:
