@@ -48,12 +48,17 @@ def http(shared_server: Server) -> Iterator[httpx.Client]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark each test with what it needs, and `unit` where that is nothing but a second of this process."""
+    """Mark each test with what it needs, and `unit` where that is nothing but a second of this process.
+
+    Files of quick tests come last, so that all processes of a run end together.
+    """
     for item in items:
         for marker in _needs(item):
             item.add_marker(marker)
         if _NO_UNIT.isdisjoint(marker.name for marker in item.iter_markers()):
             item.add_marker("unit")
+    slow = {item.path for item in items if item.get_closest_marker("unit") is None}
+    items.sort(key=lambda item: item.path not in slow)
 
 
 def _needs(item: pytest.Item) -> set[str]:

@@ -98,7 +98,11 @@ class AccessControl:
             raise
         if key is None and not is_open:
             browsing = is_browsing(path, headers.get(b"accept", b"").decode("latin-1"))
-            raise _login_first(method, path, query) if browsing else _key_first(authorization, self.keys_missing())
+            raise (
+                _login_first(method, path, query, headers)
+                if browsing
+                else _key_first(authorization, self.keys_missing())
+            )
         return key
 
     @contextmanager
@@ -139,10 +143,14 @@ def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
     return path in _UPLOADS and not headers.get(b"content-type", b"").startswith(b"application/json")
 
 
-def _login_first(method: str, path: str, query: bytes) -> Refusal:
-    asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
-    back = quote(asked) if method == "GET" else "/"
-    return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={back}"})
+def _login_first(method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Refusal:
+    """To the login, and back from it to what was asked for or, where a form was sent, to the page of the form."""
+    if method == "GET":
+        asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
+        return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(asked)}"})
+    form = "/" + headers.get(b"referer", b"").decode("latin-1").partition("//")[2].partition("/")[2]
+    lost = {"Location": f"/login?next={quote(form)}&unsent=1"}
+    return Refusal(303, "The session has ended: log in and send the form again.", headers=lost)
 
 
 def _key_first(authorization: bytes, missing: bool) -> Refusal:

@@ -9,6 +9,7 @@ from typing import Any
 import orjson
 
 from service.ingest import instruments
+from service.ingest.rig_words import said_of_file
 from service.ingest.uploads import Upload
 from service.middleware import long_json
 from service.middleware.unique_keys import require_unique_keys
@@ -17,7 +18,7 @@ from service.store import Database, skins
 from underskin.errors import ErrorCode, FileError, InvalidInput, Mention, Requirement
 from underskin.recordings import join
 from underskin.recordings.campaign import Campaign, from_dict
-from underskin.recordings.channels import Contents
+from underskin.recordings.channels import Contents, Document
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.readers import formats
 from underskin.recordings.reading import Reading, read_contents, understood
@@ -108,7 +109,7 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
             return InspectedFile(kind, None, _read_json(upload, most_json_bytes))
         held = read_contents(upload.path, label)
         contents = held if isinstance(held, Contents) else None
-        reading = understood(held, label, rig)
+        reading = _understood(held, label, rig, upload.said)
         _require_usable(reading.campaign)
         campaign = ReadCampaign(upload.label, reading, by_rig=rig is not None)
     except FileError as error:
@@ -118,6 +119,16 @@ def look(upload: Upload, rig: RigDescription | None, most_json_bytes: int) -> In
         campaign = ReadCampaign(upload.label, errors=[_invalid(error)])
     instrument = None if contents is None else instruments.recognised(kind, contents)
     return InspectedFile(kind, contents, [replace(campaign, instrument=instrument)])
+
+
+def _understood(
+    held: Contents | Document, label: str, rig: RigDescription | None, said: Mapping[str, Any] | None
+) -> Reading:
+    """A file by its rig description and what was said of it alone, which is then told."""
+    if rig is None or not said or not isinstance(held, Contents):
+        return understood(held, label, rig)
+    reading = understood(held, label, rig.with_recording(said))
+    return replace(reading, warnings=[said_of_file(said), *reading.warnings])
 
 
 def checked(read: ReadCampaign) -> CheckedCampaign:

@@ -21,6 +21,11 @@ def said_of(rig: RigDescription) -> list[str]:
     return [*_instrument(rig.document), *channels, *recordings, *_curve(rig), *checked]
 
 
+def said_of_file(fields: Mapping[str, Any]) -> str:
+    """`said of this file alone: sensor that was pressed s0; preload F 1 N`."""
+    return f"said of this file alone: {'; '.join(_values(fields))}"
+
+
 def typed_of(rig: RigDescription) -> list[str]:
     """What was typed of all recordings alike, a value each, and is not read from each file."""
     return _values({field: value for field, value in rig.recording.items() if not isinstance(value, Property)})

@@ -8,11 +8,11 @@ import hashlib
 import math
 import shutil
 import tempfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from fastapi import Request
 from python_multipart import MultipartParser
@@ -34,13 +34,15 @@ _LONGEST_LABEL = 200
 
 @dataclass(frozen=True)
 class Upload:
-    """One file: where it was put, what the client calls it, which field it was if it was part of a form, its digest."""
+    """One file: where it was put, what the client calls it, which field it was if it was part of a form, its digest;
+    `said`: fields of its recordings, as a page's reader said them of this file alone."""
 
     path: Path
     label: str | None
     field: str | None
     sha256: str
     in_form: bool
+    said: Mapping[str, Any] | None = None
 
     def start(self, most: int) -> bytes:
         """Its first bytes."""

@@ -1,7 +1,7 @@
 """Skins: made by the first campaign that names them, joined where two names mean one skin."""
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, ScalarSelect, Select, func, insert, literal, or_, select, update
@@ -77,6 +77,20 @@ def joined_to(connection: Connection, root: str) -> Sequence[AnyRow]:
 
 def listed(connection: Connection, contains: str | None, after: str | None, limit: int) -> Sequence[AnyRow]:
     """Skins by id, without those joined to another, with how many campaigns each has."""
+    query = _with_campaigns()
+    if contains is not None:
+        query = query.where(called(contains))
+    if after is not None:
+        query = query.where(skins.c.id > after)
+    return connection.execute(query.limit(limit)).all()
+
+
+def of_ids(connection: Connection, ids: Collection[str]) -> Sequence[AnyRow]:
+    """Those of `listed` that have these ids."""
+    return connection.execute(_with_campaigns().where(skins.c.id.in_(ids))).all()
+
+
+def _with_campaigns() -> Select[Any]:
     member = skins.alias("member")
     counted = (
         select(func.count(campaigns.c.number))
@@ -85,12 +99,7 @@ def listed(connection: Connection, contains: str | None, after: str | None, limi
         .scalar_subquery()
     )
     query = select(skins, counted.label("campaigns")).where(skins.c.root_id == skins.c.id)
-    query = query.where(skins.c.discarded_at.is_(None))
-    if contains is not None:
-        query = query.where(called(contains))
-    if after is not None:
-        query = query.where(skins.c.id > after)
-    return connection.execute(query.order_by(skins.c.id).limit(limit)).all()
+    return query.where(skins.c.discarded_at.is_(None)).order_by(skins.c.id)
 
 
 def called(contains: str) -> ColumnElement[bool]:

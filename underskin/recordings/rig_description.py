@@ -96,6 +96,10 @@ class RigDescription:
     derived: Mapping[str, Formula] = dataclasses.field(default_factory=dict)
     trim: Trim | None = None
 
+    def with_recording(self, values: Mapping[str, Any]) -> "RigDescription":
+        """The same for a file of which some fields of the recordings are known; `document` stays as given."""
+        return dataclasses.replace(self, recording={**self.recording, **values})
+
 
 def parse(data: bytes, file: str) -> RigDescription:
     """The rig description in a YAML or JSON file.

@@ -5,9 +5,9 @@ from urllib.parse import quote
 from fastapi import APIRouter, Request, Response
 from sqlalchemy import Connection
 
-from service.dependencies import WRITE, Store, Table, sender
+from service.dependencies import WRITE, Store, Table
 from service.pages.campaign import page as campaign
-from service.pages.shared.forms import Form, attempted, see
+from service.pages.shared.forms import Form, attempted, see, signed
 from service.pages.skin import page as skin
 from service.store import changes, skins
 from service.usecases.campaigns import take_back
@@ -24,7 +24,7 @@ def undo(request: Request, change_id: str, sent: Form, store: Store, table: Tabl
         return change.campaign_id, skins.require_root(connection, change.skin_id)
 
     campaign_id, root = store.read(read)
-    refused = attempted("undo", sent, lambda: take_back(store, table, change_id, sender(request)))
+    refused = attempted("undo", sent, lambda: take_back(store, table, change_id, signed(request, sent)))
     if campaign_id is None:
         shown = skin.shown(request, root, store, table, refused=refused) if refused else None
         return shown or see(f"/skins/{quote(root, safe='')}")

@@ -1,7 +1,6 @@
 """Fleets: skins of one make are chosen, named and diagnosed together; what was diagnosed before."""
 
-from collections.abc import Mapping
-from types import MappingProxyType
+from collections.abc import Collection, Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -30,9 +29,11 @@ def fleets(
     store: Store,
     find: Annotated[str, Query(max_length=200)] = "",
     after: Annotated[str | None, Query(max_length=200)] = None,
+    chosen: Annotated[tuple[str, ...], Query(max_length=_ON_A_PAGE)] = (),
+    name: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """The skins to choose from, by id."""
-    return _choice(request, store, find, after)
+    """The skins to choose from, by id; what was chosen and typed before the list was searched stays."""
+    return _choice(request, store, find, after, chosen, name)
 
 
 @router.post("/diagnosis", dependencies=WRITE)
@@ -42,7 +43,8 @@ def ask(request: Request, sent: Form, runner: RunnerInUse, store: Store, table: 
     try:
         row = store.write(usecase.ask_of_fleet, table, sender(request), _asked(sent))
     except (UnderskinError, Conflict) as error:
-        return _choice(request, store, sent.get("find", ""), sent.get("after") or None, sent, error)
+        find, after = sent.get("find", ""), sent.get("after") or None
+        return _choice(request, store, find, after, _chosen(sent), sent.get("name", ""), error)
     runner.stir()
     return see(f"/diagnoses/{row.id}")
 
@@ -64,12 +66,16 @@ def _choice(
     store: Database,
     find: str,
     after: str | None,
-    sent: Mapping[str, str] = MappingProxyType({}),
+    chosen: Collection[str],
+    name: str,
     error: UnderskinError | Conflict | None = None,
 ) -> Response:
-    """The page with the skins to choose from, as they were chosen in the form that was `sent`."""
+    """The page with the skins to choose from: those that are chosen and not in this part of the list, then the list."""
     with store.reading() as connection:
         rows = skins.listed(connection, find or None, after, _ON_A_PAGE + 1)
+        following = rows[_ON_A_PAGE - 1].id if len(rows) > _ON_A_PAGE else None
+        rows = rows[:_ON_A_PAGE]
+        chosen_before = skins.of_ids(connection, set(chosen) - {row.id for row in rows})
         before = diagnoses.listed(connection, diagnoses.DiagnosisFilters(kind="fleet"), None, _LATEST)
         verdict_of = verdicts.of_rows(connection, before)
     example = {"skins": [row.id for row in rows[:FEWEST_SKINS]], "name": "the fleet"}
@@ -78,14 +84,15 @@ def _choice(
         request,
         "fleets.html",
         status=status,
-        rows=rows[:_ON_A_PAGE],
-        following=rows[_ON_A_PAGE - 1].id if len(rows) > _ON_A_PAGE else None,
+        rows=[*chosen_before, *rows],
+        listed=len(rows),
+        following=following,
         find=find,
         after=after or "",
         fewest=FEWEST_SKINS,
         box=_BOX,
-        chosen=set(_chosen(sent)),
-        name=sent.get("name", ""),
+        chosen=set(chosen),
+        name=name,
         error=in_form_words(error, _LABELS) if isinstance(error, UnderskinError) else error and str(error),
         diagnoses=list(verdict_of.values()),
         same=same_request.post(

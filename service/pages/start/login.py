@@ -18,12 +18,12 @@ router = APIRouter()
 
 
 @router.get("/login")
-def form(request: Request, back: Annotated[str, Query(alias="next")] = "/") -> Response:
-    """Asks for a key, where one is needed."""
+def form(request: Request, back: Annotated[str, Query(alias="next")] = "/", unsent: bool = False) -> Response:
+    """Asks for a key, where one is needed; `unsent`: a form came without a session, and was not taken."""
     access: AccessControl = request.app.state.access
     if not access.keys_needed():
         return see("/")
-    return page(request, "login.html", back=back, refused=False, missing=access.keys_missing())
+    return page(request, "login.html", back=back, unsent=unsent, refused=False, missing=access.keys_missing())
 
 
 @router.post("/login")
@@ -42,7 +42,8 @@ def login(request: Request, sent: Form) -> Response:
     if key is None:
         throttle.failed(address)
         request.scope["why"] = "the key that was typed is not known"
-        return page(request, "login.html", status=401, back=back, refused=True, missing=access.keys_missing())
+        missing = access.keys_missing()
+        return page(request, "login.html", status=401, back=back, unsent=False, refused=True, missing=missing)
     answer = see(_own(back))
     set_session(request, answer, access.sessions.begin(key, address, request.headers.get("user-agent", "")))
     return answer

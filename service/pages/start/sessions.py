@@ -1,5 +1,7 @@
 """The sessions of one's own key: where somebody is logged in with it, and the way to end each."""
 
+import re
+
 from fastapi import APIRouter, Request, Response
 
 from service.auth import session
@@ -11,13 +13,26 @@ from service.pages.shared.html import page
 router = APIRouter(prefix="/sessions")
 
 
+# As browsers name themselves: each also as those that it wants to be taken for, which come later here.
+_BROWSERS = {"Edg": "Edge", "OPR": "Opera", "Firefox": "Firefox", "Chrome": "Chrome", "Version": "Safari"}
+_SYSTEMS = {
+    "Android": "Android",
+    "iPhone": "iOS",
+    "iPad": "iOS",
+    "Windows": "Windows",
+    "Mac OS": "macOS",
+    "Linux": "Linux",
+}
+
+
 @router.get("")
 def sessions(request: Request) -> Response:
     """Those that go on, the latest first."""
     key: Key | None = request.scope["key"]
     access: AccessControl = request.app.state.access
     this = session.id_of(session.cookie_in(dict(request.scope["headers"])))
-    return page(request, "sessions.html", sessions=[] if key is None else access.sessions.listed(key), this=this)
+    listed = [] if key is None else access.sessions.listed(key)
+    return page(request, "sessions.html", sessions=listed, this=this, browser_name=browser_name)
 
 
 @router.post("/{session_id}/end", dependencies=[OWN_FORM])
@@ -28,3 +43,14 @@ def end(session_id: str, request: Request) -> Response:
         access: AccessControl = request.app.state.access
         access.sessions.end(session_id, key)
     return see("/sessions")
+
+
+def browser_name(user_agent: str) -> str:
+    """Name and system of a browser by its header User-Agent ("Firefox 140 on Linux"); the header where it is of none
+    that is known."""
+    for token, name in _BROWSERS.items():
+        version = re.search(rf"\b{token}/(\d+)", user_agent)
+        if version:
+            system = next((system for part, system in _SYSTEMS.items() if part in user_agent), None)
+            return f"{name} {version[1]}" + (f" on {system}" if system else "")
+    return user_agent

@@ -49,6 +49,16 @@ for (const help of [show_times, submit_choices]) {
   addEventListener("renewed", (event) => help(event.target));
 }
 
+// A search keeps what is ticked and typed in the form whose list it searches.
+for (const search of document.querySelectorAll("[data-with]")) {
+  search.addEventListener("formdata", ({ formData }) => {
+    const form = document.getElementById(search.dataset.with);
+    for (const box of form?.querySelectorAll(":checked") ?? []) formData.append("chosen", box.value);
+    const name = form?.elements.name?.value;
+    if (name) formData.append("name", name);
+  });
+}
+
 for (const button of document.querySelectorAll("[data-copy]")) {
   button.addEventListener("click", async () => {
     const text = button.closest(".code").querySelector("code").textContent;

@@ -23,6 +23,7 @@ from service.pages.upload import (
     file_summary,
     recorded_time,
     similar_errors,
+    single_files,
     spring_mapping,
     templates,
     workbench,
@@ -173,6 +174,7 @@ def understood(
         spring=spring_mapping,
         carried_over=[] if pending.remembered is None or pending.rig is None else rig_words.typed_of(pending.rig),
         workbench=workbench,
+        single_files=single_files,
         recorded_time=recorded_time,
         in_formulas=workbench.in_formulas(document, channels),
         wrong_formulas=workbench.errors_of(pending.refused, pending.seen[file]),
@@ -195,12 +197,17 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     said, wrong = mappings.document_of(sent, base)
     guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
     pending.draft = workbench.with_guesses(said, base, guess)
+    of_files = single_files.typed(sent, pending.files)
+    values, mistimed = single_files.values_of(of_files, pending.files)
+    wrong += mistimed
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:
         wrong.append(error)
     pending.refused = [entry for error in wrong for entry in field_errors(error)]
+    pending.of_files = of_files
     if not wrong:
+        pending.say_of_files(of_files, values)
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
         pending.remembered = pending.lacking = None
         pending.turned &= not pending.is_depth_composed

@@ -9,7 +9,7 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,7 @@ class PendingUpload:
     remembered: Remembered | None = None  # where `rig` comes from, unless it was sent or said in the form
     lacking: Remembered | None = None  # what was remembered for the skin, and needs channels that these files lack
     draft: dict[str, Any] | None = None  # the rig description as the form had it, usable or not
+    of_files: Mapping[int, Mapping[str, str]] = field(default_factory=dict)  # what was typed of single files
     refused: list[dict[str, Any]] = field(
         default_factory=list
     )  # what is wrong with the form, or kept it from being kept
@@ -90,6 +91,12 @@ class PendingUpload:
         """Forget what was said of channels, here or of earlier files."""
         self.rig = self.rig_label = self.draft = self.remembered = None
         self.turned, self.refused = False, []
+        self.say_of_files({}, {})
+
+    def say_of_files(self, typed: Mapping[int, Mapping[str, str]], values: Mapping[int, Mapping[str, Any]]) -> None:
+        """Read single files by the fields of their recordings that were `typed`, which are these `values`."""
+        self.of_files = typed
+        self.files = [replace(one, said=values.get(number)) for number, one in enumerate(self.files)]
 
     def draw(self, number: int, figures: list[Drawn]) -> None:
         """Keep the figures of a file."""

@@ -77,6 +77,24 @@ def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -
     assert "in use" in page.get_by_role("row", name="s0-1N").inner_text()
 
 
+def test_who_undoes_is_asked_without_keys(reader: Visit, idle: Server) -> None:
+    page = reader.page
+    kept = idle.http.post("/v1/campaigns?skin=hasty", json=campaign("hasty")).raise_for_status().json()
+    place = f"/campaigns/{kept['id']}"
+    idle.http.post(f"/v1{place}/exclusions", json={"recording": "s0-1N", "reason": "cable"}).raise_for_status()
+    reader.go(place)
+    page.get_by_text("What was changed here: 1").click()
+    changes = page.locator(".changes")
+    name = changes.get_by_label("Your name")
+    name.fill("Mara")
+    name.press("Enter")  # undoes nothing
+    assert name.input_value() == "Mara"
+    changes.get_by_role("button", name="Undo").click()
+    page.get_by_text("What was changed here: 2").click()
+    expect(changes.get_by_text("by Mara")).to_be_visible()
+    assert idle.http.get(f"/v1{place}").json()["excluded"] == 0
+
+
 def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(idle: Server) -> None:
     kept = idle.http.post("/v1/campaigns?skin=bare", json=campaign("bare", sensors=1)).json()
     place = f"/campaigns/{kept['id']}"

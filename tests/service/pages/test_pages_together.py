@@ -110,6 +110,32 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
     context.close()
 
 
+def test_what_is_chosen_stays_while_the_list_is_searched(reader: Visit, idle: Server) -> None:
+    for name in ("ring", "disc", "plate"):
+        sent_to(idle, f"make-a-{name}", name)
+    page = reader.page
+    reader.go("/fleets?find=make-a-ring")
+    page.get_by_label("make-a-ring").check()
+    page.get_by_label("Name").fill("make a")
+    for name, there in (("disc", ["ring", "disc"]), ("plate", ["disc", "ring", "plate"]), ("nothing", None)):
+        page.get_by_label("Find a skin").fill(f"make-a-{name}")
+        page.get_by_label("Find a skin").press("Enter")
+        page.wait_for_url(f"**/fleets?find=make-a-{name}&**")
+        if there is None:
+            page.get_by_text("No skin is called so").wait_for()
+            break
+        shown = page.get_by_role("checkbox")
+        assert [shown.nth(k).get_attribute("value") for k in range(shown.count())] == [f"make-a-{one}" for one in there]
+        page.get_by_label(f"make-a-{name}").check()
+    assert page.get_by_role("checkbox", checked=True).count() == 3
+    reader.require_accessible()
+    assert page.get_by_label("Name").input_value() == "make a"
+    page.get_by_label("Name").press("Enter")
+    page.wait_for_url("**/diagnoses/*")
+    for name in ("ring", "disc", "plate"):
+        assert page.get_by_role("link", name=f"make-a-{name}").count() == 1
+
+
 def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
     sent_to(idle, "fleet-9", "nine")
     idle.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()

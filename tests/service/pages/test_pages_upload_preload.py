@@ -48,8 +48,28 @@ def test_a_typed_preload_is_held_against_the_force_of_each_file(visitor: Visit) 
     page.get_by_role("link", name="two.tdms").click()
     expect(page.get_by_role("region", name="Recordings")).to_contain_text("1 N (its force: 2.00 N), sphere radius 4 mm")
     visitor.require_accessible()
+
+    page.get_by_text("What the channels are").click()
+    page.get_by_text("What differs from file to file").click()
+    region = page.get_by_role("region", name="What differs from file to file")
+    region.get_by_label("preload F of two.tdms").fill("2,0")
+    region.get_by_label("date and time of recording of one.tdms").fill("some day")
+    read_it(page)
+    expect(page.get_by_role("alert")).to_contain_text("one.tdms: date and time of recording")
+    assert region.get_by_label("preload F of two.tdms").input_value() == "2,0"
+    region.get_by_label("date and time of recording of one.tdms").fill("2026-05-03")
+    read_it(page)
+    expect(page.get_by_role("status").first).to_contain_text("4 recordings understood")
+    expect(told).to_have_count(0)
+    visitor.require_accessible()
+    page.get_by_label("one campaign, called").check()
     page.get_by_role("button", name="Keep 4 recordings").click()
     page.wait_for_url("**/campaigns/*")
+    page.get_by_text("How its files were read").click()
+    expect(page.get_by_text("two.tdms: said of this file alone: preload F 2 N")).to_be_visible()
+    kept = visitor.page.request.get(f"{visitor.address}/v1{page.url.removeprefix(visitor.address)}/document").json()
+    assert [one["preload_n"] for one in kept["recordings"]] == [1, 2, 1, 1]
+    assert [str(one.get("recorded_at"))[:10] for one in kept["recordings"]].count("2026-05-03") == 1
 
     page.set_viewport_size({"width": 390, "height": 844})
     look_at(visitor, [file("later.tdms", shaken(2.0))], skin="pressed")

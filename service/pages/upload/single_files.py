@@ -1,0 +1,44 @@
+"""What is said of single files of an upload: their sensor, preload or time, where those differ from file to file."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from service.ingest.field_words import RECORDING
+from service.ingest.uploads import Upload
+from service.pages.shared.forms import number_or_text
+from service.pages.upload import recorded_time
+from underskin.errors import InvalidInput
+
+MOST = 100  # files that the form has a row for
+_DIFFERING = (
+    *("sensor", "indenter_radius_mm", "preload_n", "sample_height_mm", "sample_diameter_mm"),
+    recorded_time.FIELD,
+)
+FIELDS = tuple(entry for entry in RECORDING if entry[0] in _DIFFERING)
+_TEXTS = ("sensor", recorded_time.FIELD)
+
+Typed = Mapping[int, Mapping[str, str]]  # by the number of the file, by field, as it was typed
+
+
+def typed(form: Mapping[str, str], files: Sequence[Upload]) -> dict[int, dict[str, str]]:
+    """What a form says of each file, of the fields that its kind of recording has."""
+    names = [name for name, _, _, kinds in FIELDS if form.get("kind", "frf") in kinds]
+    rows = {
+        number: {name: text for name in names if (text := form.get(f"file-{number}-{name}", "").strip())}
+        for number in range(min(len(files), MOST))
+    }
+    return {number: row for number, row in rows.items() if row}
+
+
+def values_of(rows: Typed, files: Sequence[Upload]) -> tuple[dict[int, dict[str, Any]], list[InvalidInput]]:
+    """The same as fields of recordings, and the times that are none, each with the name of its file."""
+    values: dict[int, dict[str, Any]] = {}
+    wrong: list[InvalidInput] = []
+    for number, row in rows.items():
+        values[number] = {name: text if name in _TEXTS else number_or_text(text) for name, text in row.items()}
+        try:
+            values[number] |= {name: recorded_time.said(row[name]) for name in row.keys() & {recorded_time.FIELD}}
+        except InvalidInput as error:
+            words = next(words for name, words, *_ in FIELDS if name == recorded_time.FIELD)
+            wrong.append(error.at(f"{files[number].label}: {words}"))
+    return values, wrong
