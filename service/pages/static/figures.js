@@ -73,12 +73,14 @@ function point_at(id) {
 
 // Where a figure is narrow its legend has a line an entry, of a long name several, which panels one above the other
 // have no room for, and which may be as wide as the figure. Returns how many lines.
-const NARROW = 500, LEGEND_LINE = 19, LONGEST_LINE = 34, RIGHT = 20;
+const NARROW = 500, LEGEND_LINE = 19, LONGEST_LINE = 30, RIGHT = 20;
 function in_legend(data, layout, margin) {
   if (!layout.yaxis2 || layout.yaxis2.matches || layout.showlegend === false) return 0;
   margin.r = Math.min(margin.r ?? RIGHT, RIGHT);
   const entries = data.filter((trace) => trace.showlegend !== false && trace.visible !== false);
   for (const trace of entries) trace.name = in_lines(trace.name ?? "");
+  const titles = Object.entries(layout).flatMap(([name, axis]) => (name.startsWith("xaxis") ? [axis.title ?? {}] : []));
+  for (const title of titles) title.text = in_lines(title.text ?? "");
   return entries.flatMap((trace) => trace.name.split("<br>")).length;
 }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from playwright.sync_api import Locator
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.finished import Made, keep, made_of
@@ -96,6 +97,15 @@ def test_a_figure_s_numbers_are_those_of_the_report(idle: Server, made: Made) ->
     assert idle.http.get(f"{place}/nothing.csv").status_code == 404
 
 
+def require_whole(figure: Locator, width: int) -> None:
+    """All of a figure's panels are seen in a window so wide, without moving it sideways."""
+    panel = figure.locator(".plot").evaluate(
+        "plot => plot.getBoundingClientRect().left + plot._fullLayout.xaxis._offset + plot._fullLayout.xaxis._length"
+    )
+    assert panel <= width
+    assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
+
+
 def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) -> None:
     figure = adhesive_figure()
     whole = Made(made.report, {**made.figures, "curve": figure.to_json()})
@@ -122,6 +132,10 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
     (trace,) = [one for one in figure.data if (one.meta["recording"], one.meta["shows"]) == ("c01", "pull-off")]
     assert float(mark["depth_mm"]) == pytest.approx(float(trace.x[0]) * trace.meta["mm"], rel=1e-5)
     assert float(mark["force_n"]) == pytest.approx(float(trace.y[0]) * trace.meta["n"], rel=1e-5)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.reload()
+    reader.drawn(5)
+    require_whole(page.locator("#figure-curve"), 390)
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
@@ -137,11 +151,7 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     figure = page.locator("#figure-frf")
     assert "95 % of the noise" in figure.inner_text()
-    panel = figure.locator(".plot").evaluate(
-        "plot => plot.getBoundingClientRect().left + plot._fullLayout.xaxis._offset + plot._fullLayout.xaxis._length"
-    )
-    assert panel <= width  # all frequencies, without moving the figure sideways
-    assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
+    require_whole(figure, width)
     rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
     names = list(dict.fromkeys(row["recording"] for row in rows))
     assert len(names) == 12
