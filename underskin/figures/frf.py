@@ -119,12 +119,13 @@ def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:
 
 
 def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, dict[str, Any]]:
-    """Colour by preload, from dark to bright, and the whole look: with marks by indenter, if there are several."""
+    """Colour by preload, from dark to bright, and the whole look: with marks by indenter, but for the smallest."""
     preloads = sorted({entry.preload_n for entry in spreads})
     radii = sorted({entry.indenter_radius_mm for entry in spreads})
     place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
     colour = sample_colorscale("Viridis", [place])[0]
-    marks = marked(radii.index(spread.indenter_radius_mm)) if len(radii) > 1 else {"mode": "lines"}
+    number = radii.index(spread.indenter_radius_mm)
+    marks = marked(number - 1) if number else {"mode": "lines"}
     return colour, {"line": {"color": colour, "width": 1.5}, **marks}
 
 
