@@ -59,7 +59,7 @@ time is what the server itself spent within one of these requests: it does not d
     "store": "Over HTTP, server and client on one machine; 1,000,000 recordings with UNDERSKIN_SOAK=1, else 50,000.",
     "pages": """With 1,000 campaigns of 25 skins kept, and one of 656 recordings of 400 lines. Times of the
 server, over HTTP on one machine, the median of nine after the first; weight as sent, without plotly's script. The
-main thread is Chromium's, from the start of the page on, with plotly's script in its cache.""",
+main thread is Chromium's, from the start of the page on, with plotly's script in its cache, the median of nine.""",
     "diagnosis": "Campaigns of the virtual rig; each diagnosis in a fresh process with one BLAS thread.",
     AGAINST: """Processor time on one core, in turns, medians over the rounds and the campaigns: those of the folder
 that `UNDERSKIN_CAMPAIGNS` names, and those of `bench diagnosis`. Laws that nobody listed may take half as long

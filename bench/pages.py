@@ -119,7 +119,9 @@ def _stands_still(address: str, campaign_id: str) -> float:
         page.goto(f"{address}/campaigns/{campaign_id}")
         for plot in page.locator(".plot").all():
             plot.scroll_into_view_if_needed()
-        page.wait_for_function("() => [...document.querySelectorAll('.plot')].every(plot => plot.querySelector('.main-svg'))")
+        page.wait_for_function(
+            "() => [...document.querySelectorAll('.plot')].every(plot => plot.querySelector('.main-svg'))"
+        )
         page.wait_for_timeout(1000)
         longest = page.evaluate("Math.max(0, ...(window.stood || []))")
         browser.close()
