@@ -31,7 +31,7 @@ from underskin.units import LAB
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
 UNLIKELY = "or tick “These values are right, unusual as they are”"
-_LARGEST_BYTES = 200_000
+_LARGEST_BYTES = 100_000
 _LONGEST_NAME = 100  # characters
 _MOST_FIELDS = 1500  # a file of many channels has a row of fields for each, and so has an upload of many files
 _WITH_UNIT = re.compile(r"(\S*\d)\s*[^\W\d_].*")
