@@ -10,13 +10,14 @@ import pytest
 
 from tests.support.cases import first
 from tests.support.kinds_campaigns import of_block
+from tests.support.lean_reports import lean_fleet
 from tests.support.skins import HEAVY_TIP, made
 from underskin.diagnosis.inference.knowledge import Knowledge
 from underskin.diagnosis.reporting import numbers
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.diagnosis.several.bench import benches
 from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.fleet import declared_wrongly, diagnose_fleet
+from underskin.diagnosis.several.fleet import declared_wrongly
 from underskin.diagnosis.several.population import Make, Spread, State, populations
 from underskin.diagnosis.several.skin import D33, ERRORS, FAR
 from underskin.mechanisms.parameter import Normal
@@ -53,7 +54,7 @@ def sisters(count: int) -> dict[str, list[Campaign]]:
 
 @pytest.mark.slow
 def test_of_three_skins_the_one_with_another_d33_is_named_and_tells_nothing_of_the_others(table: SigmaTable) -> None:
-    fleet = diagnose_fleet(sisters(2) | {"weak": [made("weak", seed=40, d33=9.0)]}, table, "batch")
+    fleet = lean_fleet(sisters(2) | {"weak": [made("weak", seed=40, d33=9.0)]}, table, "batch")
     d33 = population(fleet, "d33")
     assert departures(fleet) == {"weak"}
     assert likeliest(fleet, "weak") == "d33"
@@ -69,7 +70,7 @@ def test_of_many_skins_two_that_depart_are_named(table: SigmaTable) -> None:
     others = {f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=14 + 0.2 * n)] for n in first(1, (4, 3))}
     skins = sisters(3) | others
     skins |= {"weak": [made("weak", seed=40, d33=9.0)], "strong": [made("strong", seed=41, d33=20.0)]}
-    fleet = diagnose_fleet(skins, table, "batch")
+    fleet = lean_fleet(skins, table, "batch")
     assert departures(fleet) == {"weak", "strong"}
     assert population(fleet, "d33")["mean"] == pytest.approx(14.2 if len(others) == 1 else 14.28, rel=0.03)
 
@@ -77,7 +78,7 @@ def test_of_many_skins_two_that_depart_are_named(table: SigmaTable) -> None:
 @pytest.mark.slow
 def test_a_skin_of_another_modulus_departs_in_that_while_its_d33_stays(table: SigmaTable) -> None:
     """What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope."""
-    fleet = diagnose_fleet(sisters(3) | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
+    fleet = lean_fleet(sisters(3) | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
     assert departures(fleet) == {"soft"}
     assert likeliest(fleet, "soft") == "youngs_modulus"
     (entry,) = fleet["mechanisms"]
@@ -90,7 +91,7 @@ def test_a_skin_of_another_modulus_departs_in_that_while_its_d33_stays(table: Si
 @pytest.mark.slow
 def test_a_skin_of_another_thickness_departs_in_that(table: SigmaTable) -> None:
     thin = made("thin", seed=40, effects={"thickness_error": {"factor": 0.8}})
-    fleet = diagnose_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
+    fleet = lean_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
     assert departures(fleet) == {"thin"}
     assert likeliest(fleet, "thin") == "thickness"
     (entry,) = fleet["mechanisms"]
@@ -101,7 +102,7 @@ def test_a_skin_of_another_thickness_departs_in_that(table: SigmaTable) -> None:
 
 @pytest.mark.slow
 def test_a_skin_that_is_rightly_declared_to_be_thinner_does_not_depart(table: SigmaTable) -> None:
-    fleet = diagnose_fleet(sisters(3) | {"thin": [made("thin", seed=40, thickness=2.0)]}, table, "batch")
+    fleet = lean_fleet(sisters(3) | {"thin": [made("thin", seed=40, thickness=2.0)]}, table, "batch")
     assert departures(fleet) == set()
     assert (fleet["verdict"], fleet["mechanisms"]) == ("no_mismatch", [])
     thickness = {one["skin"]: one["value"] for one in population(fleet, "thickness")["skins"]}
@@ -112,7 +113,7 @@ def test_a_skin_that_is_rightly_declared_to_be_thinner_does_not_depart(table: Si
 @pytest.mark.slow
 def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike(table: SigmaTable) -> None:
     thin = made("thin", seed=40, thickness=2.0, effects={"thickness_error": {"factor": 0.8}})
-    fleet = diagnose_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
+    fleet = lean_fleet(sisters(3) | {"thin": [thin]}, table, "batch")
     assert (departures(fleet), likeliest(fleet, "thin")) == ({"thin"}, "thickness")
     assert re.search(r"where the others have (1\.9\d*|2(\.0\d*)?) for the same declared", fleet["statement"])
 
@@ -120,7 +121,7 @@ def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike
 @pytest.mark.slow
 def test_where_it_is_open_in_what_a_skin_departs_the_verdict_is_ambiguous(table: SigmaTable) -> None:
     """Its headline is no surer than the departure that it states."""
-    fleet = diagnose_fleet(sisters(3) | {"weak": [made("weak", seed=41, d33=12.5)]}, table, "batch")
+    fleet = lean_fleet(sisters(3) | {"weak": [made("weak", seed=41, d33=12.5)]}, table, "batch")
     assert departures(fleet) == {"weak"}
     likely = likeliest(fleet, "weak")
     share = next(one["probability"] for one in population(fleet, likely)["departures"] if one["skin"] == "weak")
@@ -132,7 +133,7 @@ def test_where_it_is_open_in_what_a_skin_departs_the_verdict_is_ambiguous(table:
 @pytest.mark.slow
 def test_where_the_modulus_is_declared_wrongly_for_all_none_departs(table: SigmaTable) -> None:
     skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, modulus=32.0)] for n in range(3)}
-    fleet = diagnose_fleet(skins, table, "batch")
+    fleet = lean_fleet(skins, table, "batch")
     assert departures(fleet) == set()
     (entry,) = fleet["mechanisms"]
     assert (entry["name"], entry["scope"]) == ("modulus_error", {"skins": list(skins)})
@@ -144,7 +145,7 @@ def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(ta
     """E is 9 where 16 is declared, which FRFs of three skins do not tell."""
     skins = {f"s{number}": [made(f"c{number}", seed=10 + number, modulus=9.0)] for number in range(3)}
     skins["s0"].append(of_block(9.0))
-    report = diagnose_fleet(skins, table, "palms")
+    report = lean_fleet(skins, table, "palms")
     assert [entry["name"] for entry in report["mechanisms"]] == ["modulus_error"]
     assert report["campaigns"] == ["c0", "block", "c1", "c2"]
     moduli = population(report, "youngs_modulus")
@@ -156,7 +157,7 @@ def test_a_block_that_contradicts_its_skin_is_told_of_the_fleet(table: SigmaTabl
     skins = sisters(3)
     one = next(iter(skins))
     skins[one] = [*skins[one], of_block(48.0)]
-    report = diagnose_fleet(skins, table, "palms")
+    report = lean_fleet(skins, table, "palms")
     (contradiction,) = report["contradictions"]
     assert contradiction["statement"].startswith(f"{one}: The FRFs and the block contradict each other")
     assert f"n {one}: The FRFs and the block contradict each other" in report["statement"]
@@ -173,9 +174,9 @@ def test_which_campaign_counts_as_the_latest_is_told_where_one_has_no_date(table
     )
     told = "not every campaign has a date, so they count in the order in which they were given"
     later = made("later", "2018-05-03T09:00:00Z", seed=31)
-    dated = diagnose_fleet(skins | {"skin-1": [*skins["skin-1"], later], "skin-2": [undated]}, table, "batch")
+    dated = lean_fleet(skins | {"skin-1": [*skins["skin-1"], later], "skin-2": [undated]}, table, "batch")
     assert told not in dated["statement"]
-    open_order = diagnose_fleet(skins | {"skin-1": [*skins["skin-1"], undated]}, table, "batch")
+    open_order = lean_fleet(skins | {"skin-1": [*skins["skin-1"], undated]}, table, "batch")
     assert (
         f"skin-1, the last that can be used speaks: {told}: campaign c1 (2017-05-03), campaign undated (no date)"
         in (open_order["statement"])
@@ -208,7 +209,7 @@ def test_where_skins_differ_as_those_of_one_make_none_departs(table: SigmaTable)
         f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=d33, modulus=modulus)]
         for n, (d33, modulus) in enumerate(first(3, [(13.6, 15.5), (14.2, 16.6), (14.5, 15.8), (14.0, 16.0)]))
     }
-    fleet = diagnose_fleet(skins, table, "batch")
+    fleet = lean_fleet(skins, table, "batch")
     assert departures(fleet) == set()
     assert (fleet["verdict"], fleet["mechanisms"]) == ("no_mismatch", [])
     assert "None is seen to depart" in fleet["statement"]
@@ -225,7 +226,7 @@ def test_a_skin_of_two_recordings_borrows_strength_from_its_sisters(
     for seed in first(3, range(6)):
         whole = made("few", seed=60 + seed)
         few = replace(whole, recordings=whole.recordings[:2])
-        fleet = diagnose_fleet(three | {"few": [few]}, table, "batch")
+        fleet = lean_fleet(three | {"few": [few]}, table, "batch")
         own = next(one for one in population(fleet, "d33")["skins"] if one["skin"] == "few")
         held.append(own["low"] < 14.0 < own["high"])
         result = skins_diagnosed_once(few, table)
@@ -258,7 +259,7 @@ def test_a_skin_of_three_recordings_has_the_scatter_of_its_sisters(
 @pytest.mark.slow
 def test_strengths_of_a_mechanism_that_all_have_are_a_population(table: SigmaTable) -> None:
     skins = {f"skin-{n}": [made(f"c{n}", seed=20 + n, effects=HEAVY_TIP)] for n in range(3)}
-    fleet = diagnose_fleet(skins, table, "batch")
+    fleet = lean_fleet(skins, table, "batch")
     assert [(entry["name"], entry["scope"]) for entry in fleet["mechanisms"]] == [
         ("contact_resonance", {"skins": list(skins)})
     ]

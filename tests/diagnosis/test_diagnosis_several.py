@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from tests.support.cases import first
 from tests.support.kinds_campaigns import of_block
+from tests.support.lean_reports import lean_together
 from tests.support.skins import HEAVY_TIP, document, made
 from underskin.cli.app import app
 from underskin.diagnosis.reporting.html_report import page
@@ -45,7 +46,7 @@ def with_gain(campaign: Campaign, sensor: str, gain: float) -> Campaign:
 def appeared(table: SigmaTable) -> dict[str, Any]:
     """The report on a campaign with a heavy tip and an earlier one without it, given in that order."""
     before, after = made("may"), made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)
-    return diagnose_together([after, before], table, "both")
+    return lean_together([after, before], table, "both")
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +69,7 @@ def test_what_appeared_between_two_campaigns_is_named_with_its_date(appeared: di
 
 def test_what_acts_in_all_is_known_better_than_from_one(appeared: dict[str, Any], table: SigmaTable) -> None:
     each = [made("may", effects=HEAVY_TIP), made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)]
-    report = diagnose_together(each, table, "both")
+    report = lean_together(each, table, "both")
     assert scopes(report) == {"contact_resonance": {"campaigns": ["may", "september"]}}
     (mass, _) = report["mechanisms"][0]["parameters"]
     (alone, _) = appeared["mechanisms"][0]["parameters"]
@@ -80,7 +81,7 @@ def test_without_all_dates_no_date_is_given_and_the_order_is_told(table: SigmaTa
     """Of one campaign no time is known, so that nothing can be said to be there since a date."""
     before = made("may")
     undated = replace(before, recordings=tuple(replace(entry, recorded_at=None) for entry in before.recordings))
-    report = diagnose_together([undated, made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)], table, "both")
+    report = lean_together([undated, made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)], table, "both")
     assert scopes(report) == {"contact_resonance": {"campaigns": ["september"]}}
     assert "since" not in report["statement"]
     assert (
@@ -94,7 +95,7 @@ def test_a_d33_of_all_sensors_that_fell_is_a_change_of_level(table: SigmaTable) 
     fallen = made("september", SEPTEMBER, seed=8)
     for sensor in [entry.id for entry in fallen.skin.sensors]:
         fallen = with_gain(fallen, sensor, 0.75)
-    report = diagnose_together([made("may"), fallen], table, "both")
+    report = lean_together([made("may"), fallen], table, "both")
     assert scopes(report) == {"ageing": {"campaigns": ["september"], "since": "2017-09-12"}}
     (entry,) = report["mechanisms"]
     assert "a change of level that ageing or " in entry["statement"]
@@ -106,7 +107,7 @@ def test_a_d33_of_all_sensors_that_fell_is_a_change_of_level(table: SigmaTable) 
 
 def test_one_sensor_that_ages_is_no_physics_of_the_skin(table: SigmaTable) -> None:
     aged = with_gain(made("september", SEPTEMBER, seed=8), "s03", 0.75)
-    report = diagnose_together([made("may"), aged], table, "both")
+    report = lean_together([made("may"), aged], table, "both")
     assert report["verdict"] == "explained"
     assert scopes(report) == {"ageing": {"campaigns": ["september"], "since": "2017-09-12", "sensors": ["s03"]}}
     (change,) = report["mechanisms"][0]["parameters"]
@@ -120,18 +121,18 @@ def test_two_sensors_that_have_each_others_d33_since_a_date_are_exchanged_and_no
     """Presses at the sensors' centres: places tell nothing, the levels alone do."""
     before = with_gain(with_gain(made("may"), "s02", 1.3), "s05", 0.8)
     after = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 1.3), "s02", 0.8)
-    report = diagnose_together([before, after], table, "both")
+    report = lean_together([before, after], table, "both")
     assert "ageing" not in scopes(report)
     assert "Sensors s02 and s05 look exchanged since 2017-09-12" in report["statement"]
     (finding,) = [one for one in report["findings"] if "each have the d33" in one["statement"]]
     assert finding["code"] == "sensors_exchanged"
     apart = with_gain(with_gain(made("september", SEPTEMBER, seed=8), "s05", 0.8), "s02", 0.8)
-    report = diagnose_together([before, apart], table, "both")
+    report = lean_together([before, apart], table, "both")
     assert "exchanged" not in report["statement"]
 
 
 def test_where_nothing_changed_one_d33_serves(table: SigmaTable) -> None:
-    report = diagnose_together([made("may"), made("september", SEPTEMBER, seed=8)], table, "both")
+    report = lean_together([made("may"), made("september", SEPTEMBER, seed=8)], table, "both")
     assert (report["verdict"], report["mechanisms"]) == ("no_mismatch", [])
     assert report["probability"] > 0.9
 
@@ -219,7 +220,7 @@ def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_wi
 def test_a_block_that_was_joined_to_both_dates_counts_once(block_apart: dict[str, Any], table: SigmaTable) -> None:
     apart = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
     both = [replace(one, recordings=(*one.recordings, *of_block(9.0).recordings)) for one in apart]
-    report = diagnose_together(both, table, "both")
+    report = lean_together(both, table, "both")
     assert report["by_kind"] == block_apart["by_kind"]
     assert report["mechanisms"] == block_apart["mechanisms"]
 

@@ -8,11 +8,10 @@ import pytest
 
 from service.pages.diagnosis.figure_columns import columns
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import lean_fleet, lean_together
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.html_report import of_report, page
 from underskin.diagnosis.reporting.several_figures import sensors_over_campaigns
-from underskin.diagnosis.several.campaigns import diagnose_together
-from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -24,13 +23,13 @@ def made(name: str, d33: float, seed: int, table: SigmaTable) -> Campaign:
 
 @pytest.fixture(scope="module")
 def together(table: SigmaTable) -> dict[str, Any]:
-    return diagnose_together([made("<b>may", 15.0, 1, table), made("june", 12.0, 2, table)], table, "both")
+    return lean_together([made("<b>may", 15.0, 1, table), made("june", 12.0, 2, table)], table, "both")
 
 
 @pytest.fixture(scope="module")
 def fleet(table: SigmaTable) -> dict[str, Any]:
     skins = {f"skin-{n}": [made(f"c{n}", 15.0 + 0.2 * n, n, table)] for n in range(3)}
-    return diagnose_fleet({**skins, "<i>weak": [made("c9", 9.0, 9, table)]}, table, "batch")
+    return lean_fleet({**skins, "<i>weak": [made("c9", 9.0, 9, table)]}, table, "batch")
 
 
 def test_d33_of_each_sensor_is_drawn_over_the_campaigns_with_its_interval(together: dict[str, Any]) -> None:

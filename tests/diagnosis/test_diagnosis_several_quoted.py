@@ -5,12 +5,11 @@ from typing import Any
 
 import pytest
 
+from tests.support.lean_reports import lean_fleet, lean_together
 from tests.support.skins import made
 from underskin.diagnosis.reporting.html_report import page
 from underskin.diagnosis.reporting.stated_d33 import StatedD33
 from underskin.diagnosis.several import quoted
-from underskin.diagnosis.several.campaigns import diagnose_together
-from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -22,7 +21,7 @@ HIDDEN = StatedD33({**INTERVAL, "quotable": False}, hidden=[HiddenShift("thickne
 
 @pytest.fixture(scope="module")
 def together(table: SigmaTable) -> dict[str, Any]:
-    return diagnose_together([made("may"), made("september", "2017-09-12T09:00:00Z", seed=8)], table, "both")
+    return lean_together([made("may"), made("september", "2017-09-12T09:00:00Z", seed=8)], table, "both")
 
 
 def test_that_of_several_campaigns_is_of_the_last_alone(together: dict[str, Any]) -> None:
@@ -83,7 +82,7 @@ def test_a_skin_in_which_the_fleet_finds_more_than_its_own_diagnosis_is_not_quot
 def test_of_a_skin_of_two_recordings_alone_no_d33_is_quoted(table: SigmaTable) -> None:
     skins = {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(3)}
     whole = made("few", seed=60)
-    fleet = diagnose_fleet(skins | {"few": [replace(whole, recordings=whole.recordings[:2])]}, table, "batch")
+    fleet = lean_fleet(skins | {"few": [replace(whole, recordings=whole.recordings[:2])]}, table, "batch")
     assert "not of few (its recordings say too little)" in fleet["statement"]
 
 
@@ -91,7 +90,7 @@ def test_of_a_skin_of_two_recordings_alone_no_d33_is_quoted(table: SigmaTable) -
 @pytest.mark.usefixtures("skins_diagnosed_once")
 def test_the_statement_of_a_fleet_ends_with_it_and_names_quantities_in_words(table: SigmaTable) -> None:
     skins = {f"skin-{number}": [made(f"c{number}", seed=20 + number)] for number in range(3)}
-    fleet = diagnose_fleet(skins | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
+    fleet = lean_fleet(skins | {"soft": [made("soft", seed=40, modulus=6.0)]}, table, "batch")
     assert "One departs, soft, in Young's modulus: " in fleet["statement"]
     assert "youngs modulus" not in fleet["statement"]
     assert fleet["statement"].split(". ")[-1].startswith("d33 is not to be quoted, because ")
