@@ -220,7 +220,7 @@ def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_wi
 def test_a_block_that_was_joined_to_both_dates_counts_once(block_apart: dict[str, Any], table: SigmaTable) -> None:
     apart = [made("may", modulus=9.0), made("september", SEPTEMBER, seed=8, modulus=9.0)]
     both = [replace(one, recordings=(*one.recordings, *of_block(9.0).recordings)) for one in apart]
-    report = lean_together(both, table, "both")
+    report = diagnose_together(both, table, "both")
     assert report["by_kind"] == block_apart["by_kind"]
     assert report["mechanisms"] == block_apart["mechanisms"]
 
