@@ -10,11 +10,10 @@ import numpy as np
 import orjson
 
 from service.store import database, diagnoses
+from tests.support.lean_reports import lean_fleet, lean_together
 from tests.support.store_server import Server
 from underskin import __version__
 from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.several.campaigns import diagnose_together
-from underskin.diagnosis.several.fleet import diagnose_fleet
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
 from underskin.recordings.conditions import Sensor, SkinDescription
@@ -132,8 +131,8 @@ def joint_reports() -> dict[str, dict[str, Any]]:
     one, two, three = (parse(resonant(name, seed=seed)) for seed, name in enumerate(("one", "two", "three")))
     fleet = {"a": [one], "b": [two], "c": [three]}
     made = {
-        "skin": diagnose_together([one, two], table(), "several"),
-        "fleet": diagnose_fleet(fleet, table(), "fleet"),
+        "skin": lean_together([one, two], table(), "several"),
+        "fleet": lean_fleet(fleet, table(), "fleet"),
     }
     return dict(orjson.loads(orjson.dumps(made, option=orjson.OPT_SERIALIZE_NUMPY)))
 
