@@ -10,6 +10,7 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
+from underskin.recordings.frf import summary
 from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone
@@ -112,6 +113,25 @@ def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
     assert "below 20 Hz it was not excited" in zone.reason
     mean, _, _ = band_average(stacked(idle), zone)
     assert mean == pytest.approx([one.values.real[sines].mean() for one in frfs], rel=0.01)
+
+
+def test_a_sine_at_the_mains_beside_idle_lines_is_no_pick_up_and_low_sines_are_in_the_zone() -> None:
+    """A multisine whose lowest lines share their bins with idle ones."""
+    frequency = np.arange(1.0, 500.0)
+    sines = np.isin(frequency, [5, 8, 12, 20, 31, 48, 75, 110])
+    generator = np.random.default_rng(7)
+    frfs = []
+    for _ in range(4):
+        noise = generator.normal(size=(len(frequency), 2)) @ [1e-12, 1e-12j]
+        coherence = np.where(sines, 1.0, generator.uniform(0.0, 0.2, len(frequency)))
+        frfs.append(Frf(frequency, np.where(sines, 7.4e-12, noise), coherence))
+    zone = flat_zone(stacked(frfs), [(4.0, 1.0), (4.0, 2.0)] * 2)
+    assert (zone.low_hz, zone.high_hz, zone.left_out_hz) == (5.0, 110.0, ())
+    assert "high-pass" not in zone.reason
+    assert zone.holds(frequency).tolist() == sines.tolist()
+    assert summary.lines_of("r", frfs[0]).frequency_hz.tolist() == frequency[sines].tolist()
+    (first, _) = summary.spreads(frfs, [(4.0, 1.0), (4.0, 2.0)] * 2)
+    assert first.frequency_hz.tolist() == frequency[sines].tolist()
 
 
 def test_where_the_charge_follows_the_force_nowhere_all_lines_count() -> None:

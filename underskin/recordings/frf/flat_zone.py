@@ -80,17 +80,16 @@ def flat_zone(
     Seminara 2018, section 3.2.2.
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
-    mains = _mains_lines(stacks)
+    edges = _edges(frequencies)
+    excited = _excited(stacks, frequencies, edges)
+    followed = [stack.at(np.isin(stack.frequency, frequencies[excited])) for stack in stacks]
+    mains = _mains_lines(followed)
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
         if not inside.any():
             allowed = f"must hold at least one line; they lie at {frequencies[0]:g} to {frequencies[-1]:g} Hz"
             raise too_few("band_hz", list(band_hz), allowed)
         return FlatZone(*band_hz, "the band given by the user", mains, chosen_by_user=True)
-    decades = float(np.log10(frequencies[-1] / frequencies[0]))
-    edges = np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
-    excited = _excited(stacks, frequencies, edges)
-    followed = [stack.at(np.isin(stack.frequency, frequencies[excited])) for stack in stacks]
     ratio = _binned(followed, edges, mains)
     names, curves, noise = _by_condition(ratio, conditions)
     filled = np.flatnonzero(np.isfinite(curves).any(axis=0))
@@ -112,13 +111,25 @@ def flat_zone(
     return FlatZone(float(low), float(high), reason, left_out, tuple(np.round(idle_hz, 6).tolist()))
 
 
+def excited_lines(stack: Stack) -> Mask:
+    """At which lines (lines,) of a stack with frequencies above 0 the charge follows the force; all of them where it
+    does at none, or no coherence is known."""
+    return _excited([stack], stack.frequency, _edges(stack.frequency))
+
+
+def _edges(frequencies: Floats) -> Floats:
+    decades = float(np.log10(frequencies[-1] / frequencies[0]))
+    return np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
+
+
 def _bin_of(frequency: Floats, edges: Floats) -> Indices:
     return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
 
 
 def _excited(stacks: Sequence[Stack], frequencies: Floats, edges: Floats) -> Mask:
     """At which lines (lines,) the charge follows the force, by the median coherence of their bin, or clearly by that of
-    their own; also where none is known, and at all where it follows at none."""
+    their own; also where none is known, and at all where it follows at none. Of an even number of coherences the lower
+    middle one counts: a bin of which half was excited is judged line by line."""
     line = np.concatenate(
         [np.broadcast_to(np.searchsorted(frequencies, one.frequency), one.coherence.shape).ravel() for one in stacks]
     )
@@ -132,12 +143,12 @@ def _excited(stacks: Sequence[Stack], frequencies: Floats, edges: Floats) -> Mas
 
 
 def _medians(group: Indices, values: Floats, groups: int) -> Floats:
-    """The median of the values of each group (groups,); NaN of those without any."""
+    """The (lower) median of the values of each group (groups,); NaN of those without any."""
     medians = np.full(groups, np.nan)
     order = np.argsort(group, kind="stable")
     known, first = np.unique(group[order], return_index=True)
     parts = np.split(values[order], first[1:])
-    medians[known] = [np.median(part) for part in parts] if len(known) else []
+    medians[known] = [np.sort(part)[(len(part) - 1) // 2] for part in parts] if len(known) else []
     return medians
 
 

@@ -1,7 +1,7 @@
 """FRFs of a campaign as a figure can show them: lines of single recordings, and the spread over recordings alike.
 
 A figure has fewer pixels than a recording lines: lines are gathered in bins of equal width in log f, of which the
-extremes are kept, so that no resonance is lost.
+extremes are kept, so that no resonance is lost. Of a force of a few sines the lines between those are no part of it.
 """
 
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.recordings.frf.estimation import Frf
-from underskin.recordings.frf.flat_zone import Condition
+from underskin.recordings.frf.flat_zone import Condition, excited_lines
 from underskin.recordings.frf.stacks import Stack, stacked
 from underskin.units import Complexes, Floats, Indices, Mask, to_lab
 
@@ -44,16 +44,19 @@ class FrfSpread:
 
 def lines_of(name: str, frf: Frf) -> FrfLines:
     """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
-    magnitude, phase = _polar(frf.values)
-    chosen = _extremes(frf.frequency, magnitude)
-    return FrfLines(name, frf.frequency[chosen], magnitude[chosen], phase[chosen], frf.coherence_or_nan[chosen])
+    (stack,) = stacked([frf])
+    stack = _of_sines(stack.at(stack.frequency > 0))
+    magnitude, phase = _polar(stack.values[0])
+    chosen = _extremes(stack.frequency, magnitude)
+    return FrfLines(name, stack.frequency[chosen], magnitude[chosen], phase[chosen], stack.coherence[0, chosen])
 
 
 def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
     """The spread over the recordings of each condition, by indenter and preload; one more for each grid of lines."""
     every = []
     keys = np.array(conditions)
-    for stack in stacked(frfs):
+    for whole in stacked(frfs):
+        stack = _of_sines(whole.at(whole.frequency > 0))
         for condition in np.unique(keys[stack.rows], axis=0):
             alike = (keys[stack.rows] == condition).all(axis=1)
             every.append(_spread(stack, alike, condition))
@@ -61,11 +64,19 @@ def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpr
 
 
 def _spread(stack: Stack, alike: Mask, condition: Floats) -> FrfSpread:
-    positive = stack.frequency > 0
-    frequency, start = _bins(stack.frequency[positive], MOST_BINS)
-    magnitude, phase = _polar(stack.values[alike][:, positive])
-    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike][:, positive])]
+    frequency, start = _bins(stack.frequency, MOST_BINS)
+    magnitude, phase = _polar(stack.values[alike])
+    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike])]
     return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
+
+
+def _of_sines(stack: Stack) -> Stack:
+    """Where the force excited fewer than half of the lines from its first to its last, those; else all lines."""
+    if len(stack.frequency) < 2:
+        return stack
+    excited = excited_lines(stack)
+    first, last = np.flatnonzero(excited)[[0, -1]]
+    return stack.at(excited) if excited.sum() < (last - first + 1) / 2 else stack
 
 
 def _levels(values: Floats, start: Indices) -> tuple[Floats, Floats, Floats]:
@@ -88,11 +99,10 @@ def _bins(frequency: Floats, most: int) -> tuple[Floats, Indices]:
 
 
 def _extremes(frequency: Floats, magnitude: Floats) -> Indices:
-    positive = np.flatnonzero(frequency > 0)
-    if len(positive) <= MOST_LINES:
-        return positive
-    _, start = _bins(frequency[positive], MOST_LINES // 2)
-    parts = np.split(positive, start[1:])
+    if len(frequency) <= MOST_LINES:
+        return np.arange(len(frequency))
+    _, start = _bins(frequency, MOST_LINES // 2)
+    parts = np.split(np.arange(len(frequency)), start[1:])
     chosen = [part[[np.argmin(magnitude[part]), np.argmax(magnitude[part])]] for part in parts]
     return np.unique(np.concatenate(chosen))
 
