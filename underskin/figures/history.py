@@ -150,7 +150,14 @@ def _each(sensors: Sequence[SensorPoints]) -> list[go.Scatter]:
             text=[label(sensor) for *_, sensor in points],
             hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.5g} pC/N<extra></extra>",
         ),
-        go.Scatter(x=[], y=[], mode="lines+markers", name="pointed at", line={"color": _CHOSEN, "width": 2.5}),
+        go.Scatter(
+            x=[],
+            y=[],
+            mode="lines+markers",
+            name="pointed at",
+            line={"color": _CHOSEN, "width": 2.5},
+            hovertemplate="%{text}, %{x|%d %b %Y %H:%M} UTC<br>d33 %{y:.4g} pC/N<extra></extra>",
+        ),
     ]
 
 

@@ -34,7 +34,7 @@ UNLIKELY = "or tick “These values are right, unusual as they are”"
 _LARGEST_BYTES = 100_000
 _LONGEST_NAME = 100  # characters
 _MOST_FIELDS = 1500  # a file of many channels has a row of fields for each, and so has an upload of many files
-_WITH_UNIT = re.compile(r"(\S*\d)\s*[^\W\d_].*")
+_WITH_UNIT = re.compile(r"\S*\d\s*[^\W\d_].*")
 _BETWEEN = re.compile(r"[;\s]+|,(?:\s+|$)")  # numbers in a line: a comma without a space may be a decimal one
 _LOAD_PATH = re.compile(r"contacts\[(\d+)\](?:\.(\w+))?(?:\[(\d)\])?")  # of `POST /v1/stress`
 _OF_LOAD = {"x_mm": "x", "y_mm": "y", "indenter_radius_mm": "R", "normal_force_n": "F"}
@@ -135,9 +135,8 @@ def number(name: str, typed: str) -> float:
         raise required(name, "fill it in")
     value = _value(typed)
     if value is None:
-        before_unit = _WITH_UNIT.fullmatch(typed.strip())
-        alone = f" without its unit: {before_unit[1]}" if before_unit else ""
-        raise wrong_type(name, typed.strip()[:80], f"must be a number{alone}")
+        in_unit = " alone, in the unit beside its field" if _WITH_UNIT.fullmatch(typed.strip()) else ""
+        raise wrong_type(name, typed.strip()[:80], f"must be a number{in_unit}")
     return value
 
 

@@ -53,6 +53,7 @@ function filterable(table) {
   line.className = "filter";
   line.append(label, " ", told);
   (table.closest(".wide") ?? table).before(line);
+  field.addEventListener("keydown", (event) => event.key === "Enter" && event.preventDefault()); // of a form around it
   field.addEventListener("input", () => {
     const words = field.value.toLowerCase().split(/\s+/);
     const rows = [...table.tBodies[0].rows];

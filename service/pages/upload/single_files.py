@@ -21,8 +21,8 @@ Typed = Mapping[int, Mapping[str, str]]  # by the number of the file, by field, 
 
 
 def typed(form: Mapping[str, str], files: Sequence[Upload]) -> dict[int, dict[str, str]]:
-    """What a form says of each file, of the fields that its kind of recording has."""
-    names = [name for name, _, _, kinds in FIELDS if form.get("kind", "frf") in kinds]
+    """What a form says of each file."""
+    names = [name for name, *_ in FIELDS]
     rows = {
         number: {name: text for name in names if (text := form.get(f"file-{number}-{name}", "").strip())}
         for number in range(min(len(files), MOST))
@@ -30,11 +30,13 @@ def typed(form: Mapping[str, str], files: Sequence[Upload]) -> dict[int, dict[st
     return {number: row for number, row in rows.items() if row}
 
 
-def values_of(rows: Typed, files: Sequence[Upload]) -> tuple[dict[int, dict[str, Any]], list[InvalidInput]]:
-    """The same as fields of recordings, and the times that are none, each with the name of its file."""
+def values_of(rows: Typed, files: Sequence[Upload], kind: str) -> tuple[dict[int, dict[str, Any]], list[InvalidInput]]:
+    """The fields among them that recordings of a kind have, and the times that are none, each with its file's name."""
+    names = {name for name, _, _, kinds in FIELDS if kind in kinds}
     values: dict[int, dict[str, Any]] = {}
     wrong: list[InvalidInput] = []
-    for number, row in rows.items():
+    for number, typed_of_it in rows.items():
+        row = {name: text for name, text in typed_of_it.items() if name in names}
         values[number] = {name: text if name in _TEXTS else number_or_text(text) for name, text in row.items()}
         try:
             values[number] |= {name: recorded_time.said(row[name]) for name in row.keys() & {recorded_time.FIELD}}

@@ -87,6 +87,13 @@ def listed(place: Place) -> dict[str, list[str]]:
             ),
             "Safari 18 on iOS",
         ),
+        (
+            (
+                "Mozilla/5.0 (X11; Linux x86_64) AppleWebKit/537.36 (KHTML, like Gecko) "
+                "HeadlessChrome/138.0.0.0 Safari/537.36"
+            ),
+            "Chrome 138 on Linux",
+        ),
         ("curl/8.14.1", "curl/8.14.1"),
         ("", ""),
     ],

@@ -89,9 +89,9 @@ def test_more_is_met_where_less_is_asked() -> None:
 @pytest.mark.parametrize(
     ("field", "asked", "words"),
     [
-        ("thinnest_mm", 3.0, "the layer may be"),
-        ("least_pitch_mm", 2.0, "the pitch may be"),
-        ("least_frf_pc_per_n", 12.0, "it is"),
+        ("thinnest_mm", 3.0, "is thicker than"),
+        ("least_pitch_mm", 2.0, "has a pitch above"),
+        ("least_frf_pc_per_n", 12.0, "gives more than"),
     ],
 )
 def test_the_limit_that_keeps_all_out_is_named_with_the_number_that_would_do(
