@@ -126,17 +126,17 @@ def _limits(region: Region, demand: DesignDemand) -> list[_Limit]:
     return [
         _Limit(
             thickness >= demand.thinnest_mm,
-            "The thinnest layer that can be made: of the skins tried, none that does the rest is thicker than {:.3g} mm",
+            "The thinnest layer that can be made: none of them that does the rest is thicker than {:.3g} mm",
             thickness,
         ),
         _Limit(
             region.largest_pitch_mm >= demand.least_pitch_mm,
-            "The smallest pitch that can be made: of the skins tried, none that does the rest has a pitch above {:.3g} mm",
+            "The smallest pitch that can be made: none of them that does the rest has a pitch above {:.3g} mm",
             region.largest_pitch_mm,
         ),
         _Limit(
             region.frf_pc_per_n >= demand.least_frf_pc_per_n,
-            "The least charge over force: of the skins tried, none that does the rest gives more than {:.3g} pC/N",
+            "The least charge over force: none of them that does the rest gives more than {:.3g} pC/N",
             region.frf_pc_per_n,
         ),
     ]

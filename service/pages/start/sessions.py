@@ -15,7 +15,11 @@ router = APIRouter(prefix="/sessions")
 
 # As browsers name themselves: each also as those that it wants to be taken for, which come later here.
 _BROWSERS = {
-    **{"Edg": "Edge", "OPR": "Opera", "Firefox": "Firefox", "HeadlessChrome": "Chrome", "Chrome": "Chrome"},
+    "Edg": "Edge",
+    "OPR": "Opera",
+    "Firefox": "Firefox",
+    "HeadlessChrome": "Chrome",
+    "Chrome": "Chrome",
     "Version": "Safari",
 }
 _SYSTEMS = {
