@@ -61,15 +61,18 @@ def in_lab_units(figure: go.Figure, recording: str, shows: str) -> tuple[Floats,
     return np.asarray(trace.x) * trace.meta["mm"], np.asarray(trace.y) * trace.meta["n"]
 
 
-def test_the_model_before_leaves_what_the_report_says_of_it(sticky: Shown) -> None:
+@pytest.mark.parametrize("of_wrong_law", [False, True])
+def test_a_model_that_lacks_something_leaves_what_the_report_says_of_it(sticky: Shown, of_wrong_law: bool) -> None:
     """Weighed by noise that had to hold the adhesion too, it lay far below every sample."""
-    lines = sticky.before.best.hypothesis.lines
+    seen = shown(sticky.campaign, "indentation", "thickness_error") if of_wrong_law else sticky
+    explanation = seen.after if of_wrong_law else seen.before
+    lines = explanation.best.hypothesis.lines
     assert lines.smooth is not None
-    drawn = {curve.name: curve.before.force_n for curve in sticky.curves}
+    drawn = {curve.name: (curve.after if of_wrong_law else curve.before).force_n for curve in seen.curves}
     predicted = np.concatenate([drawn[entry.id] for entry in lines.campaign.recordings])
     measured, samples = lines.value.real, lines.smooth.count
     left = (samples * (measured - predicted) ** 2).sum() / (samples * measured**2).sum()
-    _, stated = sticky.before.least_squares
+    _, stated = explanation.least_squares
     assert 100 * np.sqrt(left) == pytest.approx(stated, rel=0.1)
 
 

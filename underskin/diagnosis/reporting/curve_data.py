@@ -1,9 +1,9 @@
 """What the figure of a curve shows: its samples, what two explanations predict of it, and the marks on its course.
 
 Forces are less the zero that the samples in the air tell. Predicted ones are what the cell would show of the law's: the
-fit grants it the rest of a zero, a drift and a gain, of each curve its own. The base model alone is drawn by plain
-least squares, by which the report says what it leaves: weighed by noise that has to hold all that it lacks, it may lie
-far from every sample.
+fit grants it the rest of a zero, a drift and a gain, of each curve its own. What leaves more so than by plain least
+squares, by which the report says what it leaves, is drawn by those: weighed by noise that has to hold all that it
+lacks, it may lie far from every sample.
 """
 
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ from underskin.recordings.curve_course import course
 from underskin.units import Floats, Indices
 
 MOST_SAMPLES = 600  # of a curve
+_MORE = 1.1  # times what plain least squares leave
 _BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
 
 
@@ -86,13 +87,16 @@ def shown_curves(
     return sorted(curves, key=lambda curve: -curve.left_percent)
 
 
-def base_reading(problem: FittingProblem, explanation: Explanation) -> tuple[Floats, Floats] | None:
-    """Of indentations by the base model alone: the fit (parameters,) by plain least squares, and what the cells would
-    show by it (rows,) [N]; None of other explanations."""
-    if explanation.names or problem.kind != "indentation":
+def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
+    """Of indentations of which an explanation's most probable `reading` (rows,) [N] leaves more than plain least
+    squares do: the fit (parameters,) by these, and what the cells would show by it (rows,) [N]; else None."""
+    if problem.kind != "indentation":
         return None
     fit, _ = explanation.least_squares
-    return fit, least_squares_reading(problem.lines, explanation.model.predict(fit).value.real)
+    plain = least_squares_reading(problem.lines, explanation.model.predict(fit).value.real)
+    measured = problem.lines.value.real
+    left, least = (float(np.linalg.norm(measured - one)) for one in (reading, plain))
+    return (fit, plain) if left > _MORE * least else None
 
 
 def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
@@ -101,7 +105,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     force = explanation.model.predict(fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
     reading = cell.reading(lines, force)
-    plain = base_reading(problem, explanation)
+    plain = plain_reading(problem, explanation, reading)
     if plain is not None:
         fit, reading = plain
     deviation = _deviation(problem, explanation, cell)

@@ -14,7 +14,7 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation.region import axis_values
-from underskin.diagnosis.reporting.curve_data import base_reading
+from underskin.diagnosis.reporting.curve_data import plain_reading
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
@@ -102,7 +102,7 @@ class Thinned:
         levels = best.levels
         gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
         predicted = whole_prediction(self.problem, explanation) * gains
-        plain = base_reading(self.problem, explanation)
+        plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)
         variance = (levels.level**2 / self._total) + self._mean(self._placed(explanation))
