@@ -64,7 +64,7 @@ def in_lab_units(figure: go.Figure, recording: str, shows: str) -> tuple[Floats,
 @pytest.mark.parametrize("of_wrong_law", [False, True])
 def test_a_model_that_lacks_something_leaves_what_the_report_says_of_it(sticky: Shown, of_wrong_law: bool) -> None:
     """Weighed by noise that had to hold the adhesion too, it lay far below every sample."""
-    seen = shown(sticky.campaign, "indentation", "thickness_error") if of_wrong_law else sticky
+    seen = shown(sticky.campaign, "indentation", "instrument_compliance") if of_wrong_law else sticky
     explanation = seen.after if of_wrong_law else seen.before
     lines = explanation.best.hypothesis.lines
     assert lines.smooth is not None
