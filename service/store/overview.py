@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from statistics import median
 from typing import Any
 
-from sqlalchemy import Connection, case, func, select
+from sqlalchemy import Connection, and_, case, func, or_, select
 
 from service.store import campaigns as kept
 from service.store import diagnoses as kept_diagnoses
@@ -43,18 +43,27 @@ class Glance:
 def glances(
     connection: Connection, contains: str | None, before: int | None, limit: int, table_sha256: str
 ) -> list[Glance]:
-    """Skins by their latest arrival, those that arrived before the number `before`."""
+    """Skins by their latest campaign in use, as `Glance.last` has it, without one by what was withdrawn; those behind
+    the one with the campaign of the number `before`."""
     last = func.max(campaigns.c.number)
+    latest = func.coalesce(func.max(case((kept.CURRENT, kept.TIME))), func.max(kept.TIME))
     listed = func.count(case((kept.LISTED, campaigns.c.number)))  # not what was discarded
     query = select(skins.c.root_id, listed, last).join(skins, skins.c.id == campaigns.c.skin_id)
     put_away = select(skins.c.id).where(skins.c.discarded_at.is_not(None)).correlate(None)
     query = query.where(skins.c.root_id.not_in(put_away))
-    query = query.group_by(skins.c.root_id).order_by(last.desc()).limit(limit)
+    query = query.group_by(skins.c.root_id).order_by(latest.desc(), last.desc()).limit(limit)
     if contains is not None:
         named = select(skins.c.id).where(kept_skins.called(contains)).correlate(None)
         query = query.where(skins.c.root_id.in_(named))
     if before is not None:
-        query = query.having(last < before)
+        root = (
+            select(skins.c.root_id)
+            .join(campaigns, skins.c.id == campaigns.c.skin_id)
+            .where(campaigns.c.number == before)
+        )
+        its = select(latest).join(skins, skins.c.id == campaigns.c.skin_id)
+        its_latest = connection.execute(its.where(skins.c.root_id == root.scalar_subquery())).scalar()
+        query = query.having(or_(latest < its_latest, and_(latest == its_latest, last < before)))
     by_skin = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
     recent = _recent(connection, list(by_skin))
     values = medians(connection, [row.number for row in recent], table_sha256)

@@ -31,7 +31,7 @@ def start(
     find: Annotated[str, Query(max_length=200)] = "",
     before: str | None = None,
 ) -> Response:
-    """The skins whose campaigns came last, first."""
+    """The skins whose latest campaigns were recorded last, first."""
     with store.reading() as connection:
         glances = overview.glances(connection, find or None, number_of_cursor(before), _ON_A_PAGE + 1, table.sha256)
         shown = glances[:_ON_A_PAGE]

@@ -1,12 +1,15 @@
 """Which campaign of a skin is the latest, and which one describes it, on every page alike."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING
 from tests.support.blocks import block
-from tests.support.store_server import Server, campaign
+from tests.support.store_server import Place, Server, campaign, running
 
 SKIN = "aged"
 
@@ -36,6 +39,28 @@ def test_campaigns_are_in_the_order_of_recording(reader: Visit) -> None:
     assert names == ["the block", "in September", "in May"]
     reader.go("/")
     assert "the block" in reader.page.get_by_role("row", name=SKIN).inner_text()
+
+
+def test_skins_are_in_the_order_of_recording_from_page_to_page(tmp_path: Path) -> None:
+    """Whatever the order they arrived in; a campaign over several days says so."""
+    with running(Place(tmp_path)) as server:
+        for number in range(30):
+            day = f"2022-{1 + 7 * number % 30 // 3:02d}-{1 + 7 * number % 30 % 3:02d}"
+            document = recorded(campaign(f"day {day}", sensors=1, lines=3), day)
+            server.http.post(f"/v1/campaigns?skin=skin-{day}", json=document).raise_for_status()
+        first = server.http.get("/", headers=BROWSING).text
+        link = re.search(r'href="(/\?find=[^"]*before=\d+)"', first)
+        assert link is not None
+        second = server.http.get(link[1].replace("&amp;", "&"), headers=BROWSING).text
+        seen = [re.findall(r'href="/skins/skin-(2022-[0-9-]+)"', page) for page in (first, second)]
+        days = [*dict.fromkeys(seen[0]), *dict.fromkeys(seen[1])]
+        assert [len(dict.fromkeys(one)) for one in seen] == [25, 5]
+        assert days == sorted(days, reverse=True)
+        document = recorded(campaign("two days", sensors=1, lines=3), "2022-05-03")
+        document["recordings"][1]["recorded_at"] = "2022-06-04T09:00:00Z"
+        kept = server.http.post("/v1/campaigns?skin=skin-2022-01-01", json=document).raise_for_status().json()
+        facts = server.http.get(f"/campaigns/{kept['id']}", headers=BROWSING).text.split('class="facts"')[1]
+        assert re.search(r"2022-05-03</time> to <time[^>]*>2022-06-04", facts)
 
 
 @pytest.mark.usefixtures("aged")
