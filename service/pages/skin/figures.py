@@ -10,6 +10,8 @@ from service.schemas.skins import History, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import interval
 
+_MOST_NAMED = 5  # sensors, in a sentence
+
 Shown = Literal["d33", "uncertainty", "trend"]
 
 # Column of the values, column of their uncertainties, name, unit, what colours are compared against.
@@ -58,5 +60,22 @@ def drawn_map(
     )
     sensors = len(row.about["skin"]["sensors"])
     about += f"It tells of {len(rows)} of the {sensors} sensors. " if len(rows) < sensors else ""
-    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(values, uncertainties, quantity)} {CLICK}"
-    return drawn("map", figure, about, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
+    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(values, uncertainties, quantity)} "
+    about += _alone(rows) if show == "trend" else ""
+    return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
+
+
+def _alone(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Which sensors have a trend by their own interval that is not told over the whole array: few campaigns of many
+    sensors tell hardly any."""
+    low, high = _ENDS["trend"]
+    names = [
+        row["sensor"] for row in rows if not row.get("significant", False) and row.get(low, 0) * row.get(high, 0) > 0
+    ]
+    if not names:
+        return ""
+    more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+    return (
+        f"Taken alone, {', '.join(names[:_MOST_NAMED])}{more} would have a trend (95 %), as one sensor in twenty has "
+        "by chance: more campaigns tell which, and Compare shows what differs between two. "
+    )

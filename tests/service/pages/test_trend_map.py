@@ -70,6 +70,17 @@ def test_a_slope_is_coloured_where_its_trend_is_significant(d33: list[list[float
     assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
 
 
+def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
+    """One of sixty dies; by Student's t of 1 degree of freedom nothing is told over the whole array."""
+    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(60)]
+    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
+    answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
+    d33 = [[12.35, 9.7, 6.96] if number == 37 else [13.0, 13.1, 13.0] for number in range(60)]
+    about = drawn_map("palm", row, map_rows(row, answer, history(d33, 0.1)), "trend", "paper", None).about
+    assert "no sensor's differs from 0" in about
+    assert "Taken alone, s37 would have a trend (95 %)" in about
+
+
 @pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])
 def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_significant(
     values: list[float],
