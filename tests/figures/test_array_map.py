@@ -47,6 +47,15 @@ def test_who_differs_is_coloured_on_a_scale_that_reaches_as_far_as_chance() -> N
     assert "1 of 64 differ" in told_apart(values, np.full(64, 0.12))
 
 
+def test_one_far_beyond_many_that_differ_does_not_pale_them() -> None:
+    values = np.concatenate([-0.4 - 0.5 * np.random.default_rng(5).uniform(size=63), [-5.4]])
+    quantity = Quantity("difference", "pC/N", "zero")
+    (differs,) = [trace for trace in drawn(values, quantity=quantity).data if trace.name == "difference"]
+    assert -differs.marker.cmin == differs.marker.cmax == pytest.approx(3 * np.quantile(-values, 0.9), rel=0.01)
+    told = told_apart(values, np.full(64, 0.12), quantity)
+    assert told.endswith(". 1 beyond the scale has the colour of its end.")
+
+
 def test_a_sensor_far_off_does_not_colour_the_others() -> None:
     values = np.array([14.0, 14.05, 13.95, 2.0])
     assert differ_from_others(values, np.full(4, 0.1)).tolist() == [False, False, False, True]

@@ -24,6 +24,10 @@ _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
 _MIXED = 0.01  # of the largest size, from which on the other sign is told apart by colour
+_FAR, _FEW = (
+    3.0,
+    0.9,
+)  # times what nine in ten of those that differ do not exceed, where the colours end: one would pale the rest
 _DARK = 0.55  # luminance below which an id is written in white
 
 
@@ -155,7 +159,14 @@ def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity =
     if count == 0:
         return f"Grey: no sensor's differs from {what} beyond chance (5 % over the whole array)."
     told = f"{count} of {known} differ from {what} beyond chance (5 % over the whole array)"
-    return f"{told}{'' if count == known else '; the rest is grey'}."
+    told += "." if count == known else "; the rest is grey."
+    _, low, high = _scale(value, uncertainty, quantity)
+    beyond = int(((value < low) | (value > high)).sum())
+    return (
+        f"{told} {beyond} beyond the scale {'has' if beyond == 1 else 'have'} the colour of its end."
+        if beyond
+        else told
+    )
 
 
 def _names(quantity: Quantity) -> dict[str, str]:
@@ -179,7 +190,8 @@ def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
 
 
 def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str, float, float]:
-    """The colours' scale, and the values at its ends: as far as the values go, and at least as far as chance does."""
+    """The colours' scale, and the values at its ends: as far as the values go, but for a few far beyond the rest, and
+    at least as far as chance does."""
     known = value[np.isfinite(value)]
     if quantity.ends is not None:
         return _SCALE, *quantity.ends
@@ -193,7 +205,10 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
     middle = 0.0 if quantity.against in _FROM_ZERO else float(np.median(known))
     sure = uncertainty[np.isfinite(uncertainty)]
     by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
-    reach = max(float(np.abs(known - middle).max()), by_chance) or 1.0
+    sizes = np.abs(known - middle)
+    coloured = np.abs(value - middle)[_coloured(value, uncertainty, quantity) & np.isfinite(value)]
+    most = _FAR * float(np.quantile(coloured, _FEW)) if len(coloured) else np.inf
+    reach = max(min(float(sizes.max()), most), by_chance) or 1.0
     return "PuOr_r" if quantity.against in _FROM_ZERO else _SCALE, middle - reach, middle + reach
 
 

@@ -38,5 +38,5 @@ def test_a_force_left_negative_gives_no_modulus(reader: Visit) -> None:
     assert MODULUS not in shown
     assert "force is counted negative" in shown
     assert "the sign -1" not in shown
-    page.get_by_text("Left out of the figures: 1").click()
+    page.get_by_text("Left out of the array's d33 and of the modulus: 1").click()
     page.get_by_text("no modulus follows from a fall").wait_for()
