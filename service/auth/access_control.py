@@ -145,7 +145,7 @@ def _takes_files(path: str, headers: Mapping[bytes, bytes]) -> bool:
 
 def _login_first(method: str, path: str, query: bytes, headers: Mapping[bytes, bytes]) -> Refusal:
     """To the login, and back from it to what was asked for or, where a form was sent, to the page of the form."""
-    if method == "GET":
+    if method in SAFE:
         asked = f"{quote(path)}?{query.decode('latin-1')}" if query else quote(path)
         return Refusal(303, "Log in with a key first.", headers={"Location": f"/login?next={quote(asked)}"})
     form = "/" + headers.get(b"referer", b"").decode("latin-1").partition("//")[2].partition("/")[2]

@@ -24,10 +24,8 @@ _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
 _MOST_WITH_ID, _LONGEST_ID = 100, 6
 _MIXED = 0.01  # of the largest size, from which on the other sign is told apart by colour
-_FAR, _FEW = (
-    3.0,
-    0.9,
-)  # times what nine in ten of those that differ do not exceed, where the colours end: one would pale the rest
+# Colours end at so many times what so many of the sensors that differ do not exceed: one far beyond would pale them.
+_FAR, _MOST = 3.0, 0.9
 _DARK = 0.55  # luminance below which an id is written in white
 
 
@@ -162,11 +160,8 @@ def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity =
     told += "." if count == known else "; the rest is grey."
     _, low, high = _scale(value, uncertainty, quantity)
     beyond = int(((value < low) | (value > high)).sum())
-    return (
-        f"{told} {beyond} beyond the scale {'has' if beyond == 1 else 'have'} the colour of its end."
-        if beyond
-        else told
-    )
+    has = "has" if beyond == 1 else "have"
+    return f"{told} {beyond} beyond the scale {has} the colour of its end." if beyond else told
 
 
 def _names(quantity: Quantity) -> dict[str, str]:
@@ -207,7 +202,7 @@ def _scale(value: Floats, uncertainty: Floats, quantity: Quantity) -> tuple[str,
     by_chance = threshold(len(known)) * float(np.median(sure)) if len(sure) else 0.0
     sizes = np.abs(known - middle)
     coloured = np.abs(value - middle)[_coloured(value, uncertainty, quantity) & np.isfinite(value)]
-    most = _FAR * float(np.quantile(coloured, _FEW)) if len(coloured) else np.inf
+    most = _FAR * float(np.quantile(coloured, _MOST)) if len(coloured) else np.inf
     reach = max(min(float(sizes.max()), most), by_chance) or 1.0
     return "PuOr_r" if quantity.against in _FROM_ZERO else _SCALE, middle - reach, middle + reach
 

@@ -5,8 +5,7 @@ recordings of one condition (indenter and preload: a contact resonance moves wit
 bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
 slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
 stand out of their neighbours are left out, and so are lines at which the charge does not follow the force: noise that
-was not excited there may be flat, too. Those are the lines of bins whose median coherence is low, but for the few among
-them whose own is high: a force of a few sines excites one line in many.
+was not excited there may be flat, too (`excitation`).
 """
 
 from collections.abc import Sequence
@@ -16,19 +15,17 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
+from underskin.recordings.frf.excitation import bin_of, edges_over, excited_lines
 from underskin.recordings.frf.flat_zone_reason import Idle, levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.recordings.frf.stacks import Stack
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Floats, Mask
 
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
-_BINS_PER_DECADE = 12
 _BEYOND_NOISE = 3.0
 _OUTSTANDING = 4.0  # scatter of a mains line over that of its neighbours
 _NEIGHBOURS = 11
-_LEAST_COHERENCE = 0.5  # of bins whose lines count as excited
-_CLEAR_COHERENCE = 0.9  # of a line that does among others that do not: noise alone hardly reaches it
 
 Condition = tuple[float, float]  # indenter radius [mm], preload [N]
 
@@ -80,8 +77,8 @@ def flat_zone(
     Seminara 2018, section 3.2.2.
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
-    edges = _edges(frequencies)
-    excited = _excited(stacks, frequencies, edges)
+    edges = edges_over(frequencies)
+    excited = excited_lines(stacks, frequencies)
     followed = [stack.at(np.isin(stack.frequency, frequencies[excited])) for stack in stacks]
     mains = _mains_lines(followed)
     if band_hz is not None:
@@ -109,47 +106,6 @@ def flat_zone(
     )
     reason = reason_of(low, high, middle, curves, names, (first, last), slope, left_out, idle)
     return FlatZone(float(low), float(high), reason, left_out, tuple(np.round(idle_hz, 6).tolist()))
-
-
-def excited_lines(stack: Stack) -> Mask:
-    """At which lines (lines,) of a stack with frequencies above 0 the charge follows the force; all of them where it
-    does at none, or no coherence is known."""
-    return _excited([stack], stack.frequency, _edges(stack.frequency))
-
-
-def _edges(frequencies: Floats) -> Floats:
-    decades = float(np.log10(frequencies[-1] / frequencies[0]))
-    return np.geomspace(frequencies[0], frequencies[-1], max(1, round(_BINS_PER_DECADE * decades)) + 1)
-
-
-def _bin_of(frequency: Floats, edges: Floats) -> Indices:
-    return np.asarray(np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, len(edges) - 2))
-
-
-def _excited(stacks: Sequence[Stack], frequencies: Floats, edges: Floats) -> Mask:
-    """At which lines (lines,) the charge follows the force, by the median coherence of their bin, or clearly by that of
-    their own; also where none is known, and at all where it follows at none. Of an even number of coherences the lower
-    middle one counts: a bin of which half was excited is judged line by line."""
-    line = np.concatenate(
-        [np.broadcast_to(np.searchsorted(frequencies, one.frequency), one.coherence.shape).ravel() for one in stacks]
-    )
-    coherence = np.concatenate([one.coherence.ravel() for one in stacks])
-    line, coherence = line[np.isfinite(coherence)], coherence[np.isfinite(coherence)]
-    bins = _bin_of(frequencies, edges)
-    of_bins = _medians(bins[line], coherence, len(edges) - 1)
-    of_lines = _medians(line, coherence, len(frequencies))
-    follows = ~(of_bins[bins] < _LEAST_COHERENCE) | (of_lines >= _CLEAR_COHERENCE)
-    return follows if follows.any() else np.ones_like(follows)
-
-
-def _medians(group: Indices, values: Floats, groups: int) -> Floats:
-    """The (lower) median of the values of each group (groups,); NaN of those without any."""
-    medians = np.full(groups, np.nan)
-    order = np.argsort(group, kind="stable")
-    known, first = np.unique(group[order], return_index=True)
-    parts = np.split(values[order], first[1:])
-    medians[known] = [np.sort(part)[(len(part) - 1) // 2] for part in parts] if len(known) else []
-    return medians
 
 
 def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Floats, Floats]:
@@ -238,7 +194,7 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
         noise = np.median(np.abs(np.diff(real, axis=1)), axis=1) if real.shape[1] > 1 else np.zeros(len(real))
         plain = np.abs(level) > 2 * noise  # a dead sensor has no level
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
-        bins = _bin_of(stack.frequency, edges)
+        bins = bin_of(stack.frequency, edges)
         for number in np.unique(bins[kept]):
             lines = real[np.ix_(plain, kept & (bins == number))]
             ratio[stack.rows[plain], number] = np.median(lines / level[plain, None], axis=1)

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.recordings.frf.estimation import Frf
-from underskin.recordings.frf.flat_zone import Condition, excited_lines
+from underskin.recordings.frf.excitation import excited_lines
+from underskin.recordings.frf.flat_zone import Condition
 from underskin.recordings.frf.stacks import Stack, stacked
 from underskin.units import Complexes, Floats, Indices, Mask, to_lab
 
@@ -74,7 +75,7 @@ def _of_sines(stack: Stack) -> Stack:
     """Where the force excited fewer than half of the lines from its first to its last, those; else all lines."""
     if len(stack.frequency) < 2:
         return stack
-    excited = excited_lines(stack)
+    excited = excited_lines([stack], stack.frequency)
     first, last = np.flatnonzero(excited)[[0, -1]]
     return stack.at(excited) if excited.sum() < (last - first + 1) / 2 else stack
 
