@@ -106,15 +106,6 @@ def _is_umbridge(path: str) -> bool:
     return path.startswith("/umbridge/")
 
 
-class SeveralInvalid(InvalidInput):
-    """The first of several `errors`, for who tells one only."""
-
-    def __init__(self, errors: Sequence[InvalidInput]) -> None:
-        first = errors[0]
-        super().__init__(first.field, first.value, first.allowed, first.index, code=first.code)
-        self.errors = errors
-
-
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
     """The problem of values that cannot be used: 422."""
     shortened = [_shortened(error) for error in errors]

@@ -21,6 +21,7 @@ from underskin.recordings.campaign import Campaign
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import LARGEST_BYTES, RigDescription, from_dict
 from underskin.recordings.rig_description import parse as parse_rig
+from underskin.several_errors import SeveralInvalid, errors_of
 
 RIG = "rig"  # name of the form's part that is a rig description
 _MOST_ERRORS = 100  # in the problem of a request of which nothing is kept
@@ -99,7 +100,7 @@ def _rig(store: Database, uploads: Sequence[Upload], options: IngestOptions) -> 
                 raise error.of_field(RIG, upload.label) from None
             except InvalidInput as error:
                 label = f"{upload.label}: " if upload.label else f"{RIG}."
-                raise error.at(f"{label}{error.field}") from None
+                raise SeveralInvalid([one.at(f"{label}{one.field}") for one in errors_of(error)]) from None
     if not options.by_kept_rig:
         return None
     with store.reading() as connection:

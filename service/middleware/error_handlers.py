@@ -14,7 +14,6 @@ from starlette.types import Scope
 from service.problems import (
     RETRY_LATER,
     Refusal,
-    SeveralInvalid,
     from_validation,
     invalid_input,
     is_browsing,
@@ -23,6 +22,7 @@ from service.problems import (
 from service.store import Conflict, Missing, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
 from underskin import InvalidInput
+from underskin.several_errors import SeveralInvalid
 
 logger = logging.getLogger("underskin")
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from service.problems import SeveralInvalid
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
@@ -15,6 +14,7 @@ from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range,
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
 from underskin.prediction.columns import rows
+from underskin.several_errors import SeveralInvalid
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, checked, finite, non_negative, to_lab
 

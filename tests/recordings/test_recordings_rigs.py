@@ -11,6 +11,7 @@ from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording, IndentationRecording
 from underskin.recordings.rig_description import RigDescription
+from underskin.several_errors import SeveralInvalid
 
 RIGS = sorted((EXAMPLES / "rigs").glob("*.yaml"))
 
@@ -92,6 +93,17 @@ def test_a_wrong_rig_description_is_refused_by_field(old: str, new: str, message
     assert old in SMALL
     with pytest.raises(InvalidInput, match=message):
         parsed(SMALL.replace(old, new, 1))
+
+
+def test_all_that_is_wrong_is_told_at_once_and_nothing_that_hangs_on_it() -> None:
+    wrong = SMALL.replace("unit: um", "stiffness_n_per_mm: -1, sign: 3").replace("1e-2", "abc")
+    wrong = wrong.replace("kind:", "trim: {first_sample: 0}\nderived: {depth: 2 *, load: )}\nestimator: H1\nkind:")
+    with pytest.raises(SeveralInvalid) as raised:
+        parsed(wrong)
+    fields = ["channels.displacement_mm.sign", "channels.displacement_mm.stiffness_n_per_mm"]
+    fields += ["channels.force_n.sensitivity", "derived.depth", "derived.load", "estimator", "trim.first_sample"]
+    assert sorted(error.field for error in raised.value.errors) == fields
+    assert all(f"{field} = " in str(raised.value) for field in fields)
 
 
 @pytest.mark.parametrize(

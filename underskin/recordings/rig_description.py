@@ -17,11 +17,22 @@ are used.
 
 import dataclasses
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from functools import partial
+from typing import Annotated, Any, TypeVar
 
-from underskin.errors import FileError, Mention, Requirement, conflicting, not_one_of, out_of_range, required, too_few
+from underskin.errors import (
+    FileError,
+    InvalidInput,
+    Mention,
+    Requirement,
+    conflicting,
+    not_one_of,
+    out_of_range,
+    required,
+    too_few,
+)
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import COLUMNS, KINDS
 from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, Property, SignalMapping
@@ -32,11 +43,13 @@ from underskin.recordings.readers.channel_arithmetic import Formula
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.shown_values import named, shown
 from underskin.recordings.validation import mapping
+from underskin.several_errors import SeveralInvalid, all_of, noting
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 64_000
 _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 BLOCK_NAME = "block"  # a property that every part of a file has: a TDMS group, a MATLAB structure
+_MOST_UNKNOWN = 20  # fields of one object that are told
 _TARED = ("force_n", "charge_pc", "displacement_mm")
 _OF_CURVES = ("displacement_mm", "force_n")
 WHOLE_CURVES = ("file", "groups")  # what a curve may be, but for what a channel tells apart
@@ -44,6 +57,7 @@ _FIELDS = (
     *("schema", "name", "kind", "skin", "recording", "derived", "channels", "curves", "trim", "estimator"),
     "units_checked",
 )
+_Model = TypeVar("_Model")
 COMPLEX_FRF = "frf_pc_per_n"  # a channel of complex numbers, both parts of the FRF
 MAGNITUDE, PHASE = "frf_magnitude_pc_per_n", "frf_phase_deg"  # channels that stand for both parts, together
 
@@ -105,7 +119,7 @@ def parse(data: bytes, file: str) -> RigDescription:
     """The rig description in a YAML or JSON file.
 
     YAML is parsed in a process of its own, under the limits of reading a file. Raises FileError where the text is
-    neither, or too long, InvalidInput where a field cannot be used.
+    neither, or too long, SeveralInvalid with all fields that cannot be used.
     """
     if len(data) > LARGEST_BYTES:
         raise FileError(file, "", f"has {len(data)} bytes; a rig description may have up to {LARGEST_BYTES}")
@@ -118,33 +132,29 @@ def parse(data: bytes, file: str) -> RigDescription:
 
 
 def from_dict(document: Any) -> RigDescription:
-    """The rig description of a document; raises InvalidInput that names the field."""
+    """The rig description of a document; raises SeveralInvalid with all fields that cannot be used."""
     document = field.of_schema("rig description", document, SCHEMA, _FIELDS)
-    kind = document.get("kind", "frf")
+    kind, get = document.get("kind", "frf"), document.get
     if not isinstance(kind, str) or kind not in KINDS:
         raise not_one_of("kind", shown(kind), KINDS)
-    field.name("name", document.get("name", SCHEMA), False)
-    known = {entry.name for entry in fields(KINDS[kind])} - {"kind", "estimator"}
-    recording = mapping("recording", document.get("recording", {}))
-    derived = _derived(document.get("derived"))
-    channels = _channels(kind, document.get("channels"))
-    for name, entry in channels.items():
-        _require_sign_to_be_told(name, entry, channels, derived)
-    return RigDescription(
-        kind=kind,
-        skin=_known("skin", mapping("skin", document.get("skin")), {entry.name for entry in fields(SkinDescription)}),
-        recording={
-            name: field.build(Property, f"recording.{name}", value, False) if isinstance(value, Mapping) else value
-            for name, value in _known("recording", recording, known).items()
-        },
-        channels=channels,
-        units_checked=field.flag("units_checked", document.get("units_checked", False), False),
-        document=document,
-        curves=_curves(document.get("curves")),
-        estimator=_estimator(document.get("estimator"), channels),
-        derived=derived,
-        trim=_trim(document.get("trim")),
-    )
+    of_skin = {entry.name for entry in fields(SkinDescription)}
+    of_recording = {entry.name for entry in fields(KINDS[kind])} - {"kind", "estimator"}
+    readings: dict[str, Callable[[], Any]] = {
+        "name": lambda: field.name("name", get("name", SCHEMA), False),
+        "skin": lambda: _known("skin", get("skin"), of_skin),
+        "recording": lambda: _recording(_known("recording", get("recording", {}), of_recording)),
+        "channels": lambda: _channels(_known("channels", get("channels"), channel_fields(kind))),
+        "units_checked": lambda: field.flag("units_checked", get("units_checked", False), False),
+        "curves": lambda: _curves(get("curves")),
+        "estimator": lambda: _estimator(get("estimator"), get("channels")),
+        "derived": lambda: _derived(get("derived")),
+        "trim": lambda: _trim(get("trim")),
+    }
+    values = all_of(readings)
+    del values["name"]  # that of the document
+    rig = RigDescription(kind=kind, document=document, **values)
+    all_of({name: partial(_require_sign_to_be_told, rig, name) for name in rig.channels})
+    return rig
 
 
 def channel_fields(kind: str) -> set[str]:
@@ -153,74 +163,108 @@ def channel_fields(kind: str) -> set[str]:
     return columns | {COMPLEX_FRF, MAGNITUDE, PHASE, "time_s"} if kind == "frf" else columns
 
 
+def _built(model: type[_Model], prefix: str, value: Any) -> _Model:
+    """A model of an object; raises SeveralInvalid with all its fields that cannot be used."""
+    values, refused = field.check_fields(model, mapping(prefix, value), units_checked=False)
+    if refused:
+        raise SeveralInvalid([error.at(f"{prefix}.{error.field}") for error in refused])
+    return model(**values)
+
+
+def _known(prefix: str, document: Any, known: set[str]) -> Mapping[str, Any]:
+    unknown = [name for name in mapping(prefix, document) if name not in known][:_MOST_UNKNOWN]
+    if unknown:
+        told = [not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(known)) for name in unknown]
+        raise SeveralInvalid(told)
+    return mapping(prefix, document)
+
+
+def _recording(given: Mapping[str, Any]) -> Mapping[str, Any | Property]:
+    stated = {
+        name: partial(_built, Property, f"recording.{name}", value)
+        for name, value in given.items()
+        if isinstance(value, Mapping)
+    }
+    return {**given, **all_of(stated)}
+
+
 def _curves(document: Any) -> str | CurveChannel | None:
     if document is None or document in WHOLE_CURVES:
         return document
     if not isinstance(document, Mapping):
         raise not_one_of("curves", shown(document), (*WHOLE_CURVES, "{channel: NAME}", "{segments: NAME}"))
-    curves = field.build(CurveChannel, "curves", document, False)
+    curves = _built(CurveChannel, "curves", document)
     if (curves.channel is None) == (curves.segments is None):
         raise conflicting("curves", shown(list(document)), "must name either a channel or segments")
     return curves
 
 
 def _derived(document: Any) -> dict[str, Formula]:
-    formulas = {}
-    for name, text in mapping("derived", {} if document is None else document).items():
-        place = f"derived.{named(name)}"
-        field.name(place, name, False)
-        formulas[name] = channel_arithmetic.parse(place, field.name(place, text, False))
-    return formulas
+    given = mapping("derived", {} if document is None else document)
+    return all_of({name: partial(_formula, name, text) for name, text in given.items()})
+
+
+def _formula(name: Any, text: Any) -> Formula:
+    place = f"derived.{named(name)}"
+    field.name(place, name, False)
+    return channel_arithmetic.parse(place, field.name(place, text, False))
 
 
 def _trim(document: Any) -> Trim | None:
     if document is None:
         return None
-    trim = field.build(Trim, "trim", document, False)
+    trim = _built(Trim, "trim", document)
     if trim.first_sample and trim.last_sample and trim.last_sample <= trim.first_sample:
         above = Requirement("must be above ", Mention("trim.first_sample", "first_sample"), f", {trim.first_sample}")
         raise conflicting("trim.last_sample", trim.last_sample, above)
     return trim
 
 
-def _require_sign_to_be_told(
-    name: str, entry: ChannelMapping, channels: Mapping[str, ChannelMapping], derived: Mapping[str, Formula]
-) -> None:
-    """Refuses an automatic sign where curves cannot tell it, or where turning the whole would be wrong."""
-    if AUTOMATIC not in [signal.sign for signal in entry.signals]:
-        return
-    place = f"channels.{name}.sign"
-    if name not in _OF_CURVES or not all(one in channels for one in _OF_CURVES):
-        both = Requirement(Mention(_OF_CURVES[0]), " and ", Mention(_OF_CURVES[1]))
-        raise conflicting(place, AUTOMATIC, Requirement("is told from curves, which need ", both))
-    formula = derived.get(entry.channel)
-    if name == "displacement_mm" and formula is not None and formula.is_sum:
-        turned = f"cannot be told of {formula.text}, whose terms have signs of their own: say them in the formula"
-        raise conflicting(place, AUTOMATIC, turned)
-
-
-def _estimator(value: Any, channels: Mapping[str, ChannelMapping]) -> Estimator | None:
+def _estimator(value: Any, channels: Any) -> Estimator | None:
     if value is None:
         return None
-    if "charge_pc" not in channels:
+    if not isinstance(channels, Mapping) or "charge_pc" not in channels:
         raise conflicting("estimator", shown(value), Requirement("is for time series: ", Mention("charge_pc")))
     return checked_estimator("estimator", shown(value))
 
 
-def _channels(kind: str, document: Any) -> dict[str, ChannelMapping]:
-    given = _known("channels", mapping("channels", document), channel_fields(kind))
-    channels = {name: field.build(ChannelMapping, f"channels.{name}", value, False) for name, value in given.items()}
-    for name, entry in channels.items():
-        _require_whole(f"channels.{name}", entry)
-        if entry.deflection is not None:
-            _require_whole(f"channels.{name}.deflection", entry.deflection)
-        _require_of_its_field(name, entry, channels)
-    for one, other in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
-        if one in channels and other not in channels:
-            raise required(f"channels.{other}", Requirement("required beside ", Mention(one)))
-    if not channels:
+def _channels(given: Mapping[str, Any]) -> dict[str, ChannelMapping]:
+    if not given:
         raise too_few("channels", "none", "must name at least one channel")
+    wrong: list[InvalidInput] = []
+    for one, other in ((MAGNITUDE, PHASE), (PHASE, MAGNITUDE)):
+        if one in given and other not in given:
+            wrong.append(required(f"channels.{other}", Requirement("required beside ", Mention(one))))
+    channels = {}
+    with noting(wrong):
+        channels = all_of({name: partial(_channel, name, value, given.keys()) for name, value in given.items()})
+    if wrong:
+        raise SeveralInvalid(wrong)
     return channels
+
+
+def _channel(name: str, value: Any, fields_given: Collection[str]) -> ChannelMapping:
+    entry = _built(ChannelMapping, f"channels.{name}", value)
+    _require_whole(f"channels.{name}", entry)
+    if entry.deflection is not None:
+        _require_whole(f"channels.{name}.deflection", entry.deflection)
+    _require_of_its_field(name, entry, fields_given)
+    return entry
+
+
+def _require_sign_to_be_told(rig: RigDescription, name: str) -> None:
+    """Refuses an automatic sign where curves cannot tell it, or where turning the whole would be wrong."""
+    entry = rig.channels[name]
+    if AUTOMATIC not in [signal.sign for signal in entry.signals]:
+        return
+    place = f"channels.{name}.sign"
+    if name not in _OF_CURVES or not all(one in rig.channels for one in _OF_CURVES):
+        both = Requirement(Mention(_OF_CURVES[0]), " and ", Mention(_OF_CURVES[1]))
+        raise conflicting(place, AUTOMATIC, Requirement("is told from curves, which need ", both))
+    formula = rig.derived.get(entry.channel)
+    if name == "displacement_mm" and formula is not None and formula.is_sum:
+        turned = f"cannot be told of {formula.text}, whose terms have signs of their own: say them in the formula"
+        raise conflicting(place, AUTOMATIC, turned)
 
 
 def _require_whole(place: str, signal: SignalMapping) -> None:
@@ -231,7 +275,7 @@ def _require_whole(place: str, signal: SignalMapping) -> None:
         raise required(f"{place}.unit", "required where labelled says that the label is wrong")
 
 
-def _require_of_its_field(name: str, entry: ChannelMapping, channels: Mapping[str, ChannelMapping]) -> None:
+def _require_of_its_field(name: str, entry: ChannelMapping, fields_given: Collection[str]) -> None:
     """Refuses on one field what is for another."""
     stiffness, spring = entry.stiffness_n_per_mm, entry.spring_constant_n_per_m
     if entry.tare_percent is not None and name not in _TARED:
@@ -239,7 +283,7 @@ def _require_of_its_field(name: str, entry: ChannelMapping, channels: Mapping[st
             "is for ", Mention("force_n"), ", ", Mention("charge_pc"), " and ", Mention("displacement_mm")
         )
         raise conflicting(f"channels.{name}.tare_percent", entry.tare_percent, known)
-    if stiffness is not None and (name != "displacement_mm" or "force_n" not in channels):
+    if stiffness is not None and (name != "displacement_mm" or "force_n" not in fields_given):
         raise conflicting(f"channels.{name}.stiffness_n_per_mm", stiffness, _is_for("displacement_mm"))
     if entry.deflection is not None and name != "displacement_mm":
         raise conflicting(f"channels.{name}.deflection", entry.deflection.channel, _is_for("displacement_mm"))
@@ -253,10 +297,3 @@ def _require_of_its_field(name: str, entry: ChannelMapping, channels: Mapping[st
 
 def _is_for(name: str) -> Requirement:
     return Requirement("is for ", Mention(name))
-
-
-def _known(prefix: str, document: Mapping[str, Any], known: set[str]) -> Mapping[str, Any]:
-    for name in document:
-        if name not in known:
-            raise not_one_of(f"{prefix}.{named(name)}", shown(document[name]), sorted(known))
-    return document

@@ -23,6 +23,7 @@ from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
 from underskin.recordings import curve_signs
+from underskin.several_errors import errors_of
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
 
@@ -76,7 +77,7 @@ def _rig_upload(pending: PendingUpload) -> list[Upload]:
 def field_errors(error: Exception) -> list[dict[str, Any]]:
     """What is wrong, field by field."""
     if isinstance(error, InvalidInput):
-        return [error_entry(error.field, error.value, error.allowed, error.code)]
+        return [error_entry(one.field, one.value, one.allowed, one.code) for one in errors_of(error)]
     if isinstance(error, Refusal) and error.errors:
         return [dict(entry) for entry in error.errors]
     if isinstance(error, FileError):

@@ -86,6 +86,13 @@ def test_a_bad_rig_description_says_where(server: Server) -> None:
     assert answer.json()["errors"][0]["field"] == "r.yaml: kind"
 
 
+def test_all_that_is_wrong_with_a_rig_description_is_told_at_once(server: Server) -> None:
+    bad = RIG.replace("schema: rig/1", "schema: rig/1\ntrim: {first_sample: 9, last_sample: 3}\nestimator: H7")
+    answer = server.http.post("/v1/campaigns", files=[("rig", ("r.yaml", bad)), ("file", ("cut.csv", CSV))])
+    assert answer.status_code == 422
+    assert {error["field"] for error in answer.json()["errors"]} == {"r.yaml: trim.last_sample", "r.yaml: estimator"}
+
+
 def test_limits_hold_as_the_upload_streams(place: Place) -> None:
     with running(place, UNDERSKIN_MAX_BODY_MB="1", UNDERSKIN_MAX_UPLOAD_MB="3") as server:
         document = orjson.dumps(campaign("padded")).ljust(1_500_000)

@@ -62,9 +62,12 @@ def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG)
     page.get_by_text("What the channels are").click()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("")
+    page.get_by_label("first sample used").fill("0.5")
     page.get_by_role("button", name="Read it with these settings").click()
     alert = page.get_by_role("alert")
     assert "channels.charge_pc.sensitivity" in alert.inner_text()
+    assert "first sample used" in alert.inner_text()  # all that is wrong is told at once
+    page.get_by_label("first sample used").fill("")
     visitor.require_accessible()
     page.get_by_label("Unit of the sensitivity of Amplifier").fill("mV/N")
     page.get_by_label("sphere radius R [mm]", exact=True).fill("5")
