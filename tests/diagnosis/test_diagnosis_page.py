@@ -183,10 +183,14 @@ def test_a_list_that_keys_reach_chooses_the_recording(document: dict[str, Any], 
     choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
     choosing += "list.dispatchEvent(new Event('change')); document.title = "
     choosing += "document.getElementById('figure-curve').data.filter((t) => t.visible).map((t) => t.meta.recording);"
+    choosing += "const bottom = (one) => one.getBoundingClientRect().bottom;"
+    choosing += "const drawn = document.getElementById('figure-curve'); document.title += '|';"
+    choosing += "document.title += bottom(drawn) - bottom(drawn.parentElement);"
     script = f"<script>addEventListener('load', () => setTimeout(() => {{{choosing}}}, 500))</script></html>"
     text = page(document, {"curve": adhesive_figure()}).replace("</html>", script)
     shown = drawn_by_a_browser(text, tmp_path)
-    title = re.findall("<title>(.*?)</title>", shown)[0]
+    title, beyond = re.findall("<title>(.*?)</title>", shown)[0].split("|")
+    assert float(beyond) <= 1  # pixels: what lies below its box is hidden by what follows
     menu = adhesive_figure().layout.updatemenus[0]
     assert set(title.split(",")) == {menu.buttons[1].name.partition(":")[0]}
 

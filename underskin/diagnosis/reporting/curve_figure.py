@@ -27,6 +27,7 @@ _LOADED = 0.02  # of the largest force, from which on a curve is in view from th
 _ROOM = 0.4, 0.05  # of what is in view: the air beside it, if there is any, and the edge
 _ALONG = 40  # points along an edge of the band
 _HEIGHT, _PANEL = 460, 150  # pixels
+_PANEL_TITLE = 12  # smaller than others, that those of two panels do not touch
 
 
 class _Model(NamedTuple):
@@ -111,6 +112,7 @@ class _Curve:
             traces.append(self._trace(f"residual {model.shows}", curve.displacement_mm, left, most, look))
             which = "residual" if alone else f"residual<br>{model.shows}"
             layout[f"yaxis{row}.title.text"] = f"{which} [{readable_unit('force_n', most)[0]}]"
+            layout[f"yaxis{row}.title.font.size"] = _PANEL_TITLE
         traces += [self._mark(name, mark, largest, marker) for name, mark, marker in self._marks()]
         last = len(self._models) + 1
         layout[f"xaxis{last}.title.text"] = f"{self._along} from the contact point [{self._length}]"

@@ -45,7 +45,7 @@ const steps = ["Previous", "Next"].map((text, index) => {
 list.addEventListener("change", show);
 steps[0].disabled = true;
 Plotly.relayout(plot, {"updatemenus[0].visible": false});
-plot.before(label, " ", steps[0], " ", steps[1]);
+plot.parentElement.before(label, " ", steps[0], " ", steps[1]); // outside of the box that has the height of the figure
 """  # stands in for a figure's own menu, which only a pointer can open
 
 _FILTERS = (
