@@ -79,11 +79,16 @@ def test_who_stands_out_and_who_is_chosen_have_rings_and_every_value_its_interva
     figure = array_map(SENSORS[:3], X[:3], Y[:3], [14.0, 14.1, 3.0], [0.1] * 3, reasons, chosen="s01")
     widths = [shape.line.width for shape in figure.layout.shapes]
     assert widths[0] < min(widths[1:])
-    told = {sensor: text for trace in figure.data for sensor, text in zip(trace.ids, trace.customdata, strict=True)}
+    sensors = [trace for trace in figure.data if trace.ids is not None]
+    told = {sensor: text for trace in sensors for sensor, text in zip(trace.ids, trace.customdata, strict=True)}
     assert told["s02"].startswith(f"s02: {reasons[2]}")
     assert "95 %: 13.8 to 14.2" in told["s00"]
     names = {trace.name for trace in figure.data}
     assert names == {"not different from the others", "stands out"}
+    (example,) = [trace for trace in figure.data if trace.name == "stands out" and trace.showlegend is None]
+    assert (
+        example.marker.line.color == figure.layout.shapes[2].line.color
+    )  # the legend shows the ring, whatever the disc's colour
 
 
 def test_a_signed_charge_has_zero_in_the_middle_of_its_colours() -> None:

@@ -18,6 +18,7 @@ _SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so 
 _SEEN = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
 _AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
+_APART = {"color": COLOURS[1], "width": 3}  # the ring around one that stands out
 _ALONE_MM = 1.0  # radius where there is no other
 _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
@@ -104,25 +105,22 @@ def array_map(
                     "color": value[own] if name == "differs" else [colours[row] for row in rows],
                     **({"colorscale": scale, "cmin": low, "cmax": high} if name == "differs" else {}),
                     **({"colorbar": _bar(quantity)} if name == "differs" else {}),
-                    "symbol": "circle" if name != "stands out" else "x",
                     "line": {"width": 0},
                 },
                 meta=name,
+                showlegend=name != "stands out",
             )
             if not inside and len(sensors) <= _MOST_WITH_ID:
                 below.append({**_below([sensors[row] for row in rows], x[own], y[own] - radius), "meta": name})
     figure.add_traces(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
+    if not plain.all():  # in the legend as its disc is ringed
+        ringed = {"symbol": "circle-open", "size": 10, "color": _APART["color"], "line": _APART}
+        figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)["stands out"])
     discs = []
     for row, name in enumerate(sensors):
-        ring = (
-            {"color": INK, "width": 4}
-            if name == chosen
-            else {"color": COLOURS[1], "width": 3}
-            if reasons[row]
-            else None
-        )
+        ring = {"color": INK, "width": 4} if name == chosen else _APART if reasons[row] else None
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
         line = ring or {"color": "#5b6670", "width": 1}
         discs.append(
