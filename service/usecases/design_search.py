@@ -1,7 +1,7 @@
 """Which skins resolve what is asked: thickness, sensor radius and pitch, searched over the domain of the table.
 
-Resolution is the two-point separation of `POST /v1/design`: the distance from which on two equal contacts show as two
-wherever the row of sensors lies. A thin layer spreads the stress less, and a fine pitch samples it more densely; a
+What is asked for is the two-point separation of `POST /v1/design`: from which distance on two equal contacts show as
+two wherever the row of sensors lies. A thin layer spreads the stress less, and a fine pitch samples it more densely; a
 sensor cannot be wider than the pitch, and two contacts cannot be nearer than where they touch.
 """
 

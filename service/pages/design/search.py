@@ -23,7 +23,7 @@ router = APIRouter(prefix="/design/search")
 
 # Field, words, unit; where it starts, unless that is the skin's or the prototype's.
 FIELDS = (
-    ("resolution_mm", "resolution, at most", "mm", "2"),
+    ("resolution_mm", "two-point separation, at most", "mm", "2"),
     ("preload_n", "force F of each load", "N", None),
     ("indenter_radius_mm", "sphere radius R", "mm", None),
     ("youngs_modulus_mpa", "Young's modulus E", "MPa", None),

@@ -100,8 +100,8 @@ def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(reade
     page.get_by_role("link", name="which skins resolve what you ask").press("Enter")
     reader.drawn(1)
     fits_and_is_accessible(reader)
-    page.get_by_label("resolution, at most").fill("3,5")
-    page.get_by_label("resolution, at most").press("Enter")
+    page.get_by_label("two-point separation, at most").fill("3,5")
+    page.get_by_label("two-point separation, at most").press("Enter")
     page.wait_for_url("**resolution_mm=3%2C5**")
     best = page.get_by_role("row", name=re.compile("^Fewest sensors"))
     pitch = float(best.locator("td").nth(2).inner_text().split()[0])
@@ -143,4 +143,4 @@ def test_the_map_of_skins_comes_as_numbers(server: Server) -> None:
     assert refused.status_code == 422
     assert refused.json()["errors"][0]["field"] == "resolution_mm"
     text = server.http.get("/design/search?resolution_mm=60", headers={"Accept": "text/html"}).text
-    assert "resolution, at most [mm]: 60" in text
+    assert "two-point separation, at most [mm]: 60" in text
