@@ -57,7 +57,8 @@ function filterable(table) {
   field.addEventListener("input", () => {
     const words = field.value.toLowerCase().split(/\s+/);
     const rows = [...table.tBodies[0].rows];
-    for (const row of rows) row.hidden = !words.every((word) => row.textContent.toLowerCase().includes(word));
+    const has = (row) => words.every((word) => row.textContent.toLowerCase().includes(word));
+    for (const row of rows) row.hidden = !has(row) && !row.querySelector("input:checked"); // what is ticked stays in view
     const left = rows.filter((row) => !row.hidden).length;
     told.textContent = field.value ? `${left} of ${rows.length}${part ? " on this page" : ""}` : "";
   });

@@ -136,6 +136,16 @@ def test_what_is_chosen_stays_while_the_list_is_searched(reader: Visit, idle: Se
         assert page.get_by_role("link", name=f"make-a-{name}").count() == 1
 
 
+def test_a_filter_of_the_page_hides_no_skin_that_is_ticked(reader: Visit, idle: Server) -> None:
+    for number in range(12):
+        sent_to(idle, f"make-b-{number}", f"b{number}")
+    page = reader.page
+    reader.go("/fleets?find=make-b-")
+    page.get_by_label("make-b-3").check()
+    page.get_by_label("Filter").fill("make-b-7")
+    assert page.locator("tbody tr:visible label").all_inner_texts() == ["make-b-3", "make-b-7"]
+
+
 def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
     sent_to(idle, "fleet-9", "nine")
     idle.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
