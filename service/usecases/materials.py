@@ -1,5 +1,6 @@
 """Materials of a skin as presets: the modulus of an elastomer or the d33 of a film, as somebody published it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 _PAPER = "Seminara, Sensors 18 (2018) 459"
@@ -67,3 +68,12 @@ FILMS = (
     _film("prototype-3-n", "PVDF of the prototype at 3 N", 22.0, "from FRFs of earlier runs", _PAPER),
 )
 MATERIALS = {material.id: material for material in (*ELASTOMERS, *FILMS)}
+
+
+def with_values(values: Mapping[str, float]) -> dict[str, str]:
+    """Names of the materials whose value a design has, by field; empty where it has none's."""
+    named: dict[str, list[str]] = {one.field: [] for one in MATERIALS.values()}
+    for one in MATERIALS.values():
+        if values.get(one.field) == one.value:
+            named[one.field].append(one.name)
+    return {field: " or ".join(names) for field, names in named.items()}

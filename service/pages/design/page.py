@@ -19,7 +19,7 @@ from service.pages.shared.html import compress, page
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.materials import ELASTOMERS, FILMS, RATIO_SOURCE
+from service.usecases.materials import ELASTOMERS, FILMS, RATIO_SOURCE, with_values
 from underskin.errors import UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -49,6 +49,7 @@ def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
         compared=shown.compared,
         materials=(("Elastomers", "Young's modulus", "MPa", ELASTOMERS), ("Films", "d33", "pC/N", FILMS)),
         ratio_source=RATIO_SOURCE,
+        material_of=with_values(sliders.values),
         same=_same(request, sliders.values),
     )
 
@@ -63,6 +64,7 @@ def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response
         "figures": {figure.name: figure.json for figure in shown.figures},
         "compared": {entry.name: [entry.stands, entry.change] for entry in shown.compared},
         "outside": shown.outside,
+        "materials": with_values(sliders.values),
         "same": [same.curl, same.python],
     }
     content = orjson.dumps(changed if shown.error is None else {"error": shown.error})

@@ -43,6 +43,9 @@ async function answer() {
     value.title = exact;
     entry.querySelector(".quiet").textContent = note;
   }
+  for (const [field, material] of Object.entries(design.materials)) {
+    document.querySelector(`[data-material="${field}"]`).textContent = material;
+  }
   for (const [name, [stands, change]] of Object.entries(design.compared)) {
     const row = document.querySelector(`[data-compared="${name}"]`);
     row.querySelector("[data-stands]").textContent = stands;

@@ -86,6 +86,11 @@ def test_a_material_gives_its_number_and_leaves_the_others(reader: Visit) -> Non
     page.get_by_role("button", name="Take PVDF film").click()
     page.wait_for_url("**d33_pc_per_n=33&**")
     assert page.locator("#youngs_modulus_mpa").input_value() == "2"
+    told = page.locator("[data-material]")
+    assert told.all_inner_texts() == ["Sylgard 184, 10 : 1", "PVDF film"]
+    page.locator("#youngs_modulus_mpa").fill("2.5")
+    page.wait_for_function("() => document.querySelector('[data-material]').textContent === ''")
+    assert told.last.inner_text() == "PVDF film"
 
 
 def test_an_unknown_material_is_refused(server: Server) -> None:
