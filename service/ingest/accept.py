@@ -191,7 +191,7 @@ def _kept(
     if campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
     result["findings"] = [finding.sentence for finding in plausibility.implausible(campaign)]
-    notes += [*_other_skin(connection, campaign, options), *_repeats(connection, campaign, options)]
+    notes += [*_of_corrected(connection, campaign, options), *_repeats(connection, campaign, options)]
     corrected_from = options.signed or options.sender
     arrival = campaigns.NewCampaign(
         campaign, options.skin, refused, notes, checked.file, options.sender, corrected_from
@@ -205,12 +205,17 @@ def _kept(
     return {**result, "status": "ok", "id": campaign_id, "skin_id": skin_id, "recordings": stored + refused}
 
 
-def _other_skin(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
-    """What is said of a correction that names another skin than that of the campaign it corrects."""
+def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
+    """What is said of a correction that changes nothing, or names another skin than the campaign it corrects is on."""
+    same = repeats.changes_nothing(connection, campaign, options.corrects)
+    notes = ["it says the same as the campaign that it corrects"] if same else []
     kept_on = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
-    if kept_on is None:
-        return []
-    return [f"it names skin {campaign.skin.id!r}, and was kept on skin {kept_on!r}, as the campaign that it corrects"]
+    if kept_on is not None:
+        of_corrected = (
+            f"it names skin {campaign.skin.id!r}, and was kept on skin {kept_on!r}, as the campaign that it corrects"
+        )
+        notes.append(of_corrected)
+    return notes
 
 
 def _repeats(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:

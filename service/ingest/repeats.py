@@ -1,5 +1,5 @@
-"""Identical recordings in several campaigns: noted when they arrive, as is a correction that names another skin, and
-counted once in histories.
+"""Identical recordings in several campaigns: noted when they arrive, as is a correction that names another skin or
+changes nothing, and counted once in histories.
 """
 
 from collections.abc import Collection, Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
-from service.store import campaigns, repeated, skins
+from service.store import campaigns, codec, repeated, skins
 from underskin.recordings.campaign import Campaign
 
 HistoryPoint = tuple[str, str]  # of a history: id of the campaign, sensor
@@ -49,6 +49,17 @@ def already_kept(
     row = earlier.row
     sentence = f"{which} in campaign {row.name} of skin {row.skin_id} already (kept {row.received_at[:10]})."
     return sentence, row.id
+
+
+def changes_nothing(connection: Connection, campaign: Campaign, corrects: str | None) -> bool:
+    """Whether the campaign that is corrected says the same already, of the skin and of each recording in its order."""
+    if corrects is None:
+        return False
+    before = campaigns.load(connection, campaigns.find(connection, corrects))
+    if codec.about(before) != codec.about(campaign) or len(before.recordings) != len(campaign.recordings):
+        return False
+    columns = codec.recording_columns
+    return all(columns(old) == columns(new) for old, new in zip(before.recordings, campaign.recordings, strict=True))
 
 
 def otherwise_named(connection: Connection, campaign: Campaign, corrects: str | None) -> str | None:

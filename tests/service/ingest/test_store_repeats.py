@@ -78,6 +78,15 @@ def test_a_twin_counts_once_the_other_is_withdrawn_or_corrected(server: Server) 
     assert points(server, "palm") == [corrected["id"]]
 
 
+def test_a_correction_that_changes_nothing_is_told(server: Server) -> None:
+    day = made("monday")
+    first = post(server, day)["id"]
+    again = post(server, day, corrects=first, reason="E was mistyped")
+    assert again["notes"] == ["it says the same as the campaign that it corrects"]
+    thicker = {**day, "skin": {**day["skin"], "thickness_mm": 1.01 * day["skin"]["thickness_mm"]}}
+    assert post(server, thicker, corrects=again["id"], reason="h was mistyped")["notes"] == []
+
+
 def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) -> None:
     whole = made("whole")
     some = [one for one in whole["recordings"] if one["sensor"] == "s0"][:1]

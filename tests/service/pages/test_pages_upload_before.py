@@ -67,3 +67,6 @@ def test_a_correction_that_names_another_skin_is_offered_the_one_it_corrects(ser
     page = looked_at(server, "right.json", as_json(campaign("right", id="new")), corrects=wrong)
     assert "the file names skin new, not old, that of the campaign that it corrects" in page
     assert 'id="keep-skin" name="skin" list="skins" value="old"' in page
+    assert "nothing would change" not in page
+    page = looked_at(server, "same.json", as_json(campaign("slip", id="old")), corrects=wrong)
+    assert "it says the same as the campaign that it corrects: nothing would change." in page
