@@ -59,6 +59,33 @@ for (const search of document.querySelectorAll("[data-with]")) {
   });
 }
 
+// What was typed into a form that was sent after its session had ended stands in it again after the login. It waits in
+// the tab's own storage, until the next page says whether it was taken.
+const here = () => location.pathname + location.search;
+const fields_of = (form) => [...form.elements].filter(({ name, type }) => name && !["hidden", "file", "password", "submit", "button"].includes(type));
+addEventListener("submit", ({ target: form }) => {
+  if (form.method !== "post" || location.pathname === "/login") return;
+  const values = fields_of(form).map(({ name, type, value, checked }) => [name, /checkbox|radio/.test(type) ? checked : value]);
+  sessionStorage.setItem("sent", JSON.stringify({ page: here(), form: [...document.forms].indexOf(form), values }));
+});
+function typed_again({ page, form, values }) {
+  if (page !== here()) return;
+  sessionStorage.removeItem("unsent");
+  const fields = fields_of(document.forms[form] ?? document.createElement("form"));
+  values.forEach(([name, value], index) => {
+    const field = fields[index];
+    if (field?.name !== name || "submit" in field.dataset) return;
+    field[typeof value === "boolean" ? "checked" : "value"] = value;
+    field.dispatchEvent(new Event("change", { bubbles: true }));
+    field.closest("details")?.setAttribute("open", "");
+  });
+}
+const sent = sessionStorage.getItem("sent");
+sessionStorage.removeItem("sent");
+if (sent && document.querySelector("[data-unsent]")) sessionStorage.setItem("unsent", sent);
+const unsent = sessionStorage.getItem("unsent");
+if (unsent && location.pathname !== "/login") addEventListener("load", () => typed_again(JSON.parse(unsent)));
+
 for (const button of document.querySelectorAll("[data-copy]")) {
   button.addEventListener("click", async () => {
     const text = button.closest(".code").querySelector("code").textContent;

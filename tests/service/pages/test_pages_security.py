@@ -111,6 +111,13 @@ def test_with_keys_pages_need_a_login(browser: Browser, locked: tuple[Server, di
         page.get_by_label("Key").fill(keys["write"])
         page.get_by_role("button", name="Log in").click()
         page.wait_for_url("**/skins/example")  # the page of the form
+        page.wait_for_function("() => document.querySelector('[name=remark]')?.value === 'a scratch'")
+        page.get_by_role("button", name="Save").click()
+        page.get_by_text("a scratch").first.wait_for()
+        page.get_by_text("Name, notes and tags").click()
+        page.get_by_label("Notes").fill("")
+        page.reload()
+        assert page.get_by_label("Notes").input_value() == "a scratch"  # as kept: what was typed comes back once
         (cookie,) = page.context.cookies()
         assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
         page.get_by_role("button", name="Log out").click()
