@@ -149,7 +149,7 @@ def test_a_fork_server_is_kept_ready_for_the_next_job(file_place: Place) -> None
         assert await_workers(server, 1, "underskin-ready") == [ready]
         os.kill(ready, signal.SIGKILL)
         assert is_gone(ready)
-        again = asked(server, sent(server, resonant("again")))
+        again = asked(server, sent(server, campaign("again", sensors=1)))
         assert awaited(server, again)["state"] == "done"
         (last,) = await_workers(server, 1, "underskin-ready")
     assert is_gone(last)
