@@ -115,7 +115,7 @@ def test_a_map_of_curves_that_agree_is_pale_and_its_labels_differ() -> None:
     found = lean_diagnosis(parse(adhesive_curves(0.0)[0]), load_table(), *COSTLY)
     every = figures(found, report(found))
     largest = max(max(one["force_n"]) for one in adhesive_curves(0.0)[0]["recordings"])
-    assert every["before_after"].layout.xaxis.title.text == f"predicted force [{readable_unit('force_n', largest)[0]}]"
+    assert every["before_after"].layout.xaxis.title.text == f"predicted [{readable_unit('force_n', largest)[0]}]"
     drawn = every["where"]
     labels, (cells,) = drawn.layout.xaxis.ticktext, drawn.data
     assert 2 < len(set(labels)) == len(labels) <= 12

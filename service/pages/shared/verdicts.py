@@ -3,7 +3,6 @@
 And the model adopted from one, as pages head it: what it adds, since when and until when, d33 by it beside the paper's.
 """
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -29,7 +28,6 @@ _SAYS = {
     "no_mismatch": "no mismatch found",
     "insufficient_data": "too little data",
 }
-_NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 _BY_A_LAW = "mismatch by a law that nobody listed"
 
 
@@ -140,13 +138,12 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 def _quoted(report: Mapping[str, Any]) -> str:
     """Of a report with a d33; why it may not be quoted is what the report states."""
-    from underskin.diagnosis.reporting.wording import interval, number, readable  # with what draws, which takes long
+    from underskin.diagnosis.reporting.wording import interval, not_quoted, number  # with what draws, which takes long
 
     d33 = report["d33"]
     if d33.get("quotable", True):
         return f"{number(d33['value'])} {d33['unit']} (95 %: {interval(d33)})"
-    said = _NOT_QUOTED.search(report["statement"])
-    return readable(said[1]) if said else f"it lies from {number(d33['low'])} to {number(d33['high'])} {d33['unit']}"
+    return not_quoted(report) or f"it lies from {number(d33['low'])} to {number(d33['high'])} {d33['unit']}"
 
 
 def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mapping[str, Any] | None, str | None]:

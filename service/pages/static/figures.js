@@ -73,6 +73,7 @@ function point_at(id) {
 
 // Where a figure is narrow its legend has a line an entry, of a long name several, which panels one above the other
 // have no room for, and which may be as wide as the figure. Returns how many lines.
+const TOP = 30, OF_TITLE = 60; // pixels above a figure, and those of its title, which stands in the caption instead
 const NARROW = 500, LEGEND_LINE = 19, LONGEST_LINE = 30, RIGHT = 20;
 function in_legend(data, layout, margin) {
   if (!layout.yaxis2 || layout.yaxis2.matches || layout.showlegend === false) return 0;
@@ -99,7 +100,8 @@ async function redraw(plot) {
   const { data, layout } = document_of(plot);
   paint(colours_of({ data, layout }));
   dim_map(data, layout);
-  const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: 30 };
+  const top = Math.max(TOP, (layout.margin?.t ?? 0) - OF_TITLE);
+  const margin = { ...layout.template?.layout?.margin, ...layout.margin, t: top };
   const with_legend = layout.height + (plot.clientWidth < NARROW ? LEGEND_LINE * in_legend(data, layout, margin) : 0);
   const height = fit_map(plot, data, layout, margin, with_legend);
   plot.style.minHeight = `${height}px`;
@@ -131,7 +133,7 @@ DARK.addEventListener("change", () => document.querySelectorAll(".plot[data-draw
 let unfolded = [];
 function in_summary(plot, place) {
   const long = document.querySelector(".report .summary.long") !== null;
-  const height = place ? (long ? 145 : 190) : (long ? 260 : 340);
+  const height = place ? (long ? 145 : 190) : (long ? 260 : 340) + (plot.closest("#figure-curve") ? 50 : 0);
   const margin = { l: 70, r: place ? 50 : 20, t: 10, b: 55 };
   return on_sheet(plot, { width: place ? SHEET / 2 - 5 : SHEET, height, margin });
 }

@@ -71,7 +71,7 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
         font={"size": 14, "color": "#222222"},
         height=height,
         margin={"t": 80, "b": 130},
-        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
+        legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "tracegroupgap": 0},
     )
     if len(drawings) > 1:
         figure.update_layout(updatemenus=[_menu(drawings)])

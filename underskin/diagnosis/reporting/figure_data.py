@@ -39,7 +39,7 @@ class Points:
     measured: Complexes  # (points,)
     predicted: Complexes  # (points,)
     deviation: Floats  # (points,) of real and of imaginary part
-    gain: float  # sd of a recording's and of its sensor's gain
+    gain: float  # sd of a recording's gain; that of its sensor is in what is predicted
 
     @property
     def residual_percent(self) -> Complexes:
@@ -112,7 +112,7 @@ class Thinned:
             measured=unit * self._complex_mean(lines.value),
             predicted=unit * self._complex_mean(predicted),
             deviation=unit * np.sqrt(variance),
-            gain=float(np.hypot(levels.gain, levels.spread)),
+            gain=float(levels.gain),
         )
 
     def levels(self, axis: str) -> Levels | None:

@@ -5,6 +5,7 @@ to orange, which colour-blind people tell apart; lab units.
 
 from collections.abc import Mapping, Sequence
 from html import escape
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from underskin.units import Floats, readable_unit
 _GREY = "#BBBBBB"
 _MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, that show their number
 _CELL = 10  # pixels, of those numbers: 7.5 points on paper
+_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters on a line; pixels of a letter and of a line
 _ABOVE_NOISE = 2.0  # times what 95 % of the noise stays in: as far the colours of a map reach at least
 _BAND = 60  # points along a band
 _LABEL = 24  # characters on a line of a label
@@ -174,18 +176,16 @@ def before_and_after(
     diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
     """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
-    figure = make_subplots(
-        1,
-        2,
-        subplot_titles=(f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"),
-        horizontal_spacing=0.12,
-    )
+    called = f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"
+    titles = ["<br>".join(wrap(title, _TITLE)) for title in called]
+    figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.12)
+    further = _TITLE_LINE * max(title.count("<br>") for title in titles)
     _, name = _part(diagnosis, before.measured)
-    unit = f"FRF, {name} [pC/N]"
+    what, unit = f"FRF, {name} ", "pC/N"
     if thinned.lines.curves:
         largest = max(float(np.abs(points.measured).max()) for points in (before, after))
         readable, per_n = readable_unit("force_n", largest)
-        unit, before, after = f"force [{readable}]", before.times(per_n), after.times(per_n)
+        what, unit, before, after = "force ", readable, before.times(per_n), after.times(per_n)
     both = np.concatenate([column for points in (before, after) for column in (points.predicted, points.measured)])
     shown_part = _part(diagnosis, both)[0]
     room = _EDGE * float(np.ptp(shown_part))
@@ -226,17 +226,18 @@ def before_and_after(
             row=1,
             col=place,
         )
-    figure.update_xaxes(title=f"predicted {unit}", range=whole)
-    figure.update_yaxes(title=f"measured {unit}", col=1)
+    figure.update_xaxes(title=f"predicted [{unit}]", title_font_size=_TITLE_SIZE, range=whole)
+    figure.update_yaxes(title=f"measured {what}[{unit}]", title_font_size=_TITLE_SIZE, col=1)
     for place in (1, 2):
         figure.update_yaxes(range=whole, scaleanchor=f"x{place}", constrain="domain", row=1, col=place)
         figure.update_xaxes(constrain="domain", row=1, col=place)
     figure.update_layout(
         title="Measured against predicted",
-        height=470,
-        margin={"t": 90, "b": 100},
+        height=470 + further,
+        margin={"t": 90 + further, "b": 100},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
     )
+    figure.update_annotations(font_size=_TITLE_SIZE)
     return styled(figure)
 
 

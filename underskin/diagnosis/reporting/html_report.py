@@ -45,12 +45,22 @@ const steps = ["Previous", "Next"].map((text, index) => {
 list.addEventListener("change", show);
 steps[0].disabled = true;
 Plotly.relayout(plot, {"updatemenus[0].visible": false});
-plot.parentElement.before(label, " ", steps[0], " ", steps[1]); // outside of the box that has the height of the figure
+plot.before(label, " ", steps[0], " ", steps[1]);
+plot.style.height = `${plot.layout.height}px`;
+plot.parentElement.style.height = "auto"; // its box has the height of the figure alone
 """  # stands in for a figure's own menu, which only a pointer can open
 
 _FILTERS = (
     *(wording.axis, wording.columns, wording.error, wording.finding, wording.group, wording.interval, wording.number),
-    *(wording.plain, wording.quantity, wording.readable, wording.unit, wording.words, wording.law_range),
+    *(
+        wording.not_quoted,
+        wording.plain,
+        wording.quantity,
+        wording.readable,
+        wording.unit,
+        wording.words,
+        wording.law_range,
+    ),
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 

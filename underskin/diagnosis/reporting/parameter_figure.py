@@ -40,13 +40,14 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
             marker={"color": MEASURED, "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=place, col=1,
         )  # fmt: skip
         beside = _BESIDE * (high - low) or 0.1 * abs(low) or 1.0
-        figure.update_xaxes(range=[low - beside, high + beside], row=place, col=1)
+        left = low - beside if low < 0 else max(low - beside, 0.0)  # what is positive stays so
+        figure.update_xaxes(range=[left, high + beside], row=place, col=1)
     figure.update_yaxes(visible=False, range=[-1, 1])
     figure.update_layout(
         title="What the recordings say of the parameters",
-        height=190 + _ROW * len(rows),
+        height=200 + _ROW * len(rows),
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
-        margin={"t": 100, "b": 90},
+        margin={"t": 110, "b": 90},
     )
     return styled(figure)
 

@@ -45,6 +45,8 @@ _FINDINGS = {
 }  # by code; the other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
 
+_NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
+
 
 def readable(text: str) -> str:
     """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance.
@@ -107,6 +109,12 @@ def error(value: float | None) -> str:
 def interval(entry: Mapping[str, Any]) -> str:
     """From low to high."""
     return f"{number(entry['low'])} to {number(entry['high'])}"
+
+
+def not_quoted(report: Mapping[str, Any]) -> str:
+    """Where its d33 lies and why it is not to be quoted, as the report states it; empty where that is not stated."""
+    said = _NOT_QUOTED.search(report["statement"])
+    return readable(said[1]) if said else ""
 
 
 def unit(label: str) -> str:
