@@ -221,7 +221,8 @@ class MappedBlock:
             together = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
         if together < 0:
             reason = "force falls as the displacement grows, and compression is positive here"
-            how = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            signs_said = Mention("sign", "sign: 1, -1 or auto")
+            how = (signs_said, " for ", Mention("displacement_mm"), " and ", Mention("force_n"))
             doubt = ""
             depth = self.rig.channels["displacement_mm"].channel
             formula = self.rig.derived.get(depth)
@@ -230,7 +231,7 @@ class MappedBlock:
                 raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}{self._also_used(depth)}")
             if self.rig.channels["displacement_mm"].deflection is not None:
                 doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
-            raise self._error("channels", Requirement(f"{reason}: say sign: 1, -1 or auto for ", *how, doubt))
+            raise self._error("channels", Requirement(f"{reason}: say ", *how, doubt))
 
     def _also_used(self, derived: str) -> str:
         """In words, each channel of a formula that others use too, and these."""

@@ -15,6 +15,7 @@ _WORDS = {
     spring_mapping.SPRING: "spring constant [N/m]",
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*SKIN, *RECORDING)},
     "sensors": "layout",
+    "sign": "“automatic” as the sign",
     RATE: "sample rate [Hz]",
     **workbench.WORDS,
 }

@@ -154,6 +154,15 @@ def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])
 
 
+def test_a_force_that_falls_is_told_in_the_words_of_the_form(client: httpx.Client) -> None:
+    upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": -FORCE_UN}))
+    upload.say(indenter_radius_mm="0.0075", units_checked="yes")
+    told = "compression is positive here: say “automatic” as the sign for displacement and force"
+    assert told in html.unescape(upload.page)
+    upload.say(units_checked="yes", **{f"sign-{number}": "auto" for number in range(2)})
+    assert "<b>1</b> recording understood" in upload.page
+
+
 def test_a_formula_that_is_cleared_gives_way_to_the_guess(client: httpx.Client) -> None:
     raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
     upload = Upload(client, table(raw, "k (N/m)\t3"))
