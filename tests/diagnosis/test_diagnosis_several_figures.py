@@ -101,6 +101,8 @@ def test_the_page_of_several_says_what_each_was_alone_and_that_nothing_is_planne
         assert "Each campaign's own diagnosis says what to measure next" in shown
         assert [one[key] for one in document["provenance"]["each"] if f"{escape(one[key])} alone: " not in shown] == []
         assert "&#39;verdict&#39;" not in shown  # no notation of the code
+    rival = {"mechanisms": ["adhesion"], "probability": 0.1, "why_not": "May: adhesion; June: nothing missing"}
+    assert "what acts in each campaign" in page({**together, "alternatives": [rival]}, {})
 
 
 def test_an_answer_that_is_not_sure_is_not_called_decided(together: dict[str, Any]) -> None:
