@@ -8,11 +8,11 @@ import pytest
 
 from tests.support.adhesive_curves import adhesive_curves
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.lean_reports import COSTLY, lean_diagnosis
+from tests.support.lean_reports import BESIDE_SKINS, COSTLY, lean_diagnosis
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.figures import explanations, figures
 from underskin.diagnosis.reporting.report import DiagnosisResult, report
-from underskin.recordings.campaign import Campaign, parse
+from underskin.recordings.campaign import Campaign, FrfRecording, parse
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import readable_unit
 
@@ -124,3 +124,16 @@ def test_a_map_of_curves_that_agree_is_pale_and_its_labels_differ() -> None:
     assert cells.zmax >= 2 * drawn.layout.meta["noise_percent"] > 0
     assert np.abs(np.asarray(cells.z, dtype=float)).max() < 0.5 * cells.zmax
     assert set(np.ravel(cells.text)) == {"0"}
+
+
+@pytest.mark.slow
+def test_the_noise_of_points_is_without_what_sensors_differ_by() -> None:
+    made = campaign(Made(sensors=3, preloads_n=(0.5, 2.0)), load_table())
+    weak = [
+        replace(one, frf_re_pc_per_n=0.7 * one.frf_re_pc_per_n) if one.sensor == "s2" else one
+        for one in made.recordings
+        if isinstance(one, FrfRecording) and one.frf_re_pc_per_n is not None
+    ]
+    found = lean_diagnosis(replace(made, recordings=tuple(weak)), load_table(), *BESIDE_SKINS)
+    noise_percent = figures(found, report(found))["where"].layout.meta["noise_percent"]
+    assert 2 < noise_percent < 8  # 1.96 times a gain's 2 % and a line's 1 %; sensors differ by 16 %
