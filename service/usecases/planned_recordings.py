@@ -35,8 +35,9 @@ def arrived(connection: Connection, diagnosis: AnyRow, planned: Sequence[Mapping
     for number, recorded in connection.execute(query.order_by(recordings.c.campaign, recordings.c.position)):
         off_centre_mm = _off_centre_mm(recorded, places[number])
         for place, entry in enumerate(planned):
-            near = np.hypot(*(off_centre_mm - _off_centre_mm(entry, own))) <= _NEAR_MM
-            if counts[place] < entry["repeats"] and near and _is_planned(recorded, entry):
+            if counts[place] == entry["repeats"] or entry["sensor"] not in own or not _is_planned(recorded, entry):
+                continue
+            if np.hypot(*(off_centre_mm - _off_centre_mm(entry, own))) <= _NEAR_MM:
                 counts[place] += 1
                 break
     return counts

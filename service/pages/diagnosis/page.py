@@ -1,11 +1,11 @@
 """A diagnosis: asked for, watched while it runs, read, saved, adopted."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from urllib.parse import quote
 
 import orjson
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Path, Request, Response
 from jinja2 import UndefinedError
 from markupsafe import Markup
 from sqlalchemy import Connection
@@ -14,6 +14,7 @@ from service.dependencies import WRITE, CampaignId, DiagnosisId, RunnerInUse, St
 from service.pages.diagnosis.array import shown_array
 from service.pages.diagnosis.figure_columns import columns
 from service.pages.diagnosis.plan import FIELDS, left_open
+from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request, verdicts
 from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, drawn_before
 from service.pages.shared.forms import OWN_FORM, Form, see
@@ -85,6 +86,7 @@ def diagnosis(
         members = diagnoses.members(connection, row)
     alone = row.kind == "campaign"
     not_adopted = None if report is None or not alone else _not_adopted(report)
+    planned = _planned(store, row, report) if report is not None and alone else []
     place = f"/v1/diagnoses/{row.id}"
     return page(
         request,
@@ -102,6 +104,8 @@ def diagnosis(
         may_be_adopted=alone and report is not None and not_adopted is None,
         open=alone and report is not None and "curve" not in figures and left_open(report),
         limit_fields=FIELDS,
+        planned=planned,
+        heads=heads(planned),
         without=in_words(diagnoses.without(row)),
         without_names=" ".join(diagnoses.without(row)),
         supposed=[] if report is None else _supposed(report, diagnoses.without(row)),
@@ -139,6 +143,13 @@ def planned_csv(diagnosis_id: DiagnosisId, store: Store) -> Response:
     return csv_answer(f"{row.id}-plan", planned_columns(planned))
 
 
+@router.get("/diagnoses/{diagnosis_id}/planned/{number}/rig.yaml")
+def planned_rig(diagnosis_id: DiagnosisId, number: Annotated[int, Path(ge=1)], store: Store) -> Response:
+    """The rig description of one of them, with which its file can be sent."""
+    row, report, _ = _done(store, diagnosis_id)
+    return rig_answer(store, row, _planned(store, row, report), number)
+
+
 @router.get("/diagnoses/{diagnosis_id}/{figure}.csv")
 def numbers_csv(diagnosis_id: DiagnosisId, figure: str, store: Store) -> Response:
     """The numbers of a figure."""
@@ -166,6 +177,13 @@ def adopt(request: Request, diagnosis_id: DiagnosisId, store: Store) -> Response
         skin = diagnoses.find(connection, diagnosis_id).skin_id
         model = adopt_model(connection, skin, diagnosis_id, sender(request))
     return see(f"/skins/{quote(model.model_skin_id, safe='')}?model=adopted")
+
+
+def _planned(store: Database, row: AnyRow, report: Mapping[str, Any]) -> list[PlannedRow]:
+    try:
+        return planned_rows(store, row, report["next_experiment"])
+    except _ODD:
+        _cannot_be_shown(row)
 
 
 def _supposed(report: Mapping[str, Any], without: Sequence[str]) -> list[tuple[str, str]]:

@@ -1,23 +1,21 @@
 """What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
-import yaml
 from fastapi import APIRouter, Path, Request, Response
 from fastapi.responses import JSONResponse
 
 from service.dependencies import DiagnosisId, PlannerInUse, Store
 from service.jobs.planner import Planned, Planner
+from service.pages.diagnosis.planned import PlannedRow, heads, planned_rows, rig_answer
 from service.pages.shared import same_request
-from service.pages.shared.figures import attachment, csv_of_rows, file_name
+from service.pages.shared.figures import csv_of_rows, file_name
 from service.pages.shared.forms import in_form_words, number, numbers
 from service.pages.shared.html import page
 from service.problems import Refusal
 from service.store import AnyRow, Database, campaigns, diagnoses
-from service.usecases import planned_recordings
-from underskin.diagnosis.reporting.wording import axis, in_a_cell, readable
+from underskin.diagnosis.reporting.wording import in_a_cell, readable
 from underskin.errors import UnderskinError, out_of_range, required
 
 if TYPE_CHECKING:
@@ -41,9 +39,6 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
-_HEADS = {
-    "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
-}  # fmt: skip
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
@@ -69,7 +64,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
         limits = _limits(request.query_params)
         same = _same(request, row.campaign_id, limits)
         planned = planner.plan(row, _checked(limits))
-        rows = _rows(store, row, planned.plan or {})
+        rows = planned_rows(store, row, planned.plan)
     except UnderskinError as wrong:
         error = in_form_words(wrong, _LABELS)
     except Refusal as busy:
@@ -86,7 +81,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
         error=error,
         planned=planned,
         statement=None if planned is None or not planned.plan else readable(planned.plan["statement"]),
-        axes={name: _HEADS.get(name) or axis(name) for one in rows for name in one.values},
+        heads=heads(rows),
         rows=rows,
         query=request.url.query,
         same=same,
@@ -96,7 +91,7 @@ def plan(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, sto
 @router.get("/recordings.csv")
 def recordings_csv(request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store) -> Response:
     """The planned recordings, a row each, and how many of each have arrived."""
-    rows = _planned_rows(request, diagnosis_id, planner, store)
+    rows = _rows_of_address(request, diagnosis_id, planner, store)
     names = list(dict.fromkeys(name for one in rows for name in one.values))
     told = [{name: in_a_cell(value) for name, value in one.values.items()} for one in rows]
     counts = [{"repeats": one.repeats, "arrived": one.arrived} for one in rows]
@@ -110,48 +105,17 @@ def rig_yaml(
     request: Request, diagnosis_id: DiagnosisId, planner: PlannerInUse, store: Store, number: Annotated[int, Path(ge=1)]
 ) -> Response:
     """The rig description of one planned recording, with which its file can be sent."""
-    rows = _planned_rows(request, diagnosis_id, planner, store)
-    if number > len(rows):
-        raise Refusal(404, f"The plan has {len(rows)} recordings.")
-    with store.reading() as connection:
-        campaign = campaigns.find(connection, diagnoses.find(connection, diagnosis_id).campaign_id)
-        document = planned_recordings.rig_description(connection, campaign, rows[number - 1].values)
-    content = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
-    return attachment(f"rig-{number}.yaml", content, "application/yaml")
+    rows = _rows_of_address(request, diagnosis_id, planner, store)
+    return rig_answer(store, _diagnosed(store, diagnosis_id)[0], rows, number)
 
 
-@dataclass(frozen=True)
-class PlannedRow:
-    """A planned recording: its conditions by field, how often it is to be made, and how many have arrived."""
-
-    values: Mapping[str, Any]
-    repeats: int
-    arrived: int
-
-    @property
-    def complete(self) -> bool:
-        """Whether all are there."""
-        return self.arrived >= self.repeats
-
-
-def _planned_rows(request: Request, diagnosis_id: str, planner: Planner, store: Database) -> list[PlannedRow]:
+def _rows_of_address(request: Request, diagnosis_id: str, planner: Planner, store: Database) -> list[PlannedRow]:
     """Those of the limits in the address, once they are planned."""
     row, _ = _diagnosed(store, diagnosis_id)
     planned = planner.plan(row, _checked(_limits(request.query_params)))
     if planned.state != "done":
         raise Refusal(409, f"The plan is not there yet: its state is {planned.state}.")
-    return _rows(store, row, planned.plan or {})
-
-
-def _rows(store: Database, row: AnyRow, plan: Mapping[str, Any]) -> list[PlannedRow]:
-    entries = plan.get("recordings", [])
-    counts = store.read(planned_recordings.arrived, row, entries)
-    return [
-        PlannedRow(
-            {name: value for name, value in entry.items() if name != "repeats" and value != []}, entry["repeats"], count
-        )
-        for entry, count in zip(entries, counts, strict=True)
-    ]
+    return planned_rows(store, row, planned.plan)
 
 
 @router.get("/progress")

@@ -19,6 +19,7 @@ from tests.support.store_server import Server
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.wording import readable
+from underskin.recordings import rig_description
 from underskin.recordings.campaign import to_dict
 
 LIMITS = RigLimits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
@@ -126,6 +127,12 @@ def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, 
     found = {**report(), "verdict": "ambiguous", "next_experiment": planned}
     _, diagnosis_id = diagnosed(idle, resonant("planned"), found, "planned")
     reader.go(f"/diagnoses/{diagnosis_id}")
+    own = reader.page.get_by_role("region", name="The planned recordings, as they arrive")
+    assert own.locator("tbody tr").count() == 2
+    with reader.page.expect_download() as saving:
+        own.get_by_role("link", name="YAML of recording 1").click()
+    assert rig_description.parse(saving.value.path().read_bytes(), "rig.yaml").recording["preload_n"] == 3.0
+    assert reader.page.request.get(f"{reader.page.url}/planned/3/rig.yaml").status == 404
     reader.page.get_by_text("What to measure next").click()
     tables: dict[str, list[tuple[object, ...]]] = {}
     for kind in ("CSV", "XLSX"):

@@ -1,0 +1,60 @@
+"""Planned recordings as pages have them: the conditions of each, how many have arrived, its rig description."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+from fastapi import Response
+
+from service.pages.shared.figures import attachment
+from service.problems import Refusal
+from service.store import AnyRow, Database, campaigns
+from service.usecases import planned_recordings
+from underskin.diagnosis.reporting.wording import axis
+
+_HEADS = {
+    "indenter_radius_mm": "sphere radius [mm]", "position_mm": "place x, y [mm]", "dwell_s": "hold [s]",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PlannedRow:
+    """A planned recording: its conditions by field, how often it is to be made, and how many have arrived."""
+
+    values: Mapping[str, Any]
+    repeats: int
+    arrived: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether all are there."""
+        return self.arrived >= self.repeats
+
+
+def planned_rows(store: Database, row: AnyRow, plan: Mapping[str, Any] | None) -> list[PlannedRow]:
+    """Those of a plan after the diagnosis `row`."""
+    entries = (plan or {}).get("recordings", [])
+    counts = store.read(planned_recordings.arrived, row, entries)
+    return [
+        PlannedRow(
+            {name: value for name, value in entry.items() if name != "repeats" and value != []}, entry["repeats"], count
+        )
+        for entry, count in zip(entries, counts, strict=True)
+    ]
+
+
+def heads(rows: Sequence[PlannedRow]) -> dict[str, str]:
+    """Of a table of them, the heading of each condition."""
+    return {name: _HEADS.get(name) or axis(name) for one in rows for name in one.values}
+
+
+def rig_answer(store: Database, row: AnyRow, rows: Sequence[PlannedRow], number: int) -> Response:
+    """The rig description of the planned recording `number`, counted from 1, with which its file can be sent."""
+    if number > len(rows):
+        raise Refusal(404, f"The plan has {len(rows)} recordings.")
+    with store.reading() as connection:
+        campaign = campaigns.find(connection, row.campaign_id)
+        document = planned_recordings.rig_description(connection, campaign, rows[number - 1].values)
+    content = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+    return attachment(f"rig-{number}.yaml", content, "application/yaml")
