@@ -157,12 +157,13 @@ def test_it_needs_nothing_from_outside(text: str) -> None:
     assert "http" not in policy
 
 
-def drawn_by_a_browser(text: str, folder: Path) -> str:
-    """The document of a page after its scripts have run."""
+def drawn_by_a_browser(text: str, folder: Path, width: int = 1280) -> str:
+    """The document of a page after its scripts have run, in a window of that many pixels."""
     assert CHROMIUM is not None
     file = folder / "page.html"
     file.write_text(text, encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
+    options.append(f"--window-size={width},844")
     command = [CHROMIUM, *options, f"--user-data-dir={folder / 'profile'}", file.as_uri()]
     return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
 
@@ -175,6 +176,19 @@ def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
         part = drawn[drawn.index(f'id="figure-{name}"') :]
         assert "main-svg" in part[: part.index("</script>")]
     assert "<img src=x" not in drawn
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+def test_titles_of_figures_are_seen_whole_in_a_narrow_window(text: str, tmp_path: Path) -> None:
+    look = "const right = (one) => one.getBoundingClientRect().right, wide = document.documentElement.clientWidth;"
+    look += "const titles = [...document.querySelectorAll('.summary .gtitle')].map(right);"
+    look += "document.title = JSON.stringify([wide, titles]);"
+    script = f"<script>addEventListener('load', () => setTimeout(() => {{{look}}}, 2000))</script></html>"
+    shown = drawn_by_a_browser(text.replace("</html>", script), tmp_path, width=500)
+    wide, titles = json.loads(re.findall("<title>(.*?)</title>", shown)[0])
+    assert len(titles) >= 3
+    assert max(titles) <= wide
 
 
 @pytest.mark.browser
