@@ -30,9 +30,9 @@ async function answer() {
   refused.textContent = design.error ?? "";
   // What was told before stands greyed beside an error: it is of other values.
   for (const part of document.querySelectorAll(".results, figure.drawn, [data-compared]")) part.classList.toggle("old", Boolean(design.error));
+  outside.hidden = Boolean(design.error) || !design.outside;
   if (design.error) return;
   if (!document.querySelector("[data-result]")) return void location.assign(`/design?${query}`); // it opened with an error
-  outside.hidden = !design.outside;
   outside.querySelector("span").textContent = design.outside ?? "";
   history.replaceState(null, "", `/design?${query}`);
   document.querySelector("[data-query]").search = query;
