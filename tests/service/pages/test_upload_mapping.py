@@ -193,6 +193,15 @@ def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
     assert found["channels"] == {"force_n": {"channel": "a"}}
 
 
+def test_values_are_checked_before_a_file_is_read_and_those_that_a_file_states_are_not() -> None:
+    typed = {"kind": "frf", "poisson_ratio": "", "preload_n": "0.0001", "indenter_radius_mm": "", "dynamic_force_n": ""}
+    stated = {"indenter_radius_mm-from": "R"}
+    (unlikely,) = document_of({**typed, **stated}, {})[1]
+    assert (unlikely.field, unlikely.value) == ("recording.preload_n", 0.0001)
+    assert document_of({**typed, **stated, "units_checked": "yes"}, {})[1] == []
+    assert document_of({**typed, "kind": "indentation"}, {})[1] == []  # which has no preload
+
+
 @pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])
 def test_a_layout_is_written_as_people_write_it(line: str) -> None:
     found, wrong = document_of({"sensors": line}, {})
