@@ -20,6 +20,8 @@ _WORDS = {
     **workbench.WORDS,
 }
 
+_OF_CHANNEL = {"unit": "true unit", "sensitivity": "sensitivity", "sensitivity_unit": "unit of the sensitivity"}
+
 Error = Mapping[str, Any]
 Channels = Sequence[ChannelSummary]  # of the file with the error: the form is for one that has any
 
@@ -28,6 +30,9 @@ def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
     if field.startswith("derived."):
         return f"formula of {field.removeprefix('derived.')}"
+    place, _, of_channel = field.removeprefix("channels.").partition(".")
+    if place in CHOICES and of_channel in _OF_CHANNEL:
+        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[place]}"
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 

@@ -122,6 +122,7 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
 
 def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
+    assert field_words("channels.charge_pc.sensitivity") == "sensitivity of the charge"
     channels = [channel("force", "N")]
     missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
     assert what_to_do(missing, channels) == "required: say below which channel it is"
