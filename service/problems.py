@@ -11,6 +11,7 @@ import orjson
 from pydantic import BaseModel, Field, ValidationError
 
 from underskin.errors import ErrorCode, InvalidInput
+from underskin.several_errors import SeveralInvalid
 
 _MOST_LOGGED = 3
 RETRY_LATER = {"Retry-After": "5"}  # seconds
@@ -173,11 +174,11 @@ def validated(kind: type[_Model], document: Any) -> _Model:
 
 
 def parsed(kind: type[_Model], document: Any) -> _Model:
-    """The model of a document; raises InvalidInput with the first that is wrong."""
+    """The model of a document; raises SeveralInvalid with all that is wrong."""
     try:
         return kind.model_validate(document)
     except ValidationError as error:
-        raise _shortened(_as_invalid_input(error.errors(include_url=False)[0])) from None
+        raise SeveralInvalid([_shortened(one) for one in _listed(error)]) from None
 
 
 # Of pydantic's errors the code and, where a lab's words are clearer than pydantic's, those.

@@ -20,11 +20,15 @@ def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
     skin = Skin.from_lab(**given, units_checked=asked.units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=asked.indenter_radius_mm, units_checked=asked.units_checked)
     preload = float(checked("preload_n", asked.preload_n, units_checked=asked.units_checked))
-    pitch = asked.pitch_mm * 1e-3
-    if pitch < 2 * float(skin.sensor_radius):
-        allowed = f"must be at least {2 * asked.sensor_radius_mm:g} mm, the diameter of a sensor: they cannot overlap"
-        raise out_of_range("pitch_mm", asked.pitch_mm, allowed)
-    return design(table, skin, indenter, preload, pitch, asked.dip_percent / 100)
+    require_apart(asked.pitch_mm, asked.sensor_radius_mm)
+    return design(table, skin, indenter, preload, asked.pitch_mm * 1e-3, asked.dip_percent / 100)
+
+
+def require_apart(pitch_mm: float, sensor_radius_mm: float) -> None:
+    """Raises InvalidInput where sensors would overlap."""
+    if pitch_mm < 2 * sensor_radius_mm:
+        allowed = f"must be at least {2 * sensor_radius_mm:g} mm, the diameter of a sensor: they cannot overlap"
+        raise out_of_range("pitch_mm", pitch_mm, allowed)
 
 
 def design_answer(table: SigmaTable, asked: DesignRequest, designed: Design) -> DesignAnswer:

@@ -13,7 +13,7 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.two_point import largest_pitch
+from service.usecases.two_point import largest_pitch, separation
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.surrogate.off_centre_sigma import sigma_beside
@@ -24,14 +24,15 @@ THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within t
 _THICKNESSES, _RADII = 8, 6
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
-_CANDIDATES = 3  # of each merit that are calculated in full
-_FINER, _TIMES = 0.995, 6  # beyond what it misses by, and how often, a pitch is reduced until it meets the demand
+# Beyond what it misses by, by how much at most in a step, and how often, a pitch is reduced until it meets the demand.
+_FINER, _STEP, _TIMES = 0.995, 0.95, 8
 
 
 @dataclass(frozen=True)
 class Region:
-    """Contact radius [mm], thicknesses (n,) and sensor radii (m,) [mm]; of each pair (m, n) the largest pitch [mm] that
-    resolves what is asked, NaN where none does, and charge over force [pC/N], NaN outside the table."""
+    """Contact radius [mm], thicknesses (n,) and sensor radii (m,) [mm]; of each pair (m, n) the largest pitch [mm], to
+    about 5 %, that resolves what is asked by the calculation of `POST /v1/design`, NaN where none does, and charge over
+    force [pC/N], NaN outside the table."""
 
     contact_radius_mm: float
     thickness_mm: Floats
@@ -86,16 +87,35 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
     reached = transmission(table, skin, indenter, force)
     pitch = np.full(h.shape, np.nan)
-    distance = float(to_si("x_mm", demand.resolution_mm))
     if demand.resolution_mm >= 2 * contact:
-        for place in zip(*np.nonzero(reached.inside & (2 * radius <= distance / 2)), strict=True):
+        for place in zip(*np.nonzero(reached.inside & (4 * radii[:, None] <= demand.resolution_mm)), strict=True):
             point = [float(part[place]) for part in (reached.a_over_h, reached.rt_over_h, reached.load_parameter)]
             offset, response = sigma_beside(table, *point)
             if np.isfinite(response).all():
-                finest, dip = 2 * float(radius[place]), demand.dip_percent / 100
-                pitch[place] = largest_pitch(offset * float(h[place]), response, distance, finest, dip)
-    frf, largest = to_lab("frf_pc_per_n", reached.frf(d33)), to_lab("x_mm", pitch)
-    return Region(contact, thickness, radii, np.asarray(largest), np.asarray(frf))
+                finest = 2 * float(radii[place[0]])
+                pitch[place] = _largest_pitch_mm(offset * float(h[place]), response, finest, contact, demand)
+    return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
+
+
+def _largest_pitch_mm(
+    offset: Floats, response: Floats, finest_mm: float, contact_mm: float, demand: DesignDemand
+) -> float:
+    """From `finest_mm` on, in steps of 0.01 mm: what few placements and distances say, reduced until all those of
+    `POST /v1/design` say the same; NaN where nothing nearby does. `offset`: in m."""
+    distance, finest, touching = (
+        float(to_si("x_mm", value)) for value in (demand.resolution_mm, finest_mm, 2 * contact_mm)
+    )
+    dip = demand.dip_percent / 100
+    pitch = float(to_lab("x_mm", largest_pitch(offset, response, distance, finest, dip)))
+    for _ in range(_TIMES):
+        pitch = float(np.floor(100 * pitch) / 100)
+        if not pitch >= finest_mm:
+            break
+        apart = float(to_lab("x_mm", separation(offset, response, pitch * 1e-3, touching, dip)))
+        if apart <= demand.resolution_mm:
+            return pitch
+        pitch *= float(np.fmax(_STEP, _FINER * demand.resolution_mm / apart))
+    return float("nan")
 
 
 def _steps(low: float, high: float, most: float, count: int) -> Floats:
@@ -181,31 +201,20 @@ def _offers(table: SigmaTable, demand: DesignDemand, region: Region, feasible: M
     merits = {"fewest sensors": few, "strongest signal": frf, "thickest layer": thickness + 1e-9 * frf}
     offers: list[Offer] = []
     for merit, value in merits.items():
-        order = [place for place in np.argsort(-value, axis=None).tolist() if feasible.flat[place]][:_CANDIDATES]
-        made = next((one for place in order if (one := _offer(table, demand, region, place, merit)) is not None), None)
-        same = [place for place, one in enumerate(offers) if made is not None and one.request == made.request]
-        if made is not None and not same:
+        made = _offer(table, demand, region, int(np.argmax(value)), merit)
+        same = [place for place, one in enumerate(offers) if one.request == made.request]
+        if not same:
             offers.append(made)
         for place in same:
             offers[place] = replace(offers[place], merit=f"{offers[place].merit}, {merit}")
     return offers
 
 
-def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, merit: str) -> Offer | None:
-    """One pair with a pitch at which `POST /v1/design` says that the demand is met; None where there is none nearby."""
+def _offer(table: SigmaTable, demand: DesignDemand, region: Region, place: int, merit: str) -> Offer:
+    """One pair at its largest pitch, as `POST /v1/design` has it."""
     row, column = np.unravel_index(place, region.largest_pitch_mm.shape)
     thickness, radius = float(region.thickness_mm[column]), float(region.sensor_radius_mm[row])
-    pitch = float(region.largest_pitch_mm[row, column])
-    for _ in range(_TIMES):
-        pitch = float(np.floor(100 * pitch) / 100)
-        if pitch < max(2 * radius, demand.least_pitch_mm):
-            return None
-        request, answer = _forward(table, demand, thickness, radius, pitch)
-        apart = answer.two_point_separation_mm
-        if apart is not None and apart <= demand.resolution_mm:
-            return Offer(merit, request, answer)
-        pitch *= _FINER * (1.0 if apart is None else demand.resolution_mm / apart)
-    return None
+    return Offer(merit, *_forward(table, demand, thickness, radius, float(region.largest_pitch_mm[row, column])))
 
 
 def _forward(

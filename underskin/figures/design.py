@@ -76,7 +76,7 @@ def array_response(design: Design, pitch_mm: float, beside: Pinned | None = None
     half = 1e3 * design.resolution.width / 2
     if np.isfinite(half):
         figure.add_scatter(
-            x=[-half, half], y=[50, 50], mode="lines+markers", name=f"resolution {2 * half:.3g} mm",
+            x=[-half, half], y=[50, 50], mode="lines+markers", name=f"response width {2 * half:.3g} mm",
             line={"color": COLOURS[6], "width": 2}, marker={"symbol": "line-ns-open", "size": 12},
             hoverinfo="name",
         )  # fmt: skip

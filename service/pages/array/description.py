@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,15 @@ from fastapi import Request
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, label_of, number
 from service.pages.shared.skin_values import FIELDS, UNITS, shown
+from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, told_together, wrong_fields
 from service.store import Database, campaigns, skins
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, answer
 from underskin.array_stress.request import read_request
-from underskin.errors import UnderskinError, out_of_range, wrong_type
+from underskin.errors import InvalidInput, UnderskinError, out_of_range, wrong_type
 from underskin.findings.codes import Reason
+from underskin.recordings.validation import not_negative
+from underskin.several_errors import all_of, noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 _MOST_SENSORS = 10_000
@@ -24,6 +28,7 @@ _KNOWN_TO, _ADDED_PERCENT = 0.1, 3
 GRID = (("columns", "sensors along x", ""), ("rows", "sensors along y", ""), ("pitch_mm", "pitch", "mm"))
 _DEFAULTS = {"columns": "4", "rows": "4", "pitch_mm": "8"}
 GLUE = "glue_stiffness"
+LOAD = "load in line"  # as errors call one of the loads, with its number
 _LABELS = {
     **{name: f"{words} [{unit}]" if unit else words for name, words, unit, *_ in (*FIELDS, *GRID)},
     GLUE: "glue line, κ",
@@ -49,15 +54,18 @@ class Described:
         return FIELDS if self.sensors is not None else (*FIELDS, *GRID)
 
     def document(self) -> dict[str, Any]:
-        """The request without its loads; raises InvalidInput."""
-        numbers = {name: number(name, self.values[name]) for name, *_ in self.fields}
-        document: dict[str, Any] = {name: numbers[name] for name, *_ in FIELDS}
-        if self.glue.strip():
-            document[GLUE] = number(GLUE, self.glue)
-        if self.units_checked:
-            document[UNITS] = True
-        document["sensors"] = list(_grid(numbers) if self.sensors is None else self.sensors)
-        return document
+        """The request without its loads; raises SeveralInvalid."""
+        with told_together() as wrong:
+            document: dict[str, Any] = {}
+            with noting(wrong):
+                document |= quantities(self.values, [name for name, *_ in FIELDS], units_checked=self.units_checked)
+            if self.glue.strip():
+                with noting(wrong):
+                    document[GLUE] = not_negative(GLUE, number(GLUE, self.glue), self.units_checked)
+            if self.units_checked:
+                document[UNITS] = True
+            document["sensors"] = _grid(self.values) if self.sensors is None else list(self.sensors)
+            return document
 
 
 def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin_id: str | None) -> Described:
@@ -70,13 +78,9 @@ def described(store: Database, table: SigmaTable, given: Mapping[str, str], skin
     return Described(skin_id, values, given.get(GLUE, ""), UNITS in given, sensors, taken)
 
 
-def refused(error: UnderskinError, lines: Sequence[int] = ()) -> str:
-    """An error in the words of these forms; `lines`: of the loads in their text."""
-    return in_form_words(error, _LABELS, lines, UNLIKELY)
-
-
 def findings(answer: ArrayStress | None, lines: Sequence[int] = ()) -> list[tuple[str, str]]:
-    """What looks wrong, each with what it is about in the words of these forms; `lines` as for `refused`."""
+    """What looks wrong, each with what it is about in the words of these forms; `lines`: of the loads in their
+    text."""
     found = [] if answer is None else answer.findings
     return [(label_of(one.field, _LABELS, lines), one.statement) for one in found]
 
@@ -97,14 +101,21 @@ def finite_strain(answer: ArrayStress | None) -> str | None:
 
 def tried(
     request: Request, make: Callable[[], dict[str, Any]], lines: Sequence[int] = ()
-) -> tuple[dict[str, Any], ArrayStress | None, str | None]:
-    """The request that `make` makes, with its answer or what is wrong; `lines` as for `refused`."""
+) -> tuple[dict[str, Any], ArrayStress | None, WrongFields]:
+    """The request that `make` makes, with its answer or what is wrong; `lines` as for `findings`."""
     document: dict[str, Any] = {}
     try:
         document = make()
-        return document, answered(request, document), None
+        return document, answered(request, document), NOTHING_WRONG
     except UnderskinError as error:
-        return document, None, refused(error, lines)
+        in_words = partial(in_form_words, labels=_LABELS, lines=lines, unlikely=UNLIKELY)
+        return document, None, wrong_fields(error, in_words, _form_field)
+
+
+def _form_field(error: InvalidInput) -> str:
+    """The field of the form that holds what is wrong."""
+    loads = error.field.startswith(("contacts", LOAD))
+    return "loads" if loads else "map" if error.field.startswith("pressure_map") else error.field
 
 
 def answered(request: Request, document: Mapping[str, Any]) -> ArrayStress:
@@ -136,11 +147,10 @@ def charge_figure(
     return drawn("charge", figure, about, numbers)
 
 
-def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
+def _grid(typed: Mapping[str, str]) -> list[dict[str, Any]]:
+    readings = {name: partial(_count, name, typed[name]) for name in ("columns", "rows")}
+    values = all_of({**readings, "pitch_mm": partial(number, "pitch_mm", typed["pitch_mm"])})
     columns, rows, pitch = values["columns"], values["rows"], values["pitch_mm"]
-    for name in ("columns", "rows"):
-        if not values[name].is_integer():
-            raise wrong_type(name, f"{values[name]:g}", "must be a whole number")
     if not (1 <= columns <= 1000 and 1 <= rows <= 1000 and columns * rows <= _MOST_SENSORS):
         raise out_of_range("columns", f"{columns:g} × {rows:g}", f"must be 1 to {_MOST_SENSORS} sensors in all")
     return [
@@ -148,6 +158,13 @@ def _grid(values: Mapping[str, float]) -> list[dict[str, Any]]:
         for row in range(int(rows))
         for column in range(int(columns))
     ]
+
+
+def _count(name: str, typed: str) -> float:
+    value = number(name, typed)
+    if not value.is_integer():
+        raise wrong_type(name, f"{value:g}", "must be a whole number")
+    return value
 
 
 def _sensors(store: Database, skin_id: str) -> Sequence[Mapping[str, Any]] | None:

@@ -10,6 +10,7 @@ from fastapi import APIRouter, Query, Request, Response
 from service.dependencies import Store, Table
 from service.heavy_answers import each_in_turn
 from service.pages.array.description import (
+    LOAD,
     Described,
     answered,
     charge_columns,
@@ -23,10 +24,13 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import numbers
 from service.pages.shared.html import page
+from service.pages.shared.wrong_fields import told_together
 from service.usecases.tables import influence_table
 from underskin.array_stress.answer import ArrayStress, BaseStress, base_stress
-from underskin.array_stress.request import read_request
+from underskin.array_stress.request import LabContact, read_request
 from underskin.errors import out_of_range, wrong_type
+from underskin.recordings.validation import check_fields
+from underskin.several_errors import noting
 from underskin.units import Floats
 
 router = APIRouter(prefix="/loads")
@@ -38,6 +42,7 @@ _MOST_OUTLINES = 1000  # sensors
 _POINTS = 61  # of its grid along an axis
 _OF_SKIN = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio")
 _ORDER = ("x_mm", "y_mm", "indenter_radius_mm", "normal_force_n")
+_PARTS = ("x", "y", "R", "F", "Fx", "Fy")
 
 Loads = Annotated[str, Query(max_length=_LONGEST)]
 
@@ -47,13 +52,13 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
     """With the skin and the loads of the address, or else the paper's prototype under two spheres."""
     array = described(store, table, request.query_params, skin)
     lines = [place for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
-    document, answer, error = tried(request, lambda: _document(array, loads), lines)
+    document, answer, wrong = tried(request, lambda: _document(array, loads), lines)
     return page(
         request,
         "loads.html",
         array=array,
         loads=loads,
-        error=error,
+        wrong=wrong,
         answer=answer,
         findings=[] if answer is None else [*findings(answer, lines), *_beyond_reach(document, answer, lines)],
         strained=finite_strain(answer),
@@ -165,15 +170,26 @@ def _spheres(document: Mapping[str, Any], lines: Sequence[int]) -> list[tuple[in
 
 
 def _document(array: Described, loads: str) -> dict[str, Any]:
-    """The request of `POST /v1/stress`; raises InvalidInput."""
-    contacts = [_load(place, line) for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
-    return {**array.document(), "contacts": contacts}
+    """The request of `POST /v1/stress`; raises SeveralInvalid."""
+    lines = [(place, line) for place, line in enumerate(loads.splitlines(), 1) if line.strip()]
+    contacts = []
+    with told_together() as wrong:
+        document: dict[str, Any] = {}
+        with noting(wrong):
+            document = array.document()
+        for number, (place, line) in enumerate(lines):
+            with noting(wrong):
+                load = _load(place, line)
+                refused = check_fields(LabContact, load, units_checked=array.units_checked)[1]
+                wrong += [one.at(f"contacts[{number}].{one.field}") for one in refused]
+                contacts.append(load)
+        return {**document, "contacts": contacts}
 
 
 def _load(place: int, line: str) -> dict[str, Any]:
     """A line of numbers: x, y, radius and force, and perhaps the tangential force along x and y."""
-    parts = numbers(f"load in line {place}", line)
+    parts = numbers(f"{LOAD} {place}", line, _PARTS)
     if len(parts) not in (4, 6):
-        raise wrong_type(f"load in line {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
+        raise wrong_type(f"{LOAD} {place}", line[:80], "must be x y R F, or x y R F Fx Fy (mm, N)")
     load: dict[str, Any] = dict(zip(_ORDER, parts, strict=False))
     return {**load, "tangential_force_n": parts[4:]} if parts[4:] else load

@@ -20,12 +20,14 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, drawn
 from service.pages.shared.forms import TOKEN, require_own
 from service.pages.shared.html import page
+from service.pages.shared.wrong_fields import told_together
 from service.store import Database
 from underskin.array_stress import pressure_map
 from underskin.array_stress.answer import ArrayStress
 from underskin.errors import UnderskinError, out_of_range
 from underskin.prediction.columns import to_spreadsheet
 from underskin.recordings.readers import text
+from underskin.several_errors import noting
 
 router = APIRouter(prefix="/loads/map")
 
@@ -62,19 +64,23 @@ def _shown(request: Request, store: Database, given: Mapping[str, str], content:
     described = description.described(store, request.app.state.table, given, given.get(_SKIN))
 
     def document_of_map() -> dict[str, Any]:
-        if len(content) > _LARGEST_BYTES:
-            raise out_of_range("pressure_map", name, f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser")
-        pressure = pressure_map.parse(content, name)
-        return {**described.document(), "pressure_map": pressure}
+        document: dict[str, Any] = {}
+        with told_together() as wrong:
+            with noting(wrong):
+                document = described.document()
+            if len(content) > _LARGEST_BYTES:
+                must = f"must have at most {_LARGEST_BYTES / 1e6:g} MB: make it coarser"
+                raise out_of_range("pressure_map", name, must)
+            return {**document, "pressure_map": pressure_map.parse(content, name)}
 
-    document, answer, error = description.tried(request, document_of_map)
+    document, answer, wrong = description.tried(request, document_of_map)
     return page(
         request,
         "pressure_map.html",
         array=described,
         map=_text(content[:_LARGEST_BYTES]),
         example=_EXAMPLE,
-        error=error,
+        wrong=wrong,
         answer=answer,
         findings=description.findings(answer),
         strained=description.finite_strain(answer),

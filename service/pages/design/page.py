@@ -16,6 +16,7 @@ from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import in_form_words, see
 from service.pages.shared.html import compress, page
+from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
 from service.usecases.design import design_answer, design_of
@@ -42,7 +43,7 @@ def view(request: Request, table: Table, sliders: SlidersOfQuery) -> Response:
         results=shown.results,
         outside=shown.outside,
         figures=shown.figures,
-        error=shown.error,
+        wrong=shown.wrong,
         taken=sliders.taken,
         query=urlencode({**({} if sliders.skin_id is None else {"skin": sliders.skin_id}), **sliders.typed}),
         pin=sliders.pin,
@@ -67,7 +68,7 @@ def at_once(request: Request, table: Table, sliders: SlidersOfQuery) -> Response
         "materials": with_values(sliders.values),
         "same": [same.curl, same.python],
     }
-    content = orjson.dumps(changed if shown.error is None else {"error": shown.error})
+    content = orjson.dumps({"wrong": shown.wrong.told} if shown.wrong else changed)
     answer = Response(content, media_type="application/json", headers={"Cache-Control": "no-store"})
     compress(request, answer)
     return answer
@@ -100,7 +101,7 @@ class ShownDesign:
     results: Sequence[DesignResult]
     figures: Sequence[Drawn]
     outside: str | None = None
-    error: str | None = None
+    wrong: WrongFields = NOTHING_WRONG
     compared: Sequence[Compared] = ()
 
 
@@ -121,11 +122,18 @@ def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
         with np.errstate(all="ignore"):
             designed = design_of(table, asked)
         answer = design_answer(table, asked, designed)
+    except UnderskinError as refused:
+        return ShownDesign([], [], wrong=wrong_fields(refused, _said))
+    try:
+        if sliders.wrong_pin is not None:
+            raise sliders.wrong_pin
         beside = parsed(DesignRequest, sliders.own if sliders.pinned is None else sliders.pinned)
         with np.errstate(all="ignore"):
             other = design_of(table, beside)
     except UnderskinError as refused:
-        return ShownDesign([], [], error=in_form_words(refused, LABELS))
+        return ShownDesign(
+            [], [], wrong=wrong_fields(refused, lambda error: f"A, pinned: {_said(error)}", lambda _: "")
+        )
     name = "the paper's prototype" if sliders.skin_id is None else "the skin as it is"
     rows: list[Compared] = []
     pinned = None
@@ -149,6 +157,10 @@ def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
         ),
     ]
     return ShownDesign(results(answer), figures, answer.limit, compared=rows)
+
+
+def _said(error: UnderskinError) -> str:
+    return in_form_words(error, LABELS)
 
 
 def _same(request: Request, values: Mapping[str, float]) -> same_request.SameRequest:

@@ -11,13 +11,15 @@ from fastapi import APIRouter, Depends, Request, Response
 from service.dependencies import Store, Table
 from service.heavy_answers import each_in_turn
 from service.pages.shared.figures import Drawn, csv_answer, drawn
-from service.pages.shared.forms import in_form_words, number
+from service.pages.shared.forms import in_form_words
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import start
+from service.pages.shared.wrong_fields import NOTHING_WRONG, quantity, told_together, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignDemand
 from service.usecases.design_search import NEARLY, Offer, Searched, search
 from underskin.errors import UnderskinError
+from underskin.several_errors import noting
 
 router = APIRouter(prefix="/design/search")
 
@@ -46,8 +48,13 @@ class Typed:
 
     @property
     def demand(self) -> DesignDemand:
-        """What is asked; raises InvalidInput."""
-        return parsed(DesignDemand, {name: number(name, text) for name, text in self.fields.items()})
+        """What is asked; raises SeveralInvalid."""
+        values: dict[str, float] = {}
+        with told_together() as wrong:
+            for name, text in self.fields.items():
+                with noting(wrong):
+                    values[name] = quantity(name, text)
+            return parsed(DesignDemand, values)
 
 
 def _typed(request: Request, store: Store, table: Table, skin: str | None = None) -> Typed:
@@ -65,19 +72,19 @@ TypedInQuery = Annotated[Typed, Depends(_typed)]
 @each_in_turn
 def view(request: Request, table: Table, typed: TypedInQuery) -> Response:
     """The page."""
-    found, error = None, None
+    found, wrong = None, NOTHING_WRONG
     try:
         with np.errstate(all="ignore"):
             found = search(table, typed.demand)
     except UnderskinError as refused:
-        error = in_form_words(refused, _LABELS)
+        wrong = wrong_fields(refused, lambda error: in_form_words(error, _LABELS))
     return page(
         request,
         "design_search.html",
         skin_id=typed.skin_id,
         fields=[(name, words, unit, typed.fields[name]) for name, words, unit, _ in FIELDS],
         taken=typed.taken,
-        error=error,
+        wrong=wrong,
         offers=[] if found is None else [(offer, _address(typed, offer)) for offer in found.offers],
         binding=[] if found is None else found.binding,
         count=0 if found is None else int(found.feasible.sum()),

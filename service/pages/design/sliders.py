@@ -8,10 +8,14 @@ from urllib.parse import parse_qsl, urlencode
 from fastapi import Depends, Request
 
 from service.dependencies import Store, Table
-from service.pages.shared.forms import number
 from service.pages.shared.skin_values import start
+from service.pages.shared.wrong_fields import quantity, told_together
+from service.problems import parsed
+from service.schemas.design import DesignRequest
+from service.usecases.design import require_apart
 from service.usecases.materials import MATERIALS
 from underskin.errors import InvalidInput, not_one_of
+from underskin.several_errors import noting
 
 # Field, words, unit, the slider's ends.
 SLIDERS = (
@@ -32,8 +36,8 @@ PIN, ACTION, MATERIAL = "pin", "do", "material"
 @dataclass(frozen=True)
 class Sliders:
     """Where they start and stand, as they were `typed` and as numbers; the `pinned` design, where there is one, which
-    `pin` has as text; what is wrong with what was typed; `taken`: in sentences what of it, beyond what the address
-    gives, nobody declared."""
+    `pin` has as text; what is wrong with what was typed, and with what is pinned; `taken`: in sentences what of it,
+    beyond what the address gives, nobody declared."""
 
     skin_id: str | None
     own: Mapping[str, float]
@@ -42,6 +46,7 @@ class Sliders:
     pin: str
     pinned: Mapping[str, float] | None
     error: InvalidInput | None
+    wrong_pin: InvalidInput | None
     taken: Sequence[str]
 
 
@@ -52,22 +57,29 @@ def _sliders(request: Request, store: Store, table: Table, skin: str | None = No
     own = {name: own[name] for name, *_ in SLIDERS}
     values, error = _numbers(own, given)
     pin = request.query_params.get(PIN, "")
-    pinned, wrong = _numbers(own, dict(parse_qsl(pin, keep_blank_values=True))) if pin else (None, None)
+    pinned, wrong_pin = _numbers(own, dict(parse_qsl(pin, keep_blank_values=True))) if pin else (None, None)
     typed = {name: given.get(name, f"{own[name]:g}") for name, *_ in SLIDERS}
-    return Sliders(skin, own, typed, values, pin, pinned, error or wrong, taken)
+    return Sliders(skin, own, typed, values, pin, pinned, error, wrong_pin, taken)
 
 
 SlidersOfQuery = Annotated[Sliders, Depends(_sliders)]
 
 
 def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[str, float], InvalidInput | None]:
-    values, error = dict(own), None
-    for name in own:
-        try:
-            values[name] = number(name, given[name]) if name in given else own[name]
-        except InvalidInput as wrong:
-            error = error or wrong
-    return values, error
+    """Those given, or else one's own, and all that is wrong with them."""
+    values = dict(own)
+    try:
+        with told_together() as wrong:
+            for name in (one for one in own if one in given):
+                with noting(wrong):
+                    values[name] = quantity(name, given[name])
+            with noting(wrong):
+                parsed(DesignRequest, values)
+            if not {"pitch_mm", "sensor_radius_mm"} & {one.field for one in wrong}:
+                require_apart(values["pitch_mm"], values["sensor_radius_mm"])
+    except InvalidInput as error:
+        return values, error
+    return values, None
 
 
 def after_action(request: Request, sliders: Sliders) -> str | None:

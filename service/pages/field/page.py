@@ -16,6 +16,7 @@ from service.pages.shared.figures import Drawn, csv_answer, drawn
 from service.pages.shared.forms import UNLIKELY, in_form_words, number
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import UNITS, shown
+from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, wrong_fields
 from underskin.errors import UnderskinError
 from underskin.physics.hertz import peak_pressure
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
@@ -46,7 +47,7 @@ class ShownField:
     field: StressField | None
     given: Mapping[str, float]
     outside: str | None = None
-    error: str | None = None
+    wrong: WrongFields = NOTHING_WRONG
 
 
 @router.get("")
@@ -64,7 +65,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         values=values,
         taken=taken,
         units_checked=UNITS in request.query_params,
-        error=tried.error,
+        wrong=tried.wrong,
         outside=tried.outside,
         told=_told(tried.field, 0) if ok and tried.field is not None else [],
         error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
@@ -108,10 +109,12 @@ def section_csv(request: Request, table: Table) -> Response:
 def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> ShownField:
     given: dict[str, float] = {}
     try:
-        given = {name: number(name, values[name]) for name, *_ in FIELDS}
+        names = [name for name, *_ in FIELDS]
+        given = quantities(values, names, units_checked=UNITS in request.query_params)
         field = _computed(table, given, 1, UNITS in request.query_params)
     except UnderskinError as refused:
-        return ShownField(None, given, error=in_form_words(refused, _LABELS, unlikely=UNLIKELY))
+        wrong = wrong_fields(refused, lambda error: in_form_words(error, _LABELS, unlikely=UNLIKELY))
+        return ShownField(None, given, wrong=wrong)
     return ShownField(field, given, field.limits[0])
 
 

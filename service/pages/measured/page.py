@@ -7,14 +7,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
-from service.pages.array.description import refused
 from service.pages.measured.adopted_model import ByModel, by_model
 from service.pages.shared import same_request
 from service.pages.shared.figures import csv_answer
-from service.pages.shared.forms import number, numbers
+from service.pages.shared.forms import UNLIKELY, in_form_words, numbers
 from service.pages.shared.html import page
 from service.pages.shared.skin_values import FIELDS as SKIN_FIELDS
 from service.pages.shared.skin_values import UNITS, shown
+from service.pages.shared.wrong_fields import NOTHING_WRONG, quantities, told_together, wrong_fields
 from service.problems import parsed
 from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
@@ -22,6 +22,9 @@ from service.store import Database
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, UnderskinError, conflicting, required, wrong_type
 from underskin.prediction.domain_checks import RowConditions, beyond
+from underskin.recordings.validation import Check, declared, not_negative
+from underskin.recordings.validation import number as finite
+from underskin.several_errors import noting
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter(prefix="/d33")
@@ -30,7 +33,21 @@ FIELDS = tuple(field for field in SKIN_FIELDS if field[0] != "d33_pc_per_n")
 _LONGEST = 20_000  # characters of the rows
 _WITHOUT_UNCERTAINTY = 3  # numbers of a row
 _ROWS = "4 1 7.06 0.1\n4 3 7.45 0.1"
-_ORDER = ("indenter_radius_mm", "preload_n", "frf_pc_per_n", "frf_uncertainty_pc_per_n")
+_ROW, _ALL_ROWS = "row", "measurements"  # as errors call what is in the rows
+_CHECKS: dict[str, Check] = {
+    "indenter_radius_mm": declared,
+    "preload_n": declared,
+    "frf_pc_per_n": finite,
+    "frf_uncertainty_pc_per_n": not_negative,
+}  # of the numbers of a row, in order
+_ORDER = tuple(_CHECKS)
+_LABELS = {
+    **{name: f"{words} [{unit}]" if unit else words for name, words, unit in FIELDS},
+    "indenter_radius_mm": "sphere radius R",
+    "preload_n": "preload F",
+    "frf_pc_per_n": "FRF",
+    "frf_uncertainty_pc_per_n": "uncertainty of the FRF",
+}
 _WORDS = {"frf_pc_per_n": "FRF", "d33_pc_per_n": "d33"}  # that findings are about
 _ANSWERED = ("d33_pc_per_n", "d33_uncertainty_pc_per_n", "contact_radius_mm", "sigma", "mean_stress_mpa")
 
@@ -41,7 +58,7 @@ RowsText = Annotated[str, Query(max_length=_LONGEST)]
 def view(request: Request, store: Store, table: Table, skin: str | None = None, rows: RowsText = _ROWS) -> Response:
     """With the skin and the rows of the address, or else the paper's prototype under a sphere."""
     values, taken = shown(store, table, request.query_params, skin, FIELDS)
-    error: str | None = None
+    wrong = NOTHING_WRONG
     document: dict[str, Any] = {}
     answer: Columns | None = None
     adopted: ByModel | None = None
@@ -50,7 +67,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         answer = _answered(table, store, document)
         adopted = by_model(store, table, skin, request.query_params, document)
     except UnderskinError as problem:
-        error = _said(problem)
+        wrong = wrong_fields(problem, _said, _form_field)
     asked = document if adopted is None or adopted.document is None else adopted.document
     return page(
         request,
@@ -61,7 +78,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         taken=taken,
         units_checked=UNITS in request.query_params,
         rows=rows,
-        error=error,
+        wrong=wrong,
         findings=[] if answer is None else answer.shared["findings"],
         words=_WORDS,
         columns=None if answer is None else _columns(document, answer, adopted),
@@ -82,8 +99,13 @@ def rows_csv(request: Request, store: Store, table: Table, skin: str | None = No
 
 
 def _said(error: UnderskinError) -> str:
-    row = "" if not isinstance(error, InvalidInput) or error.index is None else f"row {error.index + 1}, "
-    return row + refused(error)
+    row = "" if not isinstance(error, InvalidInput) or error.index is None else f"{_ROW} {error.index + 1}, "
+    return row + in_form_words(error, _LABELS, unlikely=UNLIKELY)
+
+
+def _form_field(error: InvalidInput) -> str:
+    of_row = error.index is not None or error.field.startswith((_ROW, _ALL_ROWS))
+    return "rows" if of_row else error.field
 
 
 def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> Columns:
@@ -99,23 +121,42 @@ def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | No
 
 
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:
-    """The request of `POST /v1/d33`; raises InvalidInput."""
-    parts = [_row(place, line) for place, line in enumerate(rows.splitlines(), 1) if line.strip()]
+    """The request of `POST /v1/d33`; raises SeveralInvalid."""
+    with told_together() as wrong:
+        document: dict[str, Any] = {}
+        with noting(wrong):
+            document |= quantities(values, [name for name, *_ in FIELDS], units_checked=UNITS in given)
+        columns = _columns_of(rows, units_checked=UNITS in given)
+        return {**document, **columns, **({UNITS: True} if UNITS in given else {})}
+
+
+def _columns_of(rows: str, *, units_checked: bool) -> dict[str, list[float]]:
+    """The measurements, a column for each quantity; raises SeveralInvalid."""
+    parts: list[list[float]] = []
+    with told_together() as wrong:
+        for place, line in enumerate(rows.splitlines(), 1):
+            if line.strip():
+                with noting(wrong):
+                    parts.append(_row(place, line, units_checked=units_checked))
     if not parts:
-        raise required("measurements", "fill in at least one row: R F FRF, in mm, N and pC/N")
+        raise required(_ALL_ROWS, "fill in at least one row: R F FRF, in mm, N and pC/N")
     if len({len(part) for part in parts}) != 1:
         bare = [str(number) for number, part in enumerate(parts, 1) if len(part) == _WITHOUT_UNCERTAINTY]
         must = f"give an uncertainty (the fourth number) in every row or in none: row {', '.join(bare[:5])} has none"
-        raise conflicting("measurements", None, must)
-    document: dict[str, Any] = {name: number(name, values[name]) for name, *_ in FIELDS}
-    document |= dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
-    return {**document, UNITS: True} if UNITS in given else document
+        raise conflicting(_ALL_ROWS, None, must)
+    return dict(zip(_ORDER, (list(column) for column in zip(*parts, strict=True)), strict=False))
 
 
-def _row(place: int, line: str) -> list[float]:
-    parts = numbers(f"row {place}", line)
+def _row(place: int, line: str, *, units_checked: bool) -> list[float]:
+    parts = numbers(f"{_ROW} {place}", line, [_LABELS[name] for name in _ORDER])
     if len(parts) not in (_WITHOUT_UNCERTAINTY, len(_ORDER)):
-        raise wrong_type(f"row {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
+        raise wrong_type(f"{_ROW} {place}", line[:80], "must be R F FRF, or R F FRF and its uncertainty (mm, N, pC/N)")
+    with told_together() as wrong:
+        for (name, check), value in zip(_CHECKS.items(), parts, strict=False):
+            try:
+                check(name, value, units_checked)
+            except InvalidInput as error:
+                wrong.append(InvalidInput(name, error.value, error.allowed, place - 1, code=error.code))
     return parts
 
 

@@ -27,6 +27,7 @@ from underskin.errors import (
     wrong_type,
 )
 from underskin.recordings.readers import text
+from underskin.several_errors import SeveralInvalid, noting
 from underskin.units import LAB
 
 TOKEN = "form_token"  # noqa: S105 -- the name of the field
@@ -150,10 +151,11 @@ def _value(typed: str) -> float | None:
     return text.number(typed, "," if "," in typed else ".")
 
 
-def numbers(name: str, line: str) -> list[float]:
+def numbers(name: str, line: str, parts: Sequence[str] = ()) -> list[float]:
     """The numbers of a line that somebody typed, with decimal points or with decimal commas; raises InvalidInput.
 
-    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number.
+    Between them are spaces, tabs, semicolons, or commas and a space: `7,06` is one number. `parts`: what each of them
+    is, in the words of an error.
     """
     typed = [cell for cell in _BETWEEN.split(line) if cell]
     decimal = "," if any("," in cell for cell in typed) else "."
@@ -161,7 +163,15 @@ def numbers(name: str, line: str) -> list[float]:
     if decimal == "," and None in values:
         allowed = "must be numbers with spaces between them, with decimal points or with decimal commas, not both"
         raise wrong_type(name, line[:80], allowed)
-    return [number(name, cell) if value is None else value for cell, value in zip(typed, values, strict=True)]
+    names = [*(f"{name}, {part}" for part in parts), *[name] * len(typed)]
+    wrong: list[InvalidInput] = []
+    read: list[float] = []
+    for known_as, cell, value in zip(names, typed, values, strict=False):
+        with noting(wrong):
+            read.append(number(known_as, cell) if value is None else value)
+    if wrong:
+        raise SeveralInvalid(wrong)
+    return read
 
 
 def in_form_words(

@@ -14,6 +14,26 @@ function place(slider) {
   slider.value = String(Math.round((1000 * Math.log(value / slider.dataset.low)) / ratio(slider)));
 }
 
+// What is wrong, and which fields it is about: [field, sentence] each, as the page marks them when it opens.
+function mark(wrong) {
+  refused.hidden = wrong.length === 0;
+  refused.replaceChildren(
+    ...wrong.map(([, sentence], index) => {
+      const told = document.createElement("p");
+      told.id = `wrong-${index + 1}`;
+      told.textContent = sentence;
+      return told;
+    })
+  );
+  for (const input of form.querySelectorAll("input[id]")) {
+    const ids = wrong.flatMap(([field], index) => (field === input.name ? [`wrong-${index + 1}`] : []));
+    for (const [mark, value] of [["aria-invalid", "true"], ["aria-describedby", ids.join(" ")]]) {
+      if (ids.length) input.setAttribute(mark, value);
+      else input.removeAttribute(mark);
+    }
+  }
+}
+
 async function answer() {
   asking?.abort();
   asking = new AbortController();
@@ -22,17 +42,16 @@ async function answer() {
   try {
     const response = await fetch(`/design/answer?${query}`, { signal: asking.signal });
     design = await response.json();
-    if (!response.ok) design = { error: `${design.detail} Reload the page.` };
+    if (!response.ok) design = { wrong: [["", `${design.detail} Reload the page.`]] };
   } catch {
     return; // a later question took this one's place
   }
-  refused.hidden = !design.error;
-  refused.textContent = design.error ?? "";
+  mark(design.wrong ?? []);
   // What was told before stands greyed beside an error: it is of other values.
-  for (const part of document.querySelectorAll(".results, figure.drawn, [data-compared]")) part.classList.toggle("old", Boolean(design.error));
-  if (design.error) return;
+  for (const part of document.querySelectorAll(".results, figure.drawn, [data-compared]")) part.classList.toggle("old", Boolean(design.wrong));
+  outside.hidden = Boolean(design.wrong) || !design.outside;
+  if (design.wrong) return;
   if (!document.querySelector("[data-result]")) return void location.assign(`/design?${query}`); // it opened with an error
-  outside.hidden = !design.outside;
   outside.querySelector("span").textContent = design.outside ?? "";
   history.replaceState(null, "", `/design?${query}`);
   document.querySelector("[data-query]").search = query;

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from service.ingest.accept import RIG
 from service.ingest.field_words import CHANNELS, RECORDING, SKIN
 from service.pages.shared.forms import UNLIKELY, unsigned, worded
 from service.pages.upload import spring_mapping, workbench
@@ -20,6 +21,8 @@ _WORDS = {
     **workbench.WORDS,
 }
 
+_OF_CHANNEL = {"unit": "true unit", "sensitivity": "sensitivity", "sensitivity_unit": "unit of the sensitivity"}
+
 Error = Mapping[str, Any]
 Channels = Sequence[ChannelSummary]  # of the file with the error: the form is for one that has any
 
@@ -28,12 +31,22 @@ def field_words(field: str) -> str:
     """A field as the form calls it; others as they are."""
     if field.startswith("derived."):
         return f"formula of {field.removeprefix('derived.')}"
+    place, _, of_channel = field.removeprefix("channels.").partition(".")
+    if place in CHOICES and of_channel in _OF_CHANNEL:
+        return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[place]}"
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 
 def field_of(error: Error, channels: Channels) -> str:
     """The field that is wrong."""
     return field_words(error["field"]) if channels else str(error["field"])
+
+
+def ids_of(refused: Sequence[Error], field: str) -> str:
+    """The ids on the page of what is wrong with a field of the form, with blanks between them; none where it is wrong
+    in a rig description that was sent."""
+    places = [error["field"].removeprefix("skin.").removeprefix("recording.") for error in refused if RIG not in error]
+    return " ".join(f"refused-{number}" for number, place in enumerate(places, 1) if place == field)
 
 
 def what_came(error: Error, channels: Channels) -> Any:

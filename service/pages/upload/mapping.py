@@ -7,7 +7,7 @@ from typing import Any
 from service.ingest.field_words import CHANNELS, RECORDING, SKIN
 from service.ingest.reading import InspectedFile
 from service.pages.shared.forms import number_or_text
-from service.pages.upload import recorded_time, spring_mapping, workbench
+from service.pages.upload import recorded_time, spring_mapping, typed_values, workbench
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import FileError, InvalidInput, not_unique, wrong_type
 from underskin.recordings import rig_description, rig_mapping
@@ -122,7 +122,8 @@ def _stated(properties: Mapping[str, Any], kind: str, *, dated: bool) -> dict[st
 
 
 def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[str, Any], list[InvalidInput]]:
-    """The rig description that a form says, and what in it cannot be: a line of the layout, two channels for one field.
+    """The rig description that a form says, and what in it cannot be: a value, a line of the layout, two channels for
+    one field.
 
     What no field of the form is about stays as in `base`; what was typed and cannot be is kept, to be put right.
     """
@@ -151,7 +152,8 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    return document, [*strange, *twice, *unsaid, *mistimed, *workbench.named_twice(form, CHANNELS)]
+    named_twice = workbench.named_twice(form, CHANNELS)
+    return document, [*typed_values.refused(document), *strange, *twice, *unsaid, *mistimed, *named_twice]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:

@@ -198,8 +198,9 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     guess = mappings.guessed(channels_of(pending), pending.seen[0].properties, {})
     pending.draft = workbench.with_guesses(said, base, guess)
     of_files = single_files.typed(sent, pending.files)
-    values, mistimed = single_files.values_of(of_files, pending.files, said["kind"])
-    wrong += mistimed
+    units_checked = bool(said.get("units_checked"))
+    values, wrong_of_files = single_files.values_of(of_files, pending.files, said["kind"], units_checked=units_checked)
+    wrong += wrong_of_files
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:

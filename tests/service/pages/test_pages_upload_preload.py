@@ -1,6 +1,7 @@
 """A preload that is typed once for several files, or was for earlier ones, beside what each file's own force says."""
 
 import io
+import re
 
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
@@ -54,8 +55,12 @@ def test_a_typed_preload_is_held_against_the_force_of_each_file(visitor: Visit) 
     region = page.get_by_role("region", name="What differs from file to file")
     region.get_by_label("preload F of two.tdms").fill("2,0")
     region.get_by_label("date and time of recording of one.tdms").fill("some day")
+    radius = region.get_by_label("sphere radius R of one.tdms")
+    radius.fill("-4")
     read_it(page)
     expect(page.get_by_role("alert")).to_contain_text("one.tdms: date and time of recording")
+    expect(radius).to_have_accessible_description(re.compile("^one.tdms: sphere radius R -4"))
+    radius.fill("")
     assert region.get_by_label("preload F of two.tdms").input_value() == "2,0"
     region.get_by_label("date and time of recording of one.tdms").fill("2026-05-03")
     read_it(page)

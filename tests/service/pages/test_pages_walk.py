@@ -79,6 +79,7 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     newcomer.require_accessible()
     told = page.locator("[data-result=resolution] b")
     before = float(told.inner_text().split()[0])
+    assert page.locator("#figure-row").get_by_text("response width 3.34 mm").is_visible()
     assert before == pytest.approx(3.34, abs=0.01)  # the paper's geometry
     slider = page.get_by_label("thickness h, slider")
     with page.expect_response("**/design/answer?*"):
@@ -90,6 +91,12 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     page.wait_for_url("**thickness_mm=2.*")
     page.locator("#pitch_mm").fill("1")
     page.get_by_role("alert").get_by_text("cannot overlap").wait_for()
+    page.locator("#pitch_mm").fill("8")
+    page.locator("#preload_n").fill("200")
+    page.locator("#outside").get_by_text("Outside the table").wait_for()
+    page.locator("#preload_n").fill("abc")
+    page.get_by_role("alert").get_by_text("force F [N]: abc").wait_for()
+    assert not page.locator("#outside").is_visible()  # it was of 200 N
 
 
 def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:

@@ -122,6 +122,7 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
 
 def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
+    assert field_words("channels.charge_pc.sensitivity") == "sensitivity of the charge"
     channels = [channel("force", "N")]
     missing = {"code": "required", "field": "frf_im_pc_per_n", "value": None, "allowed": "required"}
     assert what_to_do(missing, channels) == "required: say below which channel it is"
@@ -191,6 +192,15 @@ def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
     found, (wrong,) = document_of(twice, {})
     assert wrong.allowed == "a is force already: set one of the two to “not used”"
     assert found["channels"] == {"force_n": {"channel": "a"}}
+
+
+def test_values_are_checked_before_a_file_is_read_and_those_that_a_file_states_are_not() -> None:
+    typed = {"kind": "frf", "poisson_ratio": "", "preload_n": "0.0001", "indenter_radius_mm": "", "dynamic_force_n": ""}
+    stated = {"indenter_radius_mm-from": "R"}
+    (unlikely,) = document_of({**typed, **stated}, {})[1]
+    assert (unlikely.field, unlikely.value) == ("recording.preload_n", 0.0001)
+    assert document_of({**typed, **stated, "units_checked": "yes"}, {})[1] == []
+    assert document_of({**typed, "kind": "indentation"}, {})[1] == []  # which has no preload
 
 
 @pytest.mark.parametrize("line", ["s1, 0.5, 8", "s1; 0,5; 8", "s1\t0,5\t8", "s1 0.5 8", "s1   0,5 8"])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.schemas.design import DesignDemand
+from service.schemas.design import DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
 from service.usecases.design_search import Searched, search
 from service.usecases.materials import ELASTOMERS, FILMS, MATERIALS
@@ -68,6 +68,23 @@ def test_every_design_that_is_offered_meets_the_demand_by_the_forward_calculatio
             distance = factor * resolution_mm * 1e-3
             dip = least_dip(designed.offset, designed.response, offer.request.pitch_mm * 1e-3, distance)
             assert dip >= 0.1 - 5e-3
+
+
+@pytest.mark.parametrize("changed", [{}, {"preload_n": 0.05}, {"resolution_mm": 5.0}])
+def test_every_pair_that_is_counted_meets_the_demand_at_its_pitch(changed: dict[str, float]) -> None:
+    """Also near the edge, where few placements of the row take for resolved what the full calculation does not."""
+    answer, region = found(**changed), found(**changed).region
+    asked = {name: value for name, value in {**ASKED, **changed}.items() if name in DesignRequest.model_fields}
+    for row, column in zip(*np.nonzero(answer.feasible), strict=True):
+        request = DesignRequest(
+            thickness_mm=float(region.thickness_mm[column]),
+            sensor_radius_mm=float(region.sensor_radius_mm[row]),
+            pitch_mm=float(region.largest_pitch_mm[row, column]),
+            **asked,
+        )
+        apart = design_answer(load_table(), request, design_of(load_table(), request)).two_point_separation_mm
+        assert apart is not None
+        assert apart <= {**ASKED, **changed}["resolution_mm"]
 
 
 def test_a_coarser_array_than_the_best_that_is_offered_misses_the_demand() -> None:

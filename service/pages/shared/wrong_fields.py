@@ -1,0 +1,73 @@
+"""What is wrong with a form, all of it at once: read field by field, and told with each wrong field marked."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+
+from service.pages.shared.forms import number
+from underskin.errors import InvalidInput, UnderskinError
+from underskin.recordings.validation import declared, poisson_ratio
+from underskin.several_errors import SeveralInvalid, all_of, errors_of, noting
+from underskin.units import LAB
+
+_MOST_TOLD = 20
+
+
+@dataclass(frozen=True)
+class WrongFields:
+    """What is wrong, in sentences, each with the name of the form's field that it is about; empty where it is about
+    none."""
+
+    told: Sequence[tuple[str, str]] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.told)
+
+    def ids(self, name: str) -> str:
+        """Ids on the page of the sentences about a field, with blanks between them."""
+        return " ".join(f"wrong-{place}" for place, (field, _) in enumerate(self.told, 1) if field == name)
+
+
+NOTHING_WRONG = WrongFields()
+
+
+def wrong_fields(
+    error: UnderskinError,
+    in_words: Callable[[UnderskinError], str],
+    field_of: Callable[[InvalidInput], str] = lambda error: error.field,
+) -> WrongFields:
+    """What an error says of a form: each of several `in_words` of the form, about the field that `field_of` gives."""
+    if not isinstance(error, InvalidInput):
+        return WrongFields([("", in_words(error))])
+    errors = errors_of(error)
+    told = [(field_of(one), in_words(one)) for one in errors[:_MOST_TOLD]]
+    more = len(errors) - len(told)
+    return WrongFields([*told, *([("", f"and {more} more")] if more else [])])
+
+
+@contextmanager
+def told_together() -> Iterator[list[InvalidInput]]:
+    """Takes what is wrong, by `noting`; after the block raises SeveralInvalid with the first error of each place, as
+    what cannot be read is missing to later checks too."""
+    wrong: list[InvalidInput] = []
+    with noting(wrong):
+        yield wrong
+    first: dict[str, InvalidInput] = {}
+    for one in wrong:
+        first.setdefault(one.place, one)
+    if first:
+        raise SeveralInvalid(list(first.values()))
+
+
+def quantity(name: str, typed: str, *, units_checked: bool = False) -> float:
+    """A number that somebody typed; that of a skin or a sphere within what is allowed of it. Raises InvalidInput."""
+    value = number(name, typed)
+    if name == "poisson_ratio":
+        return poisson_ratio(name, value, units_checked)
+    return declared(name, value, units_checked) if name in LAB else value
+
+
+def quantities(typed: Mapping[str, str], names: Iterable[str], *, units_checked: bool = False) -> dict[str, float]:
+    """The same of several fields; raises SeveralInvalid with all that is wrong."""
+    return all_of({name: partial(quantity, name, typed[name], units_checked=units_checked) for name in names})
