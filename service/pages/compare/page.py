@@ -172,7 +172,8 @@ def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
-    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []
