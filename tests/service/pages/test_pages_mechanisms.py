@@ -98,9 +98,9 @@ def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(
             diagnosed(idle, resonant(name), made, skin=verdict)
         found, _, possible = _row_of(reader, "Contact resonance").partition(", possible in ")
         counted.append((int(found), int(possible or 0)))
-    (found, possible), *after = counted
-    assert after == [(found + 1, possible), (found + 1, possible + 1)]
-    more = f"Possible in {possible + 1} more, with less than 80 %"
+    (was_found, was_possible), *after = counted
+    assert after == [(was_found + 1, was_possible), (was_found + 1, was_possible + 1)]
+    more = f"Possible in {was_possible + 1} more, with less than 80 %"
     expect(reader.page.locator("#contact_resonance").get_by_text(more)).to_be_visible()
 
 
