@@ -138,6 +138,21 @@ def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_else
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
 
 
+def test_two_skins_without_a_sensor_in_common_say_so_and_how_sensors_are_matched(idle: Server) -> None:
+    first = store_server.campaign("left", sensors=2, lines=3)
+    second = store_server.campaign("right", sensors=9, lines=3)
+    for one in [*second["skin"]["sensors"], *second["recordings"]]:
+        name = "id" if "x_mm" in one else "sensor"
+        one[name] = one[name].replace("s", "finger ")
+    ids = {name: sent(idle, document, name) for name, document in (("left", first), ("right", second))}
+    text = idle.http.get("/compare", params={"first": ids["left"], "second": ids["right"]}, headers=BROWSING).text
+    (said,) = re.findall(r"No sensor is in both campaigns: (.*?\.)", text)
+    named = ", ".join(f"finger {number}" for number in range(6))
+    assert said == f"sensors are matched by their ids, and the first has s0, s1, the second {named} and 3 more."
+    alike = idle.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
+    assert "No sensor is in both" not in alike
+
+
 def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_pages(idle: Server) -> None:
     many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
     for number, document in enumerate(many):
