@@ -12,6 +12,7 @@ from plotly.colors import sample_colorscale
 
 from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
 from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
+from underskin.findings.typeset import with_minus
 from underskin.inversion.beyond_chance import differ_from_others, differ_from_zero, threshold
 from underskin.units import Floats, Mask
 
@@ -263,9 +264,9 @@ def _told(name: str, reason: str, value: float, interval: tuple[float, float] | 
     text = f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)
     if not np.isfinite(value):
         return f"{text}<br>{quantity.name} not known"
-    text += f"<br>{quantity.name} {value:.5g} {quantity.unit}"
+    text += with_minus(f"<br>{quantity.name} {value:.5g} {quantity.unit}")
     of = "within its ±" if quantity.against == "bound" else "95 %"
-    return text if interval is None else f"{text}<br>{of}: {interval[0]:.4g} to {interval[1]:.4g}"
+    return text if interval is None else text + with_minus(f"<br>{of}: {interval[0]:.4g} to {interval[1]:.4g}")
 
 
 def _ink(colour: str) -> str:

@@ -91,7 +91,7 @@ def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_
     rows = map_rows(row, {"sensors": [{"sensor": "s0", "flags": []}]}, of_skin, places)
     figure = orjson.loads(str(drawn_map("palm", row, rows, "trend", "paper", None).json))
     ((told,),) = [trace["customdata"] for trace in figure["data"]]
-    low, high = (float(end) for end in told.partition("95 %: ")[2].split(" to "))
+    low, high = (float(end.replace("−", "-")) for end in told.partition("95 %: ")[2].split(" to "))
     line = of_skin.sensors[0].trend
     assert line is not None
     assert (low < 0 < high) is not line.significant

@@ -21,9 +21,11 @@ from underskin.diagnosis.reporting.figures import explanations
 from underskin.diagnosis.reporting.scheme import SCHEME
 from underskin.diagnosis.reporting.several_figures import several_figures
 from underskin.findings.formatting import in_percent
+from underskin.findings.typeset import with_minus, without_powers
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
 from underskin.prediction.columns import to_spreadsheet
+from underskin.units import readable_unit
 
 _LIST = """
 const plot = document.getElementById("{plot_id}"), {buttons} = plot.layout.updatemenus[0];
@@ -48,12 +50,49 @@ Plotly.relayout(plot, {"updatemenus[0].visible": false});
 plot.parentElement.before(label, " ", steps[0], " ", steps[1]); // outside of the box that has the height of the figure
 """  # stands in for a figure's own menu, which only a pointer can open
 
+
+def readable(text: str) -> str:
+    """A statement with names as words, numbers as pages set them."""
+    return with_minus(without_powers(wording.readable(text)))
+
+
+def number(value: float | None) -> str:
+    """Four digits."""
+    return with_minus(wording.number(value))
+
+
+def interval(entry: Mapping[str, Any]) -> str:
+    """From low to high, to four digits."""
+    return with_minus(wording.interval(entry))
+
+
+def as_stated(value: float | None) -> str:
+    """To the three digits of a statement, beside which it stands."""
+    return "–" if value is None else with_minus(f"{value:.3g}")
+
+
+def plain(value: Any) -> str:
+    """A value of a planned recording."""
+    return with_minus(wording.plain(value))
+
+
+def in_its_unit(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """A parameter in the unit in which its value reads well, where that would be a power of ten."""
+    field, ends = _FIELDS.get(entry["unit"]), {name: entry[name] for name in _STATED}
+    if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
+        return dict(entry)
+    unit, count = readable_unit(field, largest)
+    return {**entry, **{name: count * end for name, end in ends.items()}, "unit": unit}
+
+
 _FILTERS = (
-    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group, wording.interval, wording.number),
-    *(wording.plain, wording.quantity, wording.readable, wording.unit, wording.words, wording.law_range),
+    *(wording.axis, wording.columns, wording.error, wording.finding, wording.group, interval, number, as_stated),
+    *(plain, wording.quantity, readable, wording.unit, wording.words, wording.law_range, in_its_unit),
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 
+_FIELDS, _STATED = {"N": "force_n", "mm": "displacement_mm"}, ("value", "low", "high")
+_POWERS = 1e-4  # below which four digits are written as a power of ten
 PAPER = SCHEME.with_name("paper.js")  # the script that makes figures fit a printed sheet, in a page or a file
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
 Report = Mapping[str, Any]
