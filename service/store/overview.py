@@ -30,10 +30,10 @@ class Glance:
     d33: list[tuple[str, float]] = field(default_factory=list)
     diagnosis: AnyRow | None = None  # the latest of the last campaign: of it alone, else of it with others
     model: AnyRow | None = None  # in force
-    # d33 of the array [pC/N] in the last campaign that has one, by the model in force, and by the paper's; None where
-    # not kept
-    adopted_d33: float | None = None
-    paper_d33: float | None = None
+    # d33 of the array in the last campaign that has one, as `D33.array` has it, by the model in force, and by the
+    # paper's; None where not kept
+    adopted_array: Mapping[str, Any] | None = None
+    paper_array: Mapping[str, Any] | None = None
     # of how many sensors that campaign tells d33, and how many the skin has
     measured: tuple[int, int] | None = None
     title: str | None = None
@@ -92,10 +92,11 @@ def glances(
 
 def _add_d33(connection: Connection, glance: Glance, campaign: AnyRow, table_sha256: str) -> None:
     """That of the array in a campaign, by the paper's model and by the one in force."""
-    glance.paper_d33 = of_array(inversions.find(connection, campaign, table_sha256))
+    by_paper = inversions.find(connection, campaign, table_sha256)
+    glance.paper_array = None if by_paper is None else by_paper["array"]
     if glance.model is not None:
         by_model = inversions.find_adopted(connection, campaign, glance.model.model_id, table_sha256)
-        glance.adopted_d33 = of_array(by_model)
+        glance.adopted_array = None if by_model is None else by_model["array"]
 
 
 def _recent(connection: Connection, roots: Sequence[str]) -> Sequence[AnyRow]:

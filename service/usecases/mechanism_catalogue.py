@@ -9,6 +9,7 @@ from service.schemas.mechanisms import MechanismEntry
 from service.store import Database
 from service.usecases import mechanism_files, mechanisms
 from service.usecases.mechanism_findings import FoundIn, findings
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.figures.law_effect import LawEffect, lacking, law_effect
 from underskin.figures.law_twins import Twin, law_twins
 from underskin.mechanisms import Mechanism, Parameter
@@ -31,8 +32,9 @@ _OTHER_AXES = {  # those that no unnamed law follows
 @dataclass(frozen=True)
 class CatalogueEntry:
     """A mechanism: `twins` act alike on the reference recordings, the most alike first, or else `nearest` comes
-    closest; `found`: the diagnoses that name it as the answer, `possible`: how many more name it among several that
-    remain; `lacking`: why there is no picture of it; `file` is the document of one of the lab's own."""
+    closest; `found`: the diagnoses that hold it present with a probability that needs no rivals beside it, whatever
+    else they leave open, `possible`: how many more state it with less; `lacking`: why there is no picture of it;
+    `file` is the document of one of the lab's own."""
 
     entry: MechanismEntry
     needs: str
@@ -103,8 +105,8 @@ def _entry(
         list(by_name.values()),
         [replace(twin, axes=tuple(map(_axis, twin.axes))) for twin in alike if twin.alike >= ALIKE][:_MOST_TWINS],
         alike[0] if alike else None,
-        [one for one in found if one.verdict == "explained"],
-        sum(one.verdict == "ambiguous" for one in found),
+        [one for one in found if one.probability >= EXPLAINED],
+        sum(one.probability < EXPLAINED for one in found),
         lacking(mechanism) if own else None,
         _file(entry) if own else None,
     )

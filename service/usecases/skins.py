@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 import orjson
 from sqlalchemy import Connection
@@ -73,6 +73,21 @@ def differences(connection: Connection, ids: Sequence[str]) -> list[str]:
         if len(set(values.values())) > 1:
             told.append(f"{name} is " + " and ".join(f"{value:g} of {skin_id}" for skin_id, value in values.items()))
     return told
+
+
+def sensors(connection: Connection, root: str) -> list[Mapping[str, Any]]:
+    """All sensors of a skin, each once, where the latest campaign in use that has it says that it lies; first those
+    of the campaign that describes the skin, which is believed before the others."""
+    describing = campaigns.describing(connection, root)
+    if describing is None:
+        return []
+    current = [row for row in campaigns.of_skin(connection, root) if campaigns.state(row) == "current"]
+    by_time = sorted(current, key=lambda row: (row.recorded_at or row.received_at, row.number), reverse=True)
+    places: dict[str, Mapping[str, Any]] = {}
+    for row in [describing, *by_time]:
+        for sensor in row.about["skin"]["sensors"]:
+            places.setdefault(sensor["id"], sensor)
+    return list(places.values())
 
 
 def history_by_model(

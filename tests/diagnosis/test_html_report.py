@@ -105,9 +105,37 @@ def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_r
     shown = texts(html)
     assert "<script>alert" not in html
     assert "acts on the gain of the charge and follows the time of day; its form is periodic" in shown
-    assert "change -0.08 -0.1 to -0.06" in shown
+    assert "change −0.08 −0.1 to −0.06" in shown
     assert "modulus temperature_c linear 4 %" in shown
     assert "the time of day 8 to 17.5 h; operator: jd, mb; the preload 0.5 to 2 N, over its own range." in shown
+
+
+def test_small_forces_are_in_a_unit_in_which_they_read_well_with_minus_signs() -> None:
+    parameter = {"name": "pull", "unit": "N", "value": -1.5e-06, "low": -1.8e-06, "high": -1.2e-06}
+    law = {
+        "acts_on": "force",
+        "axis": "displacement_mm",
+        "form": "linear",
+        "expression": "F + p",
+        "probability": 1.0,
+        "parameters": [parameter],
+        "rivals": [],
+        "range": {},
+    }
+    statement = "A law is missing: by +1.5e-06 N (-1.2e-06 to +1.8e-06). It grows with a power of -0.43 in s-1."
+    shown = texts(body_of({**EMPTY, "verdict": "unexplained", "unnamed": law, "statement": statement}, {}))
+    assert "by +1.5 µN (−1.2 to +1.8)" in shown
+    assert "a power of −0.43 in s-1" in shown
+    assert "pull −1.5 −1.8 to −1.2 µN" in shown
+
+
+def test_what_is_to_be_quoted_has_the_digits_of_the_statement() -> None:
+    d33 = {"value": 13.1234, "low": 12.8912, "high": 13.4321, "unit": "pC/N"}
+    errors = {"heldout_rmse_percent": 2.0, "rmse_percent": 2.0}
+    fit = {"before": errors, "after": errors, "noise_floor_percent": 2.0, "groups": []}
+    for quotable, said in ((True, "d33 13.1 pC/N, 95 %: 12.9 to 13.4"), (False, "lies between 12.9 and 13.4 pC/N")):
+        made = {**EMPTY, "verdict": "explained", "d33": {**d33, "quotable": quotable}, "fit": fit}
+        assert said in texts(body_of(made, {}))
 
 
 def test_what_each_kind_tells_is_a_table() -> None:

@@ -4,7 +4,8 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+from underskin.figures.array_discs import disc_size
+from underskin.figures.array_map import D33, Quantity, array_map, told_apart
 from underskin.figures.loads import loaded_array
 from underskin.inversion.beyond_chance import differ_from_others
 from underskin.units import Floats
@@ -151,7 +152,7 @@ def test_discs_have_the_sensors_size_where_it_can_be_seen() -> None:
 
 def test_ids_stand_below_discs_that_have_no_room_for_them() -> None:
     figure = array_map(SENSORS, 2 * X, 2 * Y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=1.5)
-    (ids,) = [trace for trace in figure.data if trace.mode == "text"]
+    (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
     assert list(ids.text) == SENSORS
     assert list(ids.y) == pytest.approx((2 * Y - 1.5).tolist())
     assert not figure.layout.showlegend
@@ -163,3 +164,22 @@ def test_a_map_holds_all_loads() -> None:
     assert figure.layout.xaxis.range[0] < -30.0
     assert figure.layout.yaxis.range[1] > 66.0
     assert figure.layout.xaxis.range[1] > X.max()
+
+
+def test_a_sensor_that_was_not_measured_with_the_others_is_hollow_and_compared_with_none() -> None:
+    values = np.array([14.0, 14.05, 13.95, 2.0])
+    told = ["", "", "", "last measured on 03 May 2026"]
+    figure = array_map(SENSORS[:4], X[:4], Y[:4], values, np.full(4, 0.1), [""] * 4, absent=told)
+    assert fills(figure) == [GREY] * 3 + ["#ffffff"]
+    assert [shape.line.dash for shape in figure.layout.shapes] == [None] * 3 + ["dot"]
+    sensors = [trace for trace in figure.data if trace.ids is not None]
+    (hover,) = [text for one in sensors for name, text in zip(one.ids, one.customdata, strict=True) if name == "s03"]
+    assert hover.startswith("s03: last measured on 03 May 2026<br>d33 2 pC/N<br>95 %: 1.804 to 2.196")
+    assert "not in this campaign" in {trace.name for trace in figure.data if trace.showlegend is not False}
+
+
+def test_an_id_below_a_disc_is_below_the_ring_around_it() -> None:
+    figure = array_map(SENSORS[:4], 8 * X[:4], Y[:4], [14.0] * 4, [0.1] * 4, [""] * 4, D33, "s01", 1.5)
+    (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
+    *discs, ring = figure.layout.shapes
+    assert list(ids.y) == pytest.approx([discs[0].y0, ring.y0, discs[2].y0, discs[3].y0])

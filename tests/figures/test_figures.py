@@ -8,11 +8,11 @@ from underskin.diagnosis.reporting.line_styles import PAPER
 from underskin.errors import InvalidInput
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.curves import ForceCurve, force_curves
-from underskin.figures.frf import frf_recordings
+from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
-from underskin.recordings.frf.summary import FrfLines
+from underskin.recordings.frf.summary import FrfLines, FrfSpread
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])
@@ -160,6 +160,24 @@ def test_measured_lines_are_solid_and_differ_however_many_they_are() -> None:
         drawn = [trace for trace in figure.data if trace.showlegend is not False]
         assert {trace.line.dash for trace in drawn} <= {None, "solid"}
         assert len({(trace.line.color, trace.mode, trace.marker.symbol) for trace in drawn}) == count
+
+
+def test_lines_of_recordings_look_as_those_of_their_condition_do() -> None:
+    """Colour by preload, marks by sphere, whether they are shown alone or as the median of many."""
+    conditions, lines = [(4.0, 0.5), (4.0, 3.0), (10.0, 0.5), (10.0, 3.0)], np.array([1.0, 10.0])
+    alone = frf_recordings([FrfLines("r", lines, lines, 0 * lines, lines)] * 4, None, conditions)
+    three = (lines, lines, lines)
+    together = frf_overview([FrfSpread(*one, 5, lines, three, three, three) for one in conditions], None)
+
+    def looks(figure: go.Figure) -> list[tuple[str, str]]:
+        shown = [trace for trace in figure.data if trace.showlegend]
+        return [(trace.line.color, trace.mode) for trace in shown]
+
+    assert looks(alone) == looks(together)
+    (small, small_mode), (large, _), (also_small, marked_mode), (also_large, _) = looks(alone)
+    assert (small, large) == (also_small, also_large)
+    assert small != large
+    assert (small_mode, marked_mode) == ("lines", "lines+markers")
 
 
 def test_frfs_of_many_recordings_have_no_legend() -> None:

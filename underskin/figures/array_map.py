@@ -10,16 +10,16 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 from plotly.colors import sample_colorscale
 
+from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
 from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
+from underskin.findings.typeset import with_minus
 from underskin.inversion.beyond_chance import differ_from_others, differ_from_zero, threshold
 from underskin.units import Floats, Mask
 
-_SHARE = 0.42  # radius of a disc over the smallest distance of two sensors, so that none overlap at any size
-_SEEN = 1 / 80  # of the map's longer side: a smaller radius cannot be seen
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
-_AROUND = 1.17  # times it, the ring around the chosen one, which touches no neighbour's disc
 _APART = {"color": COLOURS[1], "width": 3}  # the ring around one that stands out
-_ALONE_MM = 1.0  # radius where there is no other
+_ABSENT = {"color": "#5b6670", "width": 2}  # the edge of one that was not measured with the others
+_BELOW = 6  # pixels, of a mark that is not seen, by which an id keeps off the edge of the disc above it
 _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
 _ALIKE, _UNKNOWN = "#cfd4d9", "#ffffff"
@@ -63,13 +63,20 @@ def array_map(
     quantity: Quantity = D33,
     chosen: str | None = None,
     sensor_radius_mm: float | None = None,
+    absent: Sequence[str] = (),
 ) -> go.Figure:
     """Map of the sensors; `uncertainties` are standard ones, `reasons` says why a sensor stands out, empty otherwise,
-    `chosen` is ringed. Discs have the sensors' radius where it is given and can be seen, as `disc_size` says.
+    `chosen` is ringed. Discs have the sensors' radius where it is given and can be seen, as `disc_size` says. `absent`
+    says of a sensor that was not measured with the others since when its value stands, which is compared with none:
+    its disc is hollow.
 
     Raises InvalidInput where a column's length differs from that of `sensors`.
     """
     x, y, value, uncertainty = as_columns(sensors, x_mm=x_mm, y_mm=y_mm, values=values, uncertainties=uncertainties)
+    absences = absent or [""] * len(sensors)
+    away = np.array([bool(absence) for absence in absences], dtype=bool)
+    notes = [reason or absence for reason, absence in zip(reasons, absences, strict=True)]
+    stated, value = value, np.where(away, np.nan, value)
     coloured = _coloured(value, uncertainty, quantity)
     scale, low, high = _scale(value, uncertainty, quantity)
     place = np.clip((value - low) / ((high - low) or 1.0), 0.0, 1.0)
@@ -78,12 +85,17 @@ def array_map(
         for row, known in enumerate(np.isfinite(value).tolist())
     ]
     plain = np.array([not reason for reason in reasons])
-    radius, apart = _radius(x, y, sensor_radius_mm), _apart(x, y)
+    radius, apart = radius_of(x, y, sensor_radius_mm), smallest_distance(x, y)
     inside = radius >= _WITH_ROOM * apart
     figure, below = go.Figure(), []
-    for name, own in (("differs", coloured & plain), ("alike", ~coloured & plain), ("stands out", ~plain)):
+    for name, own in (
+        ("differs", coloured & plain),
+        ("alike", ~coloured & plain & ~away),
+        ("absent", plain & away),
+        ("stands out", ~plain),
+    ):
         if own.any():
-            rows = np.flatnonzero(own).tolist()
+            rows, meta = np.flatnonzero(own).tolist(), "alike" if name == "absent" else name
             figure.add_scatter(
                 x=x[own].tolist(),
                 y=y[own].tolist(),
@@ -94,7 +106,7 @@ def array_map(
                 textfont={"size": 12 if len(sensors) <= 16 else 9, "color": [_ink(colours[row]) for row in rows]},
                 customdata=[
                     _told(
-                        sensors[row], reasons[row], value[row], _interval(row, value, uncertainty, quantity), quantity
+                        sensors[row], notes[row], stated[row], _interval(row, stated, uncertainty, quantity), quantity
                     )
                     for row in rows
                 ],
@@ -107,42 +119,40 @@ def array_map(
                     **({"colorbar": _bar(quantity)} if name == "differs" else {}),
                     "line": {"width": 0},
                 },
-                meta=name,
-                showlegend=name != "stands out",
+                meta=meta,
+                showlegend=name not in ("absent", "stands out"),
             )
             if not inside and len(sensors) <= _MOST_WITH_ID:
-                below.append({**_below([sensors[row] for row in rows], x[own], y[own] - radius), "meta": name})
+                edges = np.array([AROUND * radius if sensors[row] == chosen else radius for row in rows])
+                below.append({**_below([sensors[row] for row in rows], x[own], y[own] - edges), "meta": meta})
     figure.add_traces(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
-    if not plain.all():  # in the legend as its disc is ringed
-        ringed = {"symbol": "circle-open", "size": 10, "color": _APART["color"], "line": _APART}
-        figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)["stands out"])
+    # In the legend as their discs are ringed.
+    for name, shown, border in (("absent", away & plain, _ABSENT), ("stands out", ~plain, _APART)):
+        if shown.any():
+            ringed = {"symbol": "circle-open", "size": 10, "color": border["color"], "line": border}
+            figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)[name])
     discs = []
     for row, name in enumerate(sensors):
-        ring = {"color": INK, "width": 4} if name == chosen else _APART if reasons[row] else None
+        own_line = {"color": INK, "width": 4} if name == chosen else _APART if reasons[row] else None
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
-        line = ring or {"color": "#5b6670", "width": 1}
+        line = own_line or ({**_ABSENT, "dash": "dot"} if away[row] else {"color": "#5b6670", "width": 1})
         discs.append(
             {"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", "name": "sensor", **disc}
         )
     if chosen in sensors:  # on the ground too, since a disc may have the colour of its own ring
-        discs.append(_ring(x[sensors.index(chosen)], y[sensors.index(chosen)], _AROUND * radius))
-    figure.update_layout(shapes=discs, showlegend=sum(trace.mode != "text" for trace in figure.data) > 1)
+        discs.append(ring(x[sensors.index(chosen)], y[sensors.index(chosen)], radius))
+    figure.update_layout(shapes=discs, showlegend=sum(trace.hoverinfo != "skip" for trace in figure.data) > 1)
     figure.update_layout(meta={"alike": _ALIKE, "unknown": _UNKNOWN})  # for a page, which has others in the dark
     for update, along in ((figure.update_xaxes, x), (figure.update_yaxes, y)):
-        edge = 1.3 * max(radius, _SHARE * apart)
+        edge = 1.3 * max(radius, SHARE * apart)
         update(range=[float(along.min()) - edge, float(along.max()) + edge])
     figure.update_xaxes(title="x [mm]", constrain="domain", showgrid=False, zeroline=False)
     figure.update_yaxes(
         title="y [mm]", scaleanchor="x", scaleratio=1, constrain="domain", showgrid=False, zeroline=False
     )
     return styled(figure, f"{quantity.name} over the array")
-
-
-def _ring(x: float, y: float, radius: float) -> dict[str, Any]:
-    ends = {"x0": x - radius, "x1": x + radius, "y0": y - radius, "y1": y + radius}
-    return {"type": "circle", "line": {"color": INK, "width": 2}, "layer": "below", **ends}
 
 
 def told_apart(values: ArrayLike, uncertainties: ArrayLike, quantity: Quantity = D33) -> str:
@@ -169,7 +179,12 @@ def _names(quantity: Quantity) -> dict[str, str]:
         "bound": "0 within its ±",
         "nothing": "not known",
     }
-    return {"differs": quantity.name, "alike": alike[quantity.against], "stands out": "stands out"}
+    return {
+        "differs": quantity.name,
+        "alike": alike[quantity.against],
+        "absent": "not in this campaign",
+        "stands out": "stands out",
+    }
 
 
 def _coloured(value: Floats, uncertainty: Floats, quantity: Quantity) -> Mask:
@@ -211,39 +226,13 @@ def _mixed(known: Floats) -> bool:
     return bool(known.min() < 0 < known.max()) and least > _MIXED * most
 
 
-def disc_size(x_mm: ArrayLike, y_mm: ArrayLike, sensor_radius_mm: float | None) -> str:
-    """A sentence: of which size the discs of such a map are, beside the sensors themselves."""
-    if sensor_radius_mm is None:
-        return "Discs do not have the sensors' size, which is not declared."
-    drawn = _radius(np.asarray(x_mm, dtype=float), np.asarray(y_mm, dtype=float), sensor_radius_mm)
-    if drawn == sensor_radius_mm:
-        return "Discs have the sensors' size."
-    return f"Discs are {drawn / sensor_radius_mm:.3g} times as wide as the sensors."
-
-
-def _apart(x: Floats, y: Floats) -> float:
-    """The smallest distance of two sensors in different places [mm]; of a single one that at which its disc ends."""
-    apart = np.hypot(x[:, None] - x, y[:, None] - y)
-    apart = apart[apart > 0]
-    return float(apart.min()) if len(apart) else _ALONE_MM / _SHARE
-
-
-def _radius(x: Floats, y: Floats, sensor_radius_mm: float | None) -> float:
-    """Of all discs [mm]: the sensors', unless it is unknown, too small to be seen, or discs would overlap."""
-    widest = _SHARE * _apart(x, y)
-    side = max(float(np.ptp(x)), float(np.ptp(y)))
-    if sensor_radius_mm is None or sensor_radius_mm < _SEEN * side:
-        return widest
-    alone = side == 0
-    return sensor_radius_mm if alone else min(sensor_radius_mm, widest / _SHARE / 2)
-
-
 def _below(sensors: Sequence[str], x: Floats, y: Floats) -> dict[str, Any]:
     """Ids below discs that have no room for them."""
     return {
         "x": x.tolist(),
         "y": y.tolist(),
-        "mode": "text",
+        "mode": "markers+text",
+        "marker": {"size": _BELOW, "opacity": 0},
         "text": list(map(_id, sensors)),
         "textposition": "bottom center",
         "hoverinfo": "skip",
@@ -275,9 +264,9 @@ def _told(name: str, reason: str, value: float, interval: tuple[float, float] | 
     text = f"{label(name)}: {escape(reason, quote=False)}" if reason else label(name)
     if not np.isfinite(value):
         return f"{text}<br>{quantity.name} not known"
-    text += f"<br>{quantity.name} {value:.5g} {quantity.unit}"
+    text += with_minus(f"<br>{quantity.name} {value:.5g} {quantity.unit}")
     of = "within its ±" if quantity.against == "bound" else "95 %"
-    return text if interval is None else f"{text}<br>{of}: {interval[0]:.4g} to {interval[1]:.4g}"
+    return text if interval is None else text + with_minus(f"<br>{of}: {interval[0]:.4g} to {interval[1]:.4g}")
 
 
 def _ink(colour: str) -> str:

@@ -14,6 +14,7 @@ from underskin.recordings.frf.summary import FrfLines, FrfSpread
 from underskin.units import Floats
 
 PlotlyTrace = dict[str, Any]
+Condition = tuple[float, float]  # radius of the indenter [mm], preload [N]
 
 _AXES = ("", "2", "3")  # of the panels
 _UNITS = (" pC/N", "°", "")
@@ -27,7 +28,7 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
     """Median magnitude and phase and lowest coherence of each condition, with the range of its magnitudes as a band."""
     traces: list[PlotlyTrace] = []
     for number, spread in enumerate(spreads):
-        colour, look = _look(spread, spreads)
+        colour, look = _look(_condition(spread), list(map(_condition, spreads)))
         name = f"R {spread.indenter_radius_mm:.3g} mm, {spread.preload_n:.3g} N ({spread.recordings})"
         low, middle, high = spread.magnitude_pc_per_n
         band = {
@@ -46,12 +47,16 @@ def frf_overview(spreads: Sequence[FrfSpread], zone_hz: tuple[float, float] | No
     return _finished(traces, zone_hz, "FRF: median and range of the recordings alike")
 
 
-def frf_recordings(recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None) -> go.Figure:
-    """Each recording's lines; of many their names are under the pointer alone."""
+def frf_recordings(
+    recordings: Sequence[FrfLines], zone_hz: tuple[float, float] | None, conditions: Sequence[Condition] = ()
+) -> go.Figure:
+    """Each recording's lines; of many their names are under the pointer alone. `conditions`: each one's, by which its
+    lines look as in `frf_overview`; without them each recording has a look of its own."""
     traces: list[PlotlyTrace] = []
-    for number, entry in enumerate(recordings):
+    looks = [_look(one, conditions)[1] for one in conditions] or [one_of_many(n, 1.2) for n in range(len(recordings))]
+    for number, (entry, look) in enumerate(zip(recordings, looks, strict=True)):
         parts = (entry.magnitude_pc_per_n, entry.phase_deg, entry.coherence)
-        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, one_of_many(number, 1.2))
+        traces += _lines(label(entry.name), str(number), entry.frequency_hz, parts, look)
     figure = _finished(traces, zone_hz, "FRF of each recording")
     return figure.update_layout(showlegend=len(recordings) <= _MOST_IN_LEGEND)
 
@@ -118,13 +123,16 @@ def _values(traces: Sequence[PlotlyTrace], axis: str) -> Floats:
     return np.concatenate([np.zeros(0), *(trace["y"] for trace in traces if trace.get("yaxis") == axis)])
 
 
-def _look(spread: FrfSpread, spreads: Sequence[FrfSpread]) -> tuple[str, dict[str, Any]]:
+def _condition(spread: FrfSpread) -> Condition:
+    return spread.indenter_radius_mm, spread.preload_n
+
+
+def _look(condition: Condition, conditions: Sequence[Condition]) -> tuple[str, dict[str, Any]]:
     """Colour by preload, from dark to bright, and the whole look: with marks by indenter, but for the smallest."""
-    preloads = sorted({entry.preload_n for entry in spreads})
-    radii = sorted({entry.indenter_radius_mm for entry in spreads})
-    place = _BRIGHTEST * preloads.index(spread.preload_n) / max(len(preloads) - 1, 1)
+    radii, preloads = (sorted(set(values)) for values in zip(*conditions, strict=True))
+    place = _BRIGHTEST * preloads.index(condition[1]) / max(len(preloads) - 1, 1)
     colour = sample_colorscale("Viridis", [place])[0]
-    number = radii.index(spread.indenter_radius_mm)
+    number = radii.index(condition[0])
     marks = marked(number - 1) if number else {"mode": "lines"}
     return colour, {"line": {"color": colour, "width": 1.5}, **marks}
 

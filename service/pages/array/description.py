@@ -134,7 +134,7 @@ def charge_figure(
     answer: ArrayStress, loads_mm: Sequence[tuple[float, float]], radius_mm: float, numbers: str
 ) -> Drawn:
     """Each sensor coloured by its charge, with the loads where they have positions; `radius_mm`: the sensors'."""
-    from underskin.figures.array_map import disc_size
+    from underskin.figures.array_discs import disc_size
     from underskin.figures.loads import loaded_array
 
     x, y, charge, error = (answer.columns[name] for name in ("x_mm", "y_mm", "charge_pc", "charge_error_pc"))

@@ -65,7 +65,8 @@ def _chosen(answer: Mapping[str, Any]) -> str:
 def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], show: str) -> list[Drawn]:
     """Against preload, per sensor and as a map; where `show` is a sensor, its points against preload, and it ringed."""
     from underskin.figures.array import frf_versus_preload, response_per_sensor
-    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     if answer["band"] is None:
         return []

@@ -23,7 +23,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 router = APIRouter(prefix="/compare")
 
 _MOST_LISTED = 200
-_MOST_NAMED = 6  # sensors that lie elsewhere
+_MOST_NAMED = 6  # sensors
 _SAME_PLACE_MM = 0.01
 _COLUMNS = (
     "sensor", "first_pc_per_n", "first_uncertainty_pc_per_n", "second_pc_per_n", "second_uncertainty_pc_per_n",
@@ -77,6 +77,8 @@ def compare(
         second=second,
         both=both,
         rows=rows,
+        without_common=without_common(answers) if is_two and kind == "frf" else [],
+        most_named=_MOST_NAMED,
         moved=elsewhere[:_MOST_NAMED],
         more_moved=len(elsewhere[_MOST_NAMED:]),
         means=curves.means(of_curves) if of_curves else [],
@@ -99,6 +101,12 @@ def _pair(
     of_first = next((row.skin_id for row in listed if row.id == first), None)
     others = sorted((row for row in listed if row.id != first), key=lambda row: row.skin_id != of_first)
     return first, second or next((row.id for row in others), first)
+
+
+def without_common(answers: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+    """The ids of the sensors of both campaigns, where both have some and none is in both; else empty."""
+    ids = [[entry["sensor"] for entry in answer["sensors"]] for answer in answers]
+    return ids if len(ids) == 2 and all(ids) and set(ids[0]).isdisjoint(ids[1]) else []
 
 
 def moved(both: Sequence[AnyRow], rows: Sequence[Mapping[str, Any]]) -> list[tuple[str, float]]:
@@ -172,7 +180,8 @@ def drawn_maps(
     both: Sequence[AnyRow], answers: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
 ) -> list[Drawn]:
     """The maps of both in the same colours, and that of the difference; none where no sensor's d33 is known."""
-    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     if not rows or not all(answer["sensors"] for answer in answers):
         return []

@@ -58,7 +58,8 @@ def shown_array(
 
 
 def _map(campaign: AnyRow, rows: Sequence[Mapping[str, Any]], sensor: str | None) -> Drawn:
-    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         rows, "sensor", *_D33, "x_mm", "y_mm", "reasons"

@@ -18,6 +18,7 @@ from service.problems import Refusal
 from service.usecases import mechanisms as usecase
 from service.usecases.mechanism_catalogue import catalogue, effect
 from service.usecases.mechanism_findings import findings
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.figures.law_effect import RIG, LawEffect
 from underskin.mechanisms import Unsupported
 from underskin.surrogate.sigma_table import SigmaTable
@@ -39,6 +40,7 @@ def mechanisms(request: Request, store: Store, table: Table) -> Response:
         others=[one for one in known.entries if not one.entry.own],
         diagnoses=known.diagnoses,
         shown=_SHOWN,
+        sure=EXPLAINED,
         rig=RIG,
         same=same_request.get(request, "/v1/mechanisms", "client.mechanisms.all()"),
     )

@@ -8,8 +8,9 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
-from service.pages.shared.plain_sentences import in_readable_units, without_rig
+from service.pages.shared.plain_sentences import without_rig
 from underskin.findings.formatting import in_digits, in_percent, significant
+from underskin.findings.typeset import in_readable_units, with_minus
 from underskin.recordings.time_zone import time_zone
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
@@ -61,14 +62,16 @@ def _to_places(value: float, places: int) -> str:
 
 def given(value: float | None, unit: str = "") -> Markup:
     """A number as somebody gave it, with its unit."""
-    return _with_unit("–", "", "") if value is None else _with_unit(f"{value:.6g}", repr(value), unit)
+    if value is None:
+        return _with_unit("–", "", "")
+    return _with_unit(with_minus(f"{value or 0.0:.6g}"), repr(value), unit)
 
 
 def short_and_exact(value: float | None, unit: str, digits: int) -> tuple[str, str]:
     """A number to so many digits, and with its unit all of it."""
     if value is None or not math.isfinite(value):
         return "–", "not known"
-    shown = significant(value, digits, trailing_zeros=1e-4 <= abs(value) < 1e5)
+    shown = significant(value or 0.0, digits, trailing_zeros=1e-4 <= abs(value) < 1e5)  # 0 has no sign
     return shown.replace("-", "−"), f"{value!r} {unit}".strip()
 
 

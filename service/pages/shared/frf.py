@@ -31,8 +31,10 @@ def drawn_frf(
             return []
         if len(chosen) <= MOST_SINGLE:
             lines = [summary.lines_of(_title(recording, show), frf) for recording, frf in chosen]
+            conditions = _conditions([recording for recording, _ in chosen])
             about = "Magnitude, phase and coherence of each recording; R is the sphere's radius."
-            return [drawn("frf", frf_recordings(lines, zone), about, place)]
+            about += " Colours tell preloads apart, marks along the lines spheres." if conditions else ""
+            return [drawn("frf", frf_recordings(lines, zone, conditions), about, place)]
         summaries = spreads_of(chosen)
     else:
         summaries = spreads(kept_spreads)
@@ -42,6 +44,13 @@ def drawn_frf(
         "and phase and the lowest coherence; as a band, the magnitudes of all its recordings. R is the sphere's radius."
     )
     return [drawn("frf", frf_overview(summaries, zone), about, place)]
+
+
+def _conditions(recordings: Sequence[FrfRecording]) -> list[tuple[float, float]]:
+    """Sphere [mm] and preload [N] of each recording, where these are of one sensor under several loads."""
+    conditions = [(one.indenter_radius_mm, one.preload_n) for one in recordings]
+    of_one_sensor = len({one.sensor for one in recordings}) == 1
+    return conditions if of_one_sensor and len(set(conditions)) > 1 else []
 
 
 def _title(recording: FrfRecording, show: str) -> str:

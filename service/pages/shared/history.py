@@ -5,6 +5,7 @@ from urllib.parse import quote
 
 from service.pages.shared.figures import Drawn, drawn
 from service.schemas.skins import History, SensorHistory
+from underskin.findings.typeset import with_minus
 
 By = Literal["paper", "adopted"]
 RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}
@@ -41,4 +42,5 @@ def _trend_in_words(entry: SensorHistory) -> str:
     if line is None:
         return f"no trend: {entry.no_trend}"
     slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
+    slope = with_minus(slope)
     return slope if line.significant else f"no significant trend ({slope})"

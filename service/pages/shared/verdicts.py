@@ -84,7 +84,7 @@ def _modulus(report: Mapping[str, Any]) -> str | None:
     after = (report["fit"] or {}).get("after", {}).get("youngs_modulus")
     if after is None or report["verdict"] not in ("explained", "no_mismatch"):
         return None
-    value, low, high = (f"{after[name]:.4g}" for name in ("value", "low", "high"))
+    value, low, high = (f"{after[name]:.3g}" for name in ("value", "low", "high"))
     return f"{value} {after['unit']} (95 %: {low} to {high})"
 
 
@@ -138,12 +138,13 @@ def adopted_versions(connection: Connection, rows: Sequence[AnyRow]) -> list[Ado
 
 def _quoted(report: Mapping[str, Any]) -> str:
     """Of a report with a d33; why it may not be quoted is what the report states."""
-    from underskin.diagnosis.reporting.wording import interval, not_quoted, number  # with what draws, which takes long
+    from underskin.diagnosis.reporting.wording import as_stated, not_quoted  # with what draws, which takes long
 
     d33 = report["d33"]
+    low, high = as_stated(d33["low"]), as_stated(d33["high"])
     if d33.get("quotable", True):
-        return f"{number(d33['value'])} {d33['unit']} (95 %: {interval(d33)})"
-    return not_quoted(report) or f"it lies from {number(d33['low'])} to {number(d33['high'])} {d33['unit']}"
+        return f"{as_stated(d33['value'])} {d33['unit']} (95 %: {low} to {high})"
+    return not_quoted(report) or f"it lies from {low} to {high} {d33['unit']}"
 
 
 def answer_by_it(store: Database, table: SigmaTable, row: AnyRow) -> tuple[Mapping[str, Any] | None, str | None]:

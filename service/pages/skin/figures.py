@@ -1,14 +1,17 @@
 """The figure of a skin's page: its array as a map."""
 
+import math
 from collections.abc import Mapping, Sequence
+from datetime import datetime
 from typing import Any, Literal
 from urllib.parse import quote
 
 from service.pages.shared.figures import CLICK, Drawn, columns_of, drawn, sensors_of
 from service.pages.shared.history import RESTS, By
-from service.schemas.skins import History, TrendAnswer
+from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import interval
+from underskin.recordings.time_zone import time_zone
 
 _MOST_NAMED = 5  # sensors, in a sentence
 
@@ -26,12 +29,44 @@ _ENDS: dict[Shown, tuple[str, str]] = {
 }  # columns of 95 % intervals
 
 
-def map_rows(row: AnyRow, answer: Mapping[str, Any], history: History) -> list[dict[str, Any]]:
-    """Each sensor of a campaign's answer, with its place and, where it has one, its trend."""
-    trends = {
-        entry.sensor: _trend(entry.trend, len(entry.points)) for entry in history.sensors if entry.trend is not None
+def map_rows(
+    row: AnyRow, answer: Mapping[str, Any] | None, history: History, places: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Each sensor of the skin, which has `places`, with its trend, where it has one: as a campaign's answer tells it,
+    else with its last value in `history` and in words since when that stands (`absent`), else without a value."""
+    answered = {} if answer is None else {entry["sensor"]: entry for entry in sensors_of(row, answer)}
+    known = {entry.sensor: entry for entry in history.sensors}
+    rows = []
+    for place in places:
+        name = place["id"]
+        of_sensor = known.get(name)
+        its = answered.get(name) or _last(of_sensor)
+        trend = {} if of_sensor is None or of_sensor.trend is None else _trend(of_sensor.trend, len(of_sensor.points))
+        rows.append({"sensor": name, "x_mm": place["x_mm"], "y_mm": place["y_mm"], "absent": "", **its, **trend})
+    return rows
+
+
+def _last(of_sensor: SensorHistory | None) -> dict[str, Any]:
+    """The last value of a sensor that the latest campaign did not measure."""
+    if of_sensor is None or not of_sensor.points:
+        return {"reasons": "", "absent": "never measured with FRFs"}
+    from underskin.figures.style import SDS_OF_95  # with what draws, which takes long
+
+    point = of_sensor.points[-1]
+    half = SDS_OF_95 * point.d33_uncertainty_pc_per_n
+    return {
+        "d33_pc_per_n": point.d33_pc_per_n,
+        "d33_uncertainty_pc_per_n": point.d33_uncertainty_pc_per_n,
+        "d33_low_pc_per_n": point.d33_pc_per_n - half,
+        "d33_high_pc_per_n": point.d33_pc_per_n + half,
+        "reasons": "",
+        "absent": f"last measured on {_day(point.time)}",
     }
-    return [{**sensor, **trends.get(sensor["sensor"], {})} for sensor in sensors_of(row, answer)]
+
+
+def _day(time: str) -> str:
+    """The day of a time of the store in the lab's zone, as the axis of a history has it."""
+    return datetime.fromisoformat(time).astimezone(time_zone()).strftime("%d %b %Y")
 
 
 def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:
@@ -42,8 +77,9 @@ def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:
 def drawn_map(
     root: str, row: AnyRow, rows: Sequence[Mapping[str, Any]], show: Shown, by: By, sensor: str | None
 ) -> Drawn:
-    """The sensors of `map_rows` where they lie, one of them chosen."""
-    from underskin.figures.array_map import Quantity, array_map, disc_size, told_apart
+    """The sensors of `map_rows` where they lie, one of them chosen; `row` is the campaign that answered."""
+    from underskin.figures.array_discs import disc_size
+    from underskin.figures.array_map import Quantity, array_map, told_apart
 
     value, uncertainty, name, unit, against = _QUANTITIES[show]
     # A slope through few campaigns is surer by its uncertainty than by Student's t, so that its own test tells.
@@ -54,13 +90,17 @@ def drawn_map(
     names, x_mm, y_mm, reasons = columns_of(rows, "sensor", "x_mm", "y_mm", "reasons")
     radius = row.about["skin"].get("sensor_radius_mm")
     values, uncertainties = columns_of(rows, value, uncertainty)
-    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor, radius)
+    # A trend is of all campaigns, whichever measured a sensor last.
+    absent = ["" if show == "trend" else row["absent"] for row in rows]
+    figure = array_map(names, x_mm, y_mm, values, uncertainties, reasons, quantity, sensor, radius, absent)
+    compared = [math.nan if away else one for away, one in zip(absent, values, strict=True)]
     about = (
         f"Each sensor where it lies, coloured by {name}, in {row.name}, the latest campaign with FRFs, {RESTS[by]}. "
     )
-    sensors = len(row.about["skin"]["sensors"])
-    about += f"It tells of {len(rows)} of the {sensors} sensors. " if len(rows) < sensors else ""
-    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(values, uncertainties, quantity)} "
+    measured = sum(not row["absent"] for row in rows)
+    about += f"It tells of {measured} of the {len(rows)} sensors. " if measured < len(rows) else ""
+    about += "The hollow ones stand at their last value, with its date under the pointer. " if any(absent) else ""
+    about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(compared, uncertainties, quantity)} "
     about += _alone(rows) if show == "trend" else ""
     return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
 

@@ -47,7 +47,7 @@ _MOST_TOGETHER = 5  # of the latest diagnoses of each kind
 _AT_ONCE = 2  # campaigns whose d33 a page waits for
 _MAP_COLUMNS = (
     "sensor", "x_mm", "y_mm", *D33Value.model_fields,
-    "slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year",
+    "slope_pc_per_n_per_year", "slope_uncertainty_pc_per_n_per_year", "absent",
 )  # fmt: skip
 _HISTORY_COLUMNS = (
     "sensor", "campaign_id", "time", "time_is", "d33_pc_per_n", "d33_uncertainty_pc_per_n", "model", "model_id",
@@ -96,6 +96,7 @@ def shown(
         about = skins.find(connection, root)
         changed = changes.of_skin(connection, root)
         used = annotations.in_use(connection, root)
+        places = usecase.sensors(connection, root)
         mark = skin_changes.mark(connection, root, table.sha256)
         together = [row for kind in _SEVERAL for row in _latest(connection, root, kind)]
         may_be_together = diagnosed_together.count_usable(connection, root) > 1
@@ -114,12 +115,13 @@ def shown(
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
-    if last is not None and mapped is not None and mapped["sensors"]:
-        figures.append(drawn_map(root, last, map_rows(last, mapped, history), show, by, sensor))
+    if last is not None and (history.sensors or (mapped is not None and mapped["sensors"])):
+        figures.append(drawn_map(root, last, map_rows(last, mapped, history, places), show, by, sensor))
     if history.sensors:
         figures.append(drawn_history(root, history, sensor, by))
     chosen = {"show": show, **({"model": by} if serves else {}), **({} if sensor is None else {"sensor": sensor})}
-    frfs = [] if sensor is None or last is None or answer is None else _frfs(store, last, answer, sensor)
+    shown_of = None if sensor is None or last is None else _measured_last(store, last, answer, history, sensor)
+    frfs = [] if sensor is None or shown_of is None else _frfs(store, table, shown_of, sensor)
     path = f"/v1/skins/{quote(root, safe='')}"
     made = page(
         request,
@@ -154,6 +156,8 @@ def shown(
         of_sensor=_of_sensor(history, sensor),
         figures=figures,
         frfs=frfs,
+        shown_of=shown_of,
+        sensors=len(places),
         show=show,
         sensor=sensor,
         waiting=waiting,
@@ -169,12 +173,22 @@ def shown(
     return made
 
 
-def _frfs(store: Database, last: AnyRow, answer: Mapping[str, Any], sensor: str) -> list[Drawn]:
-    """Those of a sensor in the campaign that describes the skin, unless it has none."""
-    loaded = partial(store.read, campaigns.load, last, with_excluded=False)
+def _measured_last(
+    store: Database, last: AnyRow, answer: Mapping[str, Any] | None, history: History, sensor: str
+) -> AnyRow:
+    """The campaign that describes the skin, where it tells of the sensor, else the last one that does."""
+    told = [] if answer is None else [entry["sensor"] for entry in answer["sensors"]]
+    points = [point for entry in history.sensors if entry.sensor == sensor for point in entry.points]
+    return last if sensor in told or not points else store.read(campaigns.find, points[-1].campaign_id)
+
+
+def _frfs(store: Database, table: SigmaTable, row: AnyRow, sensor: str) -> list[Drawn]:
+    """Those of a sensor in a campaign, unless it has none."""
+    loaded = partial(store.read, campaigns.load, row, with_excluded=False)
+    answer = d33_cache.answer(store, table, row, None)
     return [
-        replace(one, title=f"FRF of {sensor} in {last.name[:80]}")
-        for one in drawn_frf(last, loaded, answer, None, sensor)
+        replace(one, title=f"FRF of {sensor} in {row.name[:80]}")
+        for one in drawn_frf(row, loaded, answer, None, sensor)
     ]
 
 
@@ -197,11 +211,15 @@ def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
 
 @router.get("/map.csv")
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
-    """d33 of each sensor in the latest campaign with FRFs, and its trend."""
+    """d33 of each sensor in the latest campaign with FRFs, or its last value and since when that stands (`absent`), and
+    its trend."""
     root, _ = _completed(store, table, skin_id)
     history = usecase.history_by_model(store, table, root, by)
     row = store.read(campaigns.describing, root)
-    rows = [] if row is None else map_rows(row, d33_cache.by_model(store, table, row, by), history)
+    if row is None:
+        return csv_of_rows(file_name(root, "map"), _MAP_COLUMNS, [])
+    places = store.read(usecase.sensors, root)
+    rows = map_rows(row, d33_cache.by_model(store, table, row, by), history, places)
     return csv_of_rows(file_name(root, "map"), _MAP_COLUMNS, rows)
 
 

@@ -1,5 +1,6 @@
 """The start: skins at a glance."""
 
+from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from typing import Annotated, Any
@@ -48,7 +49,7 @@ def start(
                 sparkline(glance.d33),
                 None if glance.diagnosis is None else verdict[glance.diagnosis.id],
                 None if glance.model is None else adoptions[glance.model.id],
-                verdicts.change_percent(glance.paper_d33, glance.adopted_d33),
+                verdicts.change_percent(_d33(glance.paper_array), _d33(glance.adopted_array)),
             )
             for glance in shown
         ],
@@ -60,6 +61,10 @@ def start(
     )
     answer.background = BackgroundTask(_ahead, store, table)
     return answer
+
+
+def _d33(array: Mapping[str, Any] | None) -> float | None:
+    return None if array is None else array["d33_pc_per_n"]
 
 
 @cache

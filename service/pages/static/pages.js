@@ -1,16 +1,21 @@
 "use strict";
 // Small helps on every page; each works without as well.
 
-// Times in the viewer's zone, the exact one under the pointer.
+const DAY = { year: "numeric", month: "short", day: "numeric" };
+
+// Times in the viewer's zone, the exact one under the pointer; in choices, which hold text alone, the day.
 function show_times(root) {
   for (const time of root.querySelectorAll("time[datetime]")) {
     const when = new Date(time.dateTime);
     if (Number.isNaN(when.getTime())) continue;
-    const date = { year: "numeric", month: "short", day: "numeric" };
     const { form } = time.dataset; // a day is the lab's, whatever the viewer's zone
     const clock = form === "day" ? { timeZone: "UTC" } : form === "date" ? {} : { hour: "2-digit", minute: "2-digit" };
     time.title = time.dateTime;
-    time.textContent = when.toLocaleString(undefined, { ...date, ...clock });
+    time.textContent = when.toLocaleString(undefined, { ...DAY, ...clock });
+  }
+  for (const choice of root.querySelectorAll("option[data-day]")) {
+    const day = new Date(choice.dataset.day).toLocaleDateString(undefined, { ...DAY, timeZone: "UTC" });
+    choice.textContent = choice.textContent.replace(choice.dataset.day, day);
   }
 }
 

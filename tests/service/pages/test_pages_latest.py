@@ -1,5 +1,6 @@
 """Which campaign of a skin is the latest, and which one describes it, on every page alike."""
 
+import csv
 import re
 from pathlib import Path
 from typing import Any
@@ -8,6 +9,7 @@ import pytest
 
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
+from tests.service.pages.test_pages_array import place_of
 from tests.support.blocks import block
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -77,6 +79,26 @@ def test_a_block_leaves_the_skin_its_geometry_and_its_map(reader: Visit) -> None
     assert reader.page.get_by_label("thickness h").input_value() == "3"
     reader.drawn(1)
     assert reader.page.get_by_role("alert").count() == 0
+
+
+def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(idle: Server, reader: Visit) -> None:
+    of_one = recorded(campaign("in October", sensors=1), "2026-10-01")
+    for document in (recorded(campaign("in May", sensors=3), "2026-05-03"), of_one):
+        idle.http.post("/v1/campaigns?skin=parts", json=document).raise_for_status()
+    page = reader.page
+    reader.go("/skins/parts")
+    reader.drawn(2)
+    assert "from 1 of 3 sensors" in page.locator(".facts").inner_text()
+    about = page.locator("#figure-map figcaption").inner_text()
+    assert "It tells of 1 of the 3 sensors. The hollow ones stand at their last value" in about
+    told = page.locator("#figure-map .plot").evaluate("plot => plot.data.flatMap((one) => one.customdata ?? [])")
+    old = "last measured on 03 May 2026"
+    assert [f"s{number}: {old}<br>d33 1" in text for number, text in enumerate(told)] == [False, True, True]
+    page.mouse.click(*place_of(page.locator("#figure-map"), "s2"))
+    page.wait_for_url("**sensor=s2*")
+    assert "FRF of s2 in in May" in page.locator("#figure-frf figcaption").inner_text()
+    rows = list(csv.DictReader(idle.http.get("/skins/parts/map.csv", headers=BROWSING).text.splitlines()))
+    assert [row["absent"] for row in rows] == ["", old, old]
 
 
 def test_older_campaigns_are_on_the_pages_behind(idle: Server, reader: Visit) -> None:

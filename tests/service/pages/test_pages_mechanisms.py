@@ -85,14 +85,23 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server,
     page.wait_for_url(f"**/diagnoses/{diagnosis_id}")
 
 
-def test_a_mechanism_among_several_answers_is_possible_and_not_found(idle: Server, reader: Visit) -> None:
-    open_answer = {**report(), "verdict": "ambiguous"}
-    before = _row_of(reader, "Contact resonance")
-    diagnosed(idle, resonant("undecided"), open_answer, skin="undecided")
-    after = _row_of(reader, "Contact resonance")
-    assert after.startswith(before.partition(",")[0])
-    assert after.endswith("possible in 1")
-    expect(reader.page.locator("#contact_resonance").get_by_text("Possible in 1 more")).to_be_visible()
+@pytest.mark.parametrize("verdict", ["ambiguous", "unexplained"])
+def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(
+    idle: Server, reader: Visit, verdict: str
+) -> None:
+    counted = []
+    for probability in (None, 0.9, 0.55):
+        if probability is not None:
+            stated = [{**one, "probability": probability} for one in report()["mechanisms"]]
+            made = {**report(), "verdict": verdict, "mechanisms": stated}
+            name = f"{verdict} {probability}"
+            diagnosed(idle, resonant(name), made, skin=verdict)
+        found, _, possible = _row_of(reader, "Contact resonance").partition(", possible in ")
+        counted.append((int(found), int(possible or 0)))
+    (was_found, was_possible), *after = counted
+    assert after == [(was_found + 1, was_possible), (was_found + 1, was_possible + 1)]
+    more = f"Possible in {was_possible + 1} more, with less than 80 %"
+    expect(reader.page.locator("#contact_resonance").get_by_text(more)).to_be_visible()
 
 
 def _row_of(reader: Visit, name: str) -> str:

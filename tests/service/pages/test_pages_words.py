@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from service.pages.shared.formats import end_of, given, interval
+from service.pages.shared.formats import end_of, given, interval, number
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.support.store_server import Server, campaign
@@ -68,6 +68,8 @@ def test_a_length_that_has_no_sign_is_refused_without_words_on_magnitude(idle: S
 
 def test_what_was_not_given_has_no_unit() -> None:
     assert [re.sub("<[^>]*>", "", given(value, "mm")) for value in (2.5, None)] == ["2.5&nbsp;mm", "–"]
+    signed = [re.sub("<[^>]*>", "", shown) for shown in (given(-30.2), given(-0.0), number(-1.5), number(-0.0))]
+    assert signed == ["−30.2", "0", "−1.50", "0"]
 
 
 @pytest.mark.parametrize("second", [1.0, 0.7])

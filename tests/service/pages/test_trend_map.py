@@ -64,7 +64,7 @@ def test_a_slope_is_coloured_where_its_trend_is_significant(d33: list[list[float
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
     of_skin = history(d33, 0.001)
-    drawn = drawn_map("palm", row, map_rows(row, answer, of_skin), "trend", "paper", None)
+    drawn = drawn_map("palm", row, map_rows(row, answer, of_skin, places), "trend", "paper", None)
     shapes: list[dict[str, Any]] = orjson.loads(str(drawn.json))["layout"]["shapes"]
     assert [shape["fillcolor"] not in (GREY, "#ffffff") for shape in shapes] == [*coloured, False]
     assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
@@ -76,7 +76,7 @@ def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
     d33 = [[12.35, 9.7, 6.96] if number == 37 else [13.0, 13.1, 13.0] for number in range(60)]
-    about = drawn_map("palm", row, map_rows(row, answer, history(d33, 0.1)), "trend", "paper", None).about
+    about = drawn_map("palm", row, map_rows(row, answer, history(d33, 0.1), places), "trend", "paper", None).about
     assert "no sensor's differs from 0" in about
     assert "Taken alone, s37 would have a trend (95 %)" in about
 
@@ -85,14 +85,13 @@ def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
 def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_significant(
     values: list[float],
 ) -> None:
-    row = cast(
-        "AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": [{"id": "s0", "x_mm": 0, "y_mm": 0}]}})
-    )
+    places = [{"id": "s0", "x_mm": 0, "y_mm": 0}]
+    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     of_skin = history([values], 0.001)
-    rows = map_rows(row, {"sensors": [{"sensor": "s0", "flags": []}]}, of_skin)
+    rows = map_rows(row, {"sensors": [{"sensor": "s0", "flags": []}]}, of_skin, places)
     figure = orjson.loads(str(drawn_map("palm", row, rows, "trend", "paper", None).json))
     ((told,),) = [trace["customdata"] for trace in figure["data"]]
-    low, high = (float(end) for end in told.partition("95 %: ")[2].split(" to "))
+    low, high = (float(end.replace("−", "-")) for end in told.partition("95 %: ")[2].split(" to "))
     line = of_skin.sensors[0].trend
     assert line is not None
     assert (low < 0 < high) is not line.significant

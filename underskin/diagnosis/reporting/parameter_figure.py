@@ -10,6 +10,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.reporting.figure_style import AFTER, MEASURED, styled
 from underskin.diagnosis.reporting.numbers import multiple_of
+from underskin.findings.typeset import with_minus
 from underskin.mechanisms.parameter import Parameter
 
 _BESIDE = 1.0  # of an interval: room beside it
@@ -55,10 +56,12 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
 def _labelled(entry: Mapping[str, Any]) -> str:
     unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
     interval = f"{entry['value']:.3g} ({entry['low']:.3g} to {entry['high']:.3g}){unit}"
-    return f"{entry['name'].replace('_', ' ')} {interval}"
+    return with_minus(f"{entry['name'].replace('_', ' ')} {interval}")
 
 
 def _before(prior: Parameter, scale: float, unit: str) -> str:
     """What was known before the recordings, in words."""
     low, high = (scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975))
-    return f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"
+    return with_minus(
+        f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"
+    )

@@ -1,4 +1,4 @@
-"""Names and numbers of a report as a page has them."""
+"""Names and numbers of a report as a page has them, numbers with a minus for a hyphen."""
 
 import math
 import re
@@ -10,9 +10,11 @@ from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
 from underskin.diagnosis.reporting.sentences import capital
+from underskin.findings.typeset import with_minus, without_powers
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unnamed.vocabulary import followed
+from underskin.units import readable_unit
 
 _FINDINGS = {
     "bent": "not proportional to the force",
@@ -44,17 +46,19 @@ _FINDINGS = {
     "unusual_magnitude": "unusual size",
 }  # by code; the other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
-
+_FIELDS = {"N": "force_n", "mm": "displacement_mm"}
+_POWERS = 1e-4  # below which four digits are written as a power of ten
 _NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 
 
 def readable(text: str) -> str:
-    """A statement with the names of mechanisms and axes as words: contact resonance for contact_resonance.
+    """A statement with the names of mechanisms and axes as words, contact resonance for contact_resonance, and its
+    small forces and lengths in units in which they read well.
 
     A stored report has sentences alone. This is for display; nothing is decided by it.
     """
     pattern, names = _names()
-    return pattern.sub(lambda match: names[match[0]], text)
+    return with_minus(without_powers(pattern.sub(lambda match: names[match[0]], text)))
 
 
 @cache
@@ -98,7 +102,12 @@ def group(name: str) -> str:
 
 def number(value: float | None) -> str:
     """Four digits."""
-    return "–" if value is None else f"{value:.4g}"
+    return "–" if value is None else with_minus(f"{value:.4g}")
+
+
+def as_stated(value: float | None) -> str:
+    """To the three digits of a statement, beside which it stands."""
+    return "–" if value is None else with_minus(f"{value:.3g}")
 
 
 def error(value: float | None) -> str:
@@ -109,6 +118,15 @@ def error(value: float | None) -> str:
 def interval(entry: Mapping[str, Any]) -> str:
     """From low to high."""
     return f"{number(entry['low'])} to {number(entry['high'])}"
+
+
+def in_its_unit(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """A parameter in the unit in which its value reads well, where that would be a power of ten."""
+    field, ends = _FIELDS.get(entry["unit"]), {name: entry[name] for name in ("value", "low", "high")}
+    if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
+        return dict(entry)
+    unit, count = readable_unit(field, largest)
+    return {**entry, **{name: count * end for name, end in ends.items()}, "unit": unit}
 
 
 def not_quoted(report: Mapping[str, Any]) -> str:
@@ -146,4 +164,6 @@ def plain(value: Any) -> str:
     """A value of a planned recording."""
     if isinstance(value, list):
         return ", ".join(map(plain, value))
-    return f"{value:.4g}" if isinstance(value, float) and math.isfinite(value) else "" if value is None else str(value)
+    if isinstance(value, float) and math.isfinite(value):
+        return number(value)
+    return "" if value is None else str(value)

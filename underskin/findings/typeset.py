@@ -1,0 +1,50 @@
+"""Numbers in sentences as pages and figures set them: a minus sign for a hyphen, small forces and lengths in a unit in
+which they read well. Stored findings and reports stay as they are."""
+
+import re
+
+from underskin.units import readable_unit
+
+_MINUS = re.compile(r"(?<![\w.−-])-(?=\d)")
+_NUMBER = r"[+−-]?\d+(?:\.\d+)?(?:e-\d+)?"
+_MEASURED = re.compile(rf"(?<![\w.])({_NUMBER}) (N|mm)\b(?: \(({_NUMBER}) to ({_NUMBER})\))?")
+_FIELDS = {"N": "force_n", "mm": "displacement_mm"}
+
+
+def with_minus(text: str) -> str:
+    """A text with the sign of its negative numbers as a minus.
+
+    >>> with_minus("s-1 by -0.43 (-0.5 to 0.1e-3) on 2026-05-03")
+    's-1 by −0.43 (−0.5 to 0.1e-3) on 2026-05-03'
+    """
+    return _MINUS.sub("−", text)
+
+
+def in_readable_units(sentence: str) -> str:
+    """A sentence with each force and length in the unit in which it reads well, as figures have it."""
+    return _MEASURED.sub(_readable, sentence)
+
+
+def without_powers(sentence: str) -> str:
+    """The same where a force or length is written as a power of ten, with the interval behind it.
+
+    >>> without_powers("a force of +1.5e-06 N (+1.2e-06 to +1.8e-06) at 0.05 N")
+    'a force of +1.5 µN (+1.2 to +1.8) at 0.05 N'
+    """
+    return _MEASURED.sub(lambda found: _readable(found) if "e-" in found[1] else found[0], sentence)
+
+
+def _readable(found: re.Match[str]) -> str:
+    unit, count = readable_unit(_FIELDS[found[2]], abs(_value(found[1])))
+    if count == 1:
+        return found[0]
+    value, *ends = (_scaled(text, count) for text in found.group(1, 3, 4) if text is not None)
+    return f"{value} {unit}" + (f" ({ends[0]} to {ends[1]})" if ends else "")
+
+
+def _value(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def _scaled(text: str, count: float) -> str:
+    return f"{count * _value(text):{'+' if text.startswith('+') else ''}.4g}"
