@@ -133,7 +133,7 @@ def test_what_is_to_be_quoted_has_the_digits_of_the_statement() -> None:
     d33 = {"value": 13.1234, "low": 12.8912, "high": 13.4321, "unit": "pC/N"}
     errors = {"heldout_rmse_percent": 2.0, "rmse_percent": 2.0}
     fit = {"before": errors, "after": errors, "noise_floor_percent": 2.0, "groups": []}
-    for quotable, said in ((True, "d33 13.1 pC/N, 95 %: 12.9 to 13.4"), (False, "lies between 12.9 and 13.4 pC/N")):
+    for quotable, said in ((True, "d33 13.1 pC/N, 95 %: 12.9 to 13.4"), (False, "lies from 12.9 to 13.4 pC/N")):
         made = {**EMPTY, "verdict": "explained", "d33": {**d33, "quotable": quotable}, "fit": fit}
         assert said in texts(body_of(made, {}))
 
