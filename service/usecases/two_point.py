@@ -16,6 +16,7 @@ from underskin.units import Floats, Mask
 _PLACEMENTS = 7  # over half a pitch: the other half is its mirror image
 _DISTANCES = 16
 _FULL_PLACEMENTS, _FULL_DISTANCES, _FINEST = 13, 160, 25.0  # as `resolution` has them
+_PARTS = 8  # in which those distances are looked at
 _STEPS = 7  # of a bisection
 
 
@@ -64,9 +65,13 @@ def separation(offset: Floats, response: Floats, pitch: float, nearest: float, d
     width = 2 * float(np.interp(float(response[0]) / 2, response[pair], offset[pair]))
     spacing = max(pitch, width / _FINEST)
     distances = np.linspace(nearest, nearest + 4 * spacing + 3 * width, _FULL_DISTANCES)
-    missed = np.flatnonzero(~_seen(offset, response, spacing, distances, _FULL_PLACEMENTS, dip))
-    settled = 0 if missed.size == 0 else int(missed[-1]) + 1
-    return float(distances[settled]) if settled < len(distances) else float("nan")
+    least = float("nan")
+    for some in np.array_split(distances, _PARTS)[::-1]:  # the farthest first: below a missed one nothing matters
+        missed = np.flatnonzero(~_seen(offset, response, spacing, some, _FULL_PLACEMENTS, dip))
+        if missed.size:
+            return float([*some, least][missed[-1] + 1])
+        least = float(some[0])
+    return least
 
 
 def _seen(offset: Floats, response: Floats, pitch: float, distances: Floats, placements: int, dip: float) -> Mask:

@@ -50,7 +50,7 @@ class Typed:
     def demand(self) -> DesignDemand:
         """What is asked; raises SeveralInvalid."""
         values: dict[str, float] = {}
-        with told_together() as wrong:
+        with told_together(list(_LABELS)) as wrong:
             for name, text in self.fields.items():
                 with noting(wrong):
                     values[name] = quantity(name, text)

@@ -69,7 +69,7 @@ def _numbers(own: Mapping[str, float], given: Mapping[str, str]) -> tuple[dict[s
     """Those given, or else one's own, and all that is wrong with them."""
     values = dict(own)
     try:
-        with told_together() as wrong:
+        with told_together(list(LABELS)) as wrong:
             for name in (one for one in own if one in given):
                 with noting(wrong):
                     values[name] = quantity(name, given[name])

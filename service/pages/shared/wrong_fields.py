@@ -47,9 +47,10 @@ def wrong_fields(
 
 
 @contextmanager
-def told_together() -> Iterator[list[InvalidInput]]:
+def told_together(order: Sequence[str] = ()) -> Iterator[list[InvalidInput]]:
     """Takes what is wrong, by `noting`; after the block raises SeveralInvalid with the first error of each place, as
-    what cannot be read is missing to later checks too."""
+    what cannot be read is missing to later checks too. `order`: of the fields in the form, where checks have another.
+    """
     wrong: list[InvalidInput] = []
     with noting(wrong):
         yield wrong
@@ -57,7 +58,8 @@ def told_together() -> Iterator[list[InvalidInput]]:
     for one in wrong:
         first.setdefault(one.place, one)
     if first:
-        raise SeveralInvalid(list(first.values()))
+        places = {name: place for place, name in enumerate(order)}
+        raise SeveralInvalid(sorted(first.values(), key=lambda one: places.get(one.field, len(places))))
 
 
 def quantity(name: str, typed: str, *, units_checked: bool = False) -> float:

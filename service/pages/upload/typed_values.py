@@ -34,5 +34,6 @@ def of_recording(kind: str, values: Mapping[str, Any], *, units_checked: bool) -
 
 
 def _refused(model: Any, typed: Mapping[str, Any], *, units_checked: bool) -> list[InvalidInput]:
-    """Without what is missing, which a file may state."""
-    return [one for one in check_fields(model, typed, units_checked=units_checked)[1] if one.field in typed]
+    """In the form's order, without what is missing, which a file may state."""
+    wrong = {one.field: one for one in check_fields(model, typed, units_checked=units_checked)[1]}
+    return [wrong[name] for name in typed if name in wrong]

@@ -63,17 +63,17 @@ CASES = {
         [
             ("thickness_mm", "thickness h [mm]: zwei – must be a number"),
             ("preload_n", "force F [N]: -1.0 – must be finite and greater than 0 (N)"),
-            ("dip_percent", "dip that can be told [%]: 500.0 – must be at most 100"),
             ("pitch_mm", f"pitch of the array [mm]: 1.0 – must be at least 3 mm, {OVERLAP}"),
+            ("dip_percent", "dip that can be told [%]: 500.0 – must be at most 100"),
         ],
     ),
     "search": (
         "/design/search",
         {"resolution_mm": "60", "preload_n": "-1", "thinnest_mm": "thick"},
         [
+            ("resolution_mm", "two-point separation, at most [mm]: 60.0 – must be at most 50"),
             ("preload_n", "force F of each load [N]: -1.0 – must be finite and greater than 0 (N)"),
             ("thinnest_mm", "thinnest layer that can be made [mm]: thick – must be a number"),
-            ("resolution_mm", "two-point separation, at most [mm]: 60.0 – must be at most 50"),
         ],
     ),
 }
