@@ -13,9 +13,10 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
-from service.usecases.two_point import largest_pitch, separation
+from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
+from underskin.prediction.skin_design import resolution
 from underskin.surrogate.off_centre_sigma import sigma_beside
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
@@ -111,7 +112,7 @@ def _largest_pitch_mm(
         pitch = float(np.floor(100 * pitch) / 100)
         if not pitch >= finest_mm:
             break
-        apart = float(to_lab("x_mm", separation(offset, response, pitch * 1e-3, touching, dip)))
+        apart = float(to_lab("x_mm", resolution(offset, response, pitch * 1e-3, touching, dip).separation))
         if apart <= demand.resolution_mm:
             return pitch
         pitch *= float(np.fmax(_STEP, _FINER * demand.resolution_mm / apart))

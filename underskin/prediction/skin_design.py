@@ -16,7 +16,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask
 
 _SWEEP = 61  # points of a sweep
-_PLACEMENTS = 24  # of the array against the contacts, over one pitch
+_PLACEMENTS = 13  # of the array against the contacts, over half a pitch
 _DISTANCES = 160
 _FINEST = 25.0  # sensors across the resolution, beyond which more make no difference
 
@@ -128,12 +128,12 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     """
     if not bool(np.isfinite(response).all()):
         return Resolution(*[float("nan")] * 5)
-    last = int(np.flatnonzero(response < float(response[0]) / 2)[0])  # the reach is many times the width
+    last = int(np.argmax(response < float(response[0]) / 2))  # the reach is many times the width
     pair = [last, last - 1]
     width = 2 * float(np.interp(float(response[0]) / 2, response[pair], offset[pair]))
     spacing = max(pitch, width / _FINEST)
     distances = np.linspace(nearest, nearest + 4 * spacing + 3 * width, _DISTANCES)
-    seen = np.array([_separated(offset, response, spacing, distance, dip) for distance in distances])
+    seen = told_apart(offset, response, spacing, distances, _PLACEMENTS, dip)
     always, sometimes = (np.asarray(part) for part in (seen.all(axis=1), seen.any(axis=1)))
     settled = len(distances) - int(np.argmin(always[::-1])) if not always.all() else 0
     between, amid = (
@@ -149,15 +149,15 @@ def resolution(offset: Floats, response: Floats, pitch: float, nearest: float, d
     )
 
 
-def _separated(offset: Floats, response: Floats, spacing: float, distance: float, dip: float) -> Mask:
-    """Whether two contacts show as two, for each placement of the row of sensors."""
-    half = distance / 2
-    count = int(np.ceil((half + spacing) / spacing)) + 1
-    placement = spacing * np.arange(_PLACEMENTS) / _PLACEMENTS
-    sensors = spacing * np.arange(-count, count + 1) + placement[:, None]
-    first, second = (np.interp(np.abs(sensors - place), offset, response, right=0.0) for place in (-half, half))
+def told_apart(offset: Floats, response: Floats, pitch: float, distances: Floats, placements: int, dip: float) -> Mask:
+    """Whether two contacts show as two: (m, n), at each distance (m,) and for each placement of the row of sensors,
+    which are over half a pitch, since the other half is its mirror image."""
+    count = int(np.ceil(distances[-1] / 2 / pitch)) + 2
+    half = distances[:, None, None] / 2
+    sensors = pitch * np.arange(-count, count + 1) + pitch * np.linspace(0, 0.5, placements)[:, None]
+    first, second = (np.interp(np.abs(sensors + side), offset, response, right=0.0) for side in (-half, half))
     reading = first + second
-    from_left = np.maximum.accumulate(reading, axis=1)[:, :-2]
-    from_right = np.maximum.accumulate(reading[:, ::-1], axis=1)[:, ::-1][:, 2:]
-    depth = np.minimum(from_left, from_right) - reading[:, 1:-1]
-    return np.asarray(depth.max(axis=1) >= dip * response[0])
+    from_left = np.maximum.accumulate(reading, axis=2)[:, :, :-2]
+    from_right = np.maximum.accumulate(reading[:, :, ::-1], axis=2)[:, :, ::-1][:, :, 2:]
+    depth = np.minimum(from_left, from_right) - reading[:, :, 1:-1]
+    return np.asarray(depth.max(axis=2) >= dip * response[0])
