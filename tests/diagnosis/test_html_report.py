@@ -113,8 +113,14 @@ def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_r
 def test_small_forces_are_in_a_unit_in_which_they_read_well_with_minus_signs() -> None:
     parameter = {"name": "pull", "unit": "N", "value": -1.5e-06, "low": -1.8e-06, "high": -1.2e-06}
     law = {
-        **{"acts_on": "force", "axis": "displacement_mm", "form": "linear", "expression": "F + p", "probability": 1.0},
-        **{"parameters": [parameter], "rivals": [], "range": {}},
+        "acts_on": "force",
+        "axis": "displacement_mm",
+        "form": "linear",
+        "expression": "F + p",
+        "probability": 1.0,
+        "parameters": [parameter],
+        "rivals": [],
+        "range": {},
     }
     statement = "A law is missing: by +1.5e-06 N (-1.2e-06 to +1.8e-06). It grows with a power of -0.43 in s-1."
     shown = texts(body_of({**EMPTY, "verdict": "unexplained", "unnamed": law, "statement": statement}, {}))
