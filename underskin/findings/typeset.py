@@ -12,25 +12,18 @@ _FIELDS = {"N": "force_n", "mm": "displacement_mm"}
 
 
 def with_minus(text: str) -> str:
-    """A text with the sign of its negative numbers as a minus.
-
-    >>> with_minus("s-1 by -0.43 (-0.5 to 0.1e-3) on 2026-05-03")
-    's-1 by −0.43 (−0.5 to 0.1e-3) on 2026-05-03'
-    """
+    """A text with the sign of its negative numbers as a minus; names and dates keep their hyphens."""
     return _MINUS.sub("−", text)
 
 
 def in_readable_units(sentence: str) -> str:
-    """A sentence with each force and length in the unit in which it reads well, as figures have it."""
-    return _MEASURED.sub(_readable, sentence)
+    """A sentence with each force and length in the unit in which it reads well, as figures have it, and minus signs."""
+    return with_minus(_MEASURED.sub(_readable, sentence))
 
 
 def without_powers(sentence: str) -> str:
-    """The same where a force or length is written as a power of ten, with the interval behind it.
-
-    >>> without_powers("a force of +1.5e-06 N (+1.2e-06 to +1.8e-06) at 0.05 N")
-    'a force of +1.5 µN (+1.2 to +1.8) at 0.05 N'
-    """
+    """A sentence with those forces and lengths in such a unit that are written as a power of ten, and the interval
+    behind each."""
     return _MEASURED.sub(lambda found: _readable(found) if "e-" in found[1] else found[0], sentence)
 
 
