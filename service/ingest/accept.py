@@ -207,7 +207,7 @@ def _kept(
 
 def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOptions) -> list[str]:
     """What is said of a correction that changes nothing, or names another skin than the campaign it corrects is on."""
-    same = repeats.changes_nothing(connection, campaign, options.corrects)
+    same = repeats.changes_nothing(connection, campaign, options.skin, options.corrects)
     notes = ["it says the same as the campaign that it corrects"] if same else []
     kept_on = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
     if kept_on is not None:

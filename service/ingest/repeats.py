@@ -51,11 +51,15 @@ def already_kept(
     return sentence, row.id
 
 
-def changes_nothing(connection: Connection, campaign: Campaign, corrects: str | None) -> bool:
-    """Whether the campaign that is corrected says the same already, of the skin and of each recording in its order."""
+def changes_nothing(connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None) -> bool:
+    """Whether the campaign that is corrected says the same already, of the skin and of each recording in its order, and
+    is on the skin that this one is sent for."""
     if corrects is None:
         return False
-    before = campaigns.load(connection, campaigns.find(connection, corrects))
+    row = campaigns.find(connection, corrects)
+    if skin_id is not None and not skins.are_one(connection, skin_id, row.skin_id):
+        return False
+    before = campaigns.load(connection, row)
     if codec.about(before) != codec.about(campaign) or len(before.recordings) != len(campaign.recordings):
         return False
     columns = codec.recording_columns

@@ -270,7 +270,8 @@ def _require_sign_to_be_told(rig: RigDescription, name: str) -> None:
 def _require_whole(place: str, signal: SignalMapping) -> None:
     """Refuses half of what belongs together."""
     if (signal.sensitivity is None) != (signal.sensitivity_unit is None):
-        raise conflicting(f"{place}.sensitivity", signal.sensitivity, "needs a sensitivity_unit, and it one")
+        belong = Requirement("needs a ", Mention("sensitivity_unit"), ", and it one")
+        raise conflicting(f"{place}.sensitivity", signal.sensitivity, belong)
     if signal.labelled is not None and signal.unit is None:
         raise required(f"{place}.unit", "required where labelled says that the label is wrong")
 

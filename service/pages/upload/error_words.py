@@ -34,6 +34,8 @@ def field_words(field: str) -> str:
     place, _, of_channel = field.removeprefix("channels.").partition(".")
     if place in CHOICES and of_channel in _OF_CHANNEL:
         return f"{_OF_CHANNEL[of_channel]} of the {CHOICES[place]}"
+    if field in _OF_CHANNEL:
+        return _OF_CHANNEL[field]
     return _WORDS.get(field.removeprefix("skin.").removeprefix("recording.").removeprefix("channels."), field)
 
 

@@ -120,7 +120,7 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
         earlier = store.read(repeats.already_kept, one.campaign, skin_id, corrects)
         if earlier is not None:
             sentences.append(earlier[0])
-        if store.read(repeats.changes_nothing, one.campaign, corrects):
+        if store.read(repeats.changes_nothing, one.campaign, skin_id, corrects):
             sentences.append("it says the same as the campaign that it corrects: nothing would change.")
         kept_on = store.read(repeats.otherwise_named, one.campaign, corrects)
         if kept_on is not None:

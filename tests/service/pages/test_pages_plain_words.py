@@ -66,7 +66,10 @@ def test_what_is_not_settled_points_to_a_section_that_is_there(reader: Visit, id
     reader.go(f"/diagnoses/{diagnosis_id}")
     heading = reader.page.get_by_role("heading", name="What the model lacks, and the values found")
     assert heading.count() == 1
-    assert f"“{heading.inner_text()}” below says why" in reader.page.locator(".summary").inner_text()
+    summary = reader.page.locator(".summary").inner_text()
+    assert f"under “{heading.inner_text()}”" in summary
+    assert "No d33 yet: it lies from" in summary
+    assert "but what would not show here would change it" in summary  # why, and not a list of what may be the reason
 
 
 def test_a_campaign_of_curves_says_what_d33_needs(reader: Visit, idle: Server) -> None:

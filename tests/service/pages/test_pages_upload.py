@@ -65,7 +65,7 @@ def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     page.get_by_label("first sample used").fill("0.5")
     page.get_by_role("button", name="Read it with these settings").click()
     alert = page.get_by_role("alert")
-    assert "channels.charge_pc.sensitivity" in alert.inner_text()
+    assert "sensitivity of the charge\t10.0\tneeds a unit of the sensitivity, and it one" in alert.inner_text()
     assert "first sample used" in alert.inner_text()  # all that is wrong is told at once
     page.get_by_label("first sample used").fill("")
     visitor.require_accessible()

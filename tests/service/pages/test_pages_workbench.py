@@ -66,7 +66,9 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     page.get_by_role("button", name="Keep 1 recording").click()
     page.wait_for_url("**/campaigns/*")
     expect(page.get_by_text(f"channel 'load' is derived: {LOAD}")).to_be_attached()
-    expect(page.get_by_text(re.compile(r"contact from -?[\d.]+ (µm|nm); it leaves [\d.e-]+ (nN|pN) "))).to_be_visible()
+    expect(
+        page.get_by_text(re.compile(r"contact from [−-]?[\d.]+ (µm|nm); it leaves [\d.e-]+ (nN|pN) "))
+    ).to_be_visible()
     (kept,) = campaigns_of(server, skin)
     (recording,) = server.http.get(f"/v1/campaigns/{kept}/document").json()["recordings"]
     np.testing.assert_allclose(recording["force_n"], FORCE_N, atol=1e-11)
