@@ -288,5 +288,5 @@ def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:
     if "since" in scope:
         return f"{called} since {scope['since']}"
     if len(scope["campaigns"]) == len(names):
-        return f"{called} in all campaigns"
+        return f"{called} in {'both' if len(names) == 2 else f'all {len(names)}'} campaigns of FRFs"
     return f"{called} in {' and '.join(scope['campaigns'])} alone"
