@@ -5,6 +5,8 @@ from html import unescape
 from typing import Any
 from urllib.parse import unquote
 
+import pytest
+
 from underskin.diagnosis.reporting.html_report import body_of, page, provenance
 
 HOSTILE = "<script>alert(\"x\")</script> & 'y'"
@@ -136,6 +138,24 @@ def test_what_is_to_be_quoted_has_the_digits_of_the_statement() -> None:
     for quotable, said in ((True, "d33 13.1 pC/N, 95 %: 12.9 to 13.4"), (False, "lies from 12.9 to 13.4 pC/N")):
         made = {**EMPTY, "verdict": "explained", "d33": {**d33, "quotable": quotable}, "fit": fit}
         assert said in texts(body_of(made, {}))
+
+
+@pytest.mark.parametrize(("worst", "told"), [(31.3, True), (18.0, False)])
+def test_a_group_that_the_others_do_not_foretell_is_told_beside_the_error(worst: float, told: bool) -> None:
+    groups = [
+        {
+            "group": name,
+            "chosen": [],
+            "before_rmse_percent": 30.0,
+            "after_rmse_percent": error,
+            "noise_floor_percent": 2,
+        }
+        for name, error in (("sensor a1", 2.0), ("sensor a3", worst))
+    ]
+    errors = {"heldout_rmse_percent": 17.2, "rmse_percent": 1.8}
+    fit = {"before": errors, "after": errors, "noise_floor_percent": 2.4, "groups": groups}
+    shown = texts(body_of({**EMPTY, "verdict": "explained", "fit": fit}, {}))
+    assert ("most of it on sensor: a3 (31.3 %), which the others do not foretell" in shown) == told
 
 
 def test_what_each_kind_tells_is_a_table() -> None:
