@@ -135,5 +135,9 @@ def test_the_noise_of_points_is_without_what_sensors_differ_by() -> None:
         if isinstance(one, FrfRecording) and one.frf_re_pc_per_n is not None
     ]
     found = lean_diagnosis(replace(made, recordings=tuple(weak)), load_table(), *BESIDE_SKINS)
-    noise_percent = figures(found, report(found))["where"].layout.meta["noise_percent"]
+    drawn = figures(found, report(found))
+    noise_percent = drawn["where"].layout.meta["noise_percent"]
     assert 2 < noise_percent < 8  # 1.96 times a gain's 2 % and a line's 1 %; sensors differ by 16 %
+    bands = [np.asarray(trace.y) for trace in drawn["before_after"].data if trace.fill == "toself"]
+    before, after = (np.abs(band[: len(band) // 2] - band[: len(band) // 2 - 1 : -1]).max() for band in bands)
+    assert before < 1.5 * after  # the model alone takes its misfit for noise

@@ -127,7 +127,7 @@ def _figure(found: Searched, typed: Typed) -> Drawn:
             found.feasible,
             offered,
         ),
-        "Each square is a skin; its colour is the largest pitch that still resolves what is asked.",
+        "Each square is a skin; its colour is the largest pitch that still resolves what is asked, to about 5 %.",
         f"/design/search/region.csv?{urlencode(typed.fields)}",
     )
 

@@ -198,7 +198,8 @@ def before_and_after(
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
         # Where all predictions are alike the band would have no width along the abscissa.
         along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
-        half = SDS_OF_95 * np.hypot(points.gain * along, float(np.median(points.deviation)))
+        # That of what is stated in both: the model alone takes its misfit for noise.
+        half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
         figure.add_scatter(
             x=[*along, *along[::-1]],
             y=[*(along + half), *(along - half)[::-1]],
