@@ -146,6 +146,7 @@ def added() -> ScalarSelect[str]:
     asked, its, new = skin_rows.alias("asked"), skin_rows.alias("counting"), campaigns.alias("new")
     has = diagnosed_campaigns.alias("has")
     there = exists().where(has.c.diagnosis == diagnoses.c.number, has.c.campaign == new.c.number)
+    there = there.correlate(diagnoses, new)  # or a campaign would count as there that another diagnosis has
     return (
         select(func.min(new.c.id))
         .select_from(diagnosed_skins)

@@ -181,6 +181,8 @@ def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: C
     assert outdated() == [None, None]
     client.skins.join("palm", "palm-b", "one skin, two labels")
     assert outdated() == [f"campaign {added} was added", None]
+    client.skins.diagnose("palm")  # which has it, and does not make the earlier one have it
+    assert outdated() == [f"campaign {added} was added", None]
     client.campaigns.withdraw(added, "of another skin")
     assert outdated() == [None, None]
     client.campaigns.exclude(ids[1], "s0-1N", "cable loose")
