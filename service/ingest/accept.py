@@ -211,10 +211,8 @@ def _of_corrected(connection: Connection, campaign: Campaign, options: IngestOpt
     notes = ["it says the same as the campaign that it corrects"] if same else []
     kept_on = None if options.skin else repeats.otherwise_named(connection, campaign, options.corrects)
     if kept_on is not None:
-        of_corrected = (
-            f"it names skin {campaign.skin.id!r}, and was kept on skin {kept_on!r}, as the campaign that it corrects"
-        )
-        notes.append(of_corrected)
+        named = f"it names skin {campaign.skin.id!r}"
+        notes.append(f"{named}, and was kept on skin {kept_on!r}, as the campaign that it corrects")
     return notes
 
 

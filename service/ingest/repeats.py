@@ -53,11 +53,12 @@ def already_kept(
 
 def changes_nothing(connection: Connection, campaign: Campaign, skin_id: str | None, corrects: str | None) -> bool:
     """Whether the campaign that is corrected says the same already, of the skin and of each recording in its order, and
-    is on the skin that this one is sent for."""
+    is on the skin that this one is sent for, with all of its recordings in use: a correction takes excluded ones in
+    again."""
     if corrects is None:
         return False
     row = campaigns.find(connection, corrects)
-    if skin_id is not None and not skins.are_one(connection, skin_id, row.skin_id):
+    if row.excluded or (skin_id is not None and not skins.are_one(connection, skin_id, row.skin_id)):
         return False
     before = campaigns.load(connection, row)
     if codec.about(before) != codec.about(campaign) or len(before.recordings) != len(campaign.recordings):

@@ -155,7 +155,7 @@ def test_a_group_that_the_others_do_not_foretell_is_told_beside_the_error(worst:
     errors = {"heldout_rmse_percent": 17.2, "rmse_percent": 1.8}
     fit = {"before": errors, "after": errors, "noise_floor_percent": 2.4, "groups": groups}
     shown = texts(body_of({**EMPTY, "verdict": "explained", "fit": fit}, {}))
-    assert ("most of it on sensor: a3 (31.3 %), which the others do not foretell" in shown) == told
+    assert ("the largest on sensor: a3 (31.3 %), which the others do not foretell" in shown) == told
 
 
 def test_what_each_kind_tells_is_a_table() -> None:

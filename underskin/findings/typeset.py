@@ -8,7 +8,7 @@ from underskin.units import readable_unit
 _MINUS = re.compile(r"(?<![\w.−-])-(?=\d)")
 _NUMBER = r"[+−-]?\d+(?:\.\d+)?(?:e-\d+)?"
 _MEASURED = re.compile(rf"(?<![\w.])({_NUMBER}) (N|mm)\b(?: \(({_NUMBER}) to ({_NUMBER})\))?")
-_FIELDS = {"N": "force_n", "mm": "displacement_mm"}
+FIELD_OF = {"N": "force_n", "mm": "displacement_mm"}  # a field of each unit that has smaller ones
 
 
 def with_minus(text: str) -> str:
@@ -28,7 +28,7 @@ def without_powers(sentence: str) -> str:
 
 
 def _readable(found: re.Match[str]) -> str:
-    unit, count = readable_unit(_FIELDS[found[2]], abs(_value(found[1])))
+    unit, count = readable_unit(FIELD_OF[found[2]], abs(_value(found[1])))
     if count == 1:
         return found[0]
     value, *ends = (_scaled(text, count) for text in found.group(1, 3, 4) if text is not None)

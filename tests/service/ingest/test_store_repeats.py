@@ -84,7 +84,11 @@ def test_a_correction_that_changes_nothing_is_told(server: Server) -> None:
     again = post(server, day, corrects=first, reason="E was mistyped")
     assert again["notes"] == ["it says the same as the campaign that it corrects"]
     thicker = {**day, "skin": {**day["skin"], "thickness_mm": 1.01 * day["skin"]["thickness_mm"]}}
-    assert post(server, thicker, corrects=again["id"], reason="h was mistyped")["notes"] == []
+    last = post(server, thicker, corrects=again["id"], reason="h was mistyped")
+    assert last["notes"] == []
+    loose = {"recording": day["recordings"][0]["id"], "reason": "cable loose"}
+    server.http.post(f"/v1/campaigns/{last['id']}/exclusions", json=loose).raise_for_status()
+    assert post(server, thicker, corrects=last["id"], reason="the cable was fine")["notes"] == []  # it is in use again
 
 
 def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) -> None:

@@ -50,7 +50,6 @@ plot.style.height = `${plot.layout.height}px`;
 plot.parentElement.style.height = "auto"; // its box has the height of the figure alone
 """  # stands in for a figure's own menu, which only a pointer can open
 
-
 _FILTERS = (
     *(wording.as_stated, wording.axis, wording.columns, wording.error, wording.finding, wording.group),
     *(wording.in_its_unit, wording.interval, wording.law_range, wording.not_quoted, wording.number, wording.plain),

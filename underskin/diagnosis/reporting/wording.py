@@ -10,7 +10,7 @@ from underskin.diagnosis.data.axes import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
 from underskin.diagnosis.reporting.sentences import capital
-from underskin.findings.typeset import with_minus, without_powers
+from underskin.findings.typeset import FIELD_OF, with_minus, without_powers
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unnamed.vocabulary import followed
@@ -46,7 +46,6 @@ _FINDINGS = {
     "unusual_magnitude": "unusual size",
 }  # by code; the other codes are words already
 _UNITS = {"n": "N", "mm": "mm", "s": "s", "h": "h", "hz": "Hz"}  # by the end of an axis' name
-_FIELDS = {"N": "force_n", "mm": "displacement_mm"}
 _POWERS = 1e-4  # below which four digits are written as a power of ten
 _NOT_QUOTED = re.compile(r"d33 is not to be quoted: (.+?)(?:; |\.(?:\s|$))")  # the clause of a report's statement
 
@@ -122,7 +121,7 @@ def interval(entry: Mapping[str, Any]) -> str:
 
 def in_its_unit(entry: Mapping[str, Any]) -> dict[str, Any]:
     """A parameter in the unit in which its value reads well, where that would be a power of ten."""
-    field, ends = _FIELDS.get(entry["unit"]), {name: entry[name] for name in ("value", "low", "high")}
+    field, ends = FIELD_OF.get(entry["unit"]), {name: entry[name] for name in ("value", "low", "high")}
     if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
         return dict(entry)
     unit, count = readable_unit(field, largest)
