@@ -29,9 +29,12 @@ def prove(
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,
     workers: Annotated[int, typer.Option(min=0, help="Processes; 0 is one for each core.")] = 0,
-    work_dir: Annotated[Path, typer.Option(help="Where results are stored, so that a stopped run resumes.")] = Path(
-        "build/proof"
-    ),
+    work_dir: Annotated[
+        Path, typer.Option(help="Where single answers are kept, so that a stopped run resumes.")
+    ] = Path("build/proof"),
+    results_dir: Annotated[
+        Path, typer.Option(help="Where each finished part is kept; the page is made of them.")
+    ] = Path("proof/results"),
     docs_dir: Annotated[Path, typer.Option(help="Where proof.md and its figures are written.")] = Path("docs"),
 ) -> None:
     """Judge the diagnosis, part by part, and write docs/proof.md from every stored part."""
@@ -54,8 +57,9 @@ def prove(
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
         for name in part or PARTS:
-            work_out(name, work, partial(_tell, bars, bars.add_task(name, total=None)))
-            written = write_page(stored_parts(work), docs_dir)  # after each part, so that a stopped run leaves a page
+            work_out(name, work, results_dir, partial(_tell, bars, bars.add_task(name, total=None)))
+            # After each part, so that a stopped run leaves a page.
+            written = write_page(stored_parts(results_dir), docs_dir)
     for path in written:
         typer.echo(str(path))
 

@@ -16,7 +16,7 @@ from proof.stored import Work, reports
 from proof.text_wide import by_subset
 from rig.wide_tails import WIDE
 
-SEED, COUNT = 65825, 480
+SEED, COUNT = 30615, 480
 _SDS_OF_95 = 1.96
 
 

@@ -16,7 +16,7 @@ from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, report
 from underskin.mechanisms.base import Stage
 from underskin.mechanisms.registry import CATALOGUE
 
-SEED, COUNT = 10340, 150
+SEED, COUNT = 99092, 150
 _ENTRIES: Mapping[Stage, tuple[str, ...]] = {
     Stage.DECLARED: ("modulus", "thickness"),
     Stage.MATERIAL: ("modulus",),

@@ -31,7 +31,7 @@ _JUDGE = "proof/judge.py"
 SEALED = Path(__file__).parent / "sealed"
 
 
-def folder(setting: str) -> Path:
+def data_folder(setting: str) -> Path:
     """The folder that an environment variable names; raises InvalidInput where it does not."""
     if setting not in os.environ:
         raise InvalidInput(setting, None, "must name the folder that these data lie in")
@@ -39,16 +39,16 @@ def folder(setting: str) -> Path:
 
 
 def _open(work: Work, progress: Tell) -> dict[str, Any]:
-    return concealed.judge_open(work, folder("UNDERSKIN_CAMPAIGNS"), progress)
+    return concealed.judge_open(work, data_folder("UNDERSKIN_CAMPAIGNS"), progress)
 
 
 def _sealed(work: Work, progress: Tell) -> dict[str, Any]:
-    return concealed.report_sealed(work, folder("UNDERSKIN_CAMPAIGNS"), SEALED, progress)
+    return concealed.report_sealed(work, data_folder("UNDERSKIN_CAMPAIGNS"), SEALED, progress)
 
 
 def _recordings(work: Work, progress: Tell) -> dict[str, Any]:
     entries = list(real.recorded())[: work.count]
-    place = folder("UNDERSKIN_RECORDINGS")
+    place = data_folder("UNDERSKIN_RECORDINGS")
     reported = reports(work, [MadeCase(entry.name, entry.make(place)) for entry in entries], progress)
     return {
         "campaigns": [
@@ -110,22 +110,17 @@ PARTS: dict[str, Part] = {
 }
 
 
-def work_out(name: str, work: Work, progress: Tell) -> None:
-    """Make one part and store it."""
+def work_out(name: str, work: Work, folder: Path, progress: Tell) -> None:
+    """Make one part and store it in the folder of results."""
     result = {"sources": of_diagnosis(), "judged_by": sources(_JUDGE), **PARTS[name](work, progress)}
-    work.folder.mkdir(parents=True, exist_ok=True)
-    unfinished = work.folder / f".{name}.json.part"
-    unfinished.write_text(json.dumps(result, ensure_ascii=False), encoding="utf-8")
-    unfinished.replace(_path(name, work))
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = folder / f".{name}.json.part"
+    unfinished.write_text(json.dumps(result, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    unfinished.replace(folder / f"{name}.json")
 
 
-def stored_parts(work: Work) -> dict[str, dict[str, Any]]:
+def stored_parts(folder: Path) -> dict[str, dict[str, Any]]:
     """Every stored part that was judged by the present sources of the judge."""
-    parts = {
-        name: json.loads(_path(name, work).read_text(encoding="utf-8")) for name in PARTS if _path(name, work).exists()
-    }
+    paths = {name: folder / f"{name}.json" for name in PARTS}
+    parts = {name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items() if path.exists()}
     return {name: part for name, part in parts.items() if part["judged_by"] == sources(_JUDGE)}
-
-
-def _path(name: str, work: Work) -> Path:
-    return work.folder / f"{name}.json"

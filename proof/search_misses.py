@@ -27,7 +27,7 @@ from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import load_table
 
-SEED, COUNT = 73116, 480
+SEED, COUNT = 69229, 480
 _HIDES = ("single", "pair")
 
 Result = dict[str, Any]

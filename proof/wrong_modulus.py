@@ -16,7 +16,7 @@ from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, source
 from rig.effects import FRF
 from rig.wrong_modulus import drawn_wrong_modulus
 
-SEED, COUNT = 49590, 80
+SEED, COUNT = 29736, 80
 _ERROR = "modulus_error"
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8

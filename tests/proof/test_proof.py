@@ -155,7 +155,7 @@ def _light(description: dict[str, Any]) -> bool:
 def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(tmp_path: Path) -> None:
     command = typer.Typer()
     command.command()(prove)
-    options = ["--count=2", "--workers=1", f"--work-dir={tmp_path / 'work'}", f"--docs-dir={tmp_path / 'docs'}"]
+    options = ["--count=2", "--workers=1", *(f"--{name}-dir={tmp_path / name}" for name in ("work", "results", "docs"))]
     begun = CliRunner().invoke(command, ["mixture", *options])
     assert begun.exit_code == 0, begun.output
     page = (tmp_path / "docs/proof.md").read_text(encoding="utf-8")

@@ -10,9 +10,9 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 from plotly.colors import sample_colorscale
 
+from underskin.diagnosis.reporting.typeset import with_minus
 from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
 from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
-from underskin.findings.typeset import with_minus
 from underskin.inversion.beyond_chance import differ_from_others, differ_from_zero, threshold
 from underskin.units import Floats, Mask
 

@@ -161,8 +161,8 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
-    Reason.FORCE_CONTRADICTS_PRELOAD: "force_n is {mean_n:.3g} N in the mean, but preload_n is {preload_n:g}: is one "
-    "in another unit?",
+    Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
+    "is one in another unit?",
     Reason.SENSORS_AT_ONE_PLACE: sentences.one_place,
     Reason.SENSORS_TOO_NEAR: sentences.too_near,
     Reason.SENSORS_OVERLAP: "{first} and {second} lie over one another, their centres {distance_mm:g} mm apart: are x "

@@ -48,12 +48,10 @@ def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample:
 def counted_negative(fields: Sequence[str], more: int) -> str:
     """Force, displacement or both fall while a curve is pressed."""
     named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
-    are = "are" if len(fields) > 1 else "is"
-    pulled = ": right for a sample that is pulled" if len(fields) > 1 else ""
-    return (
-        f"{named} {are} counted negative as it is pressed, where compression and depth count positive{pulled}; "
-        f"the sign -1 turns a channel round{more_alike(more, 'recording')}"
-    )
+    both = "are", ": right for a sample that is pulled, else reverse the signs of both channels"
+    are, unless = both if len(fields) > 1 else ("is", "; reverse the sign of that channel")
+    negative = f"{named} {are} counted negative as it is pressed, where compression and depth count positive"
+    return f"{negative}{unless}{more_alike(more, 'recording')}"
 
 
 def size(too_large: bool) -> str:
@@ -233,7 +231,7 @@ def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: 
 def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, unit: str) -> str:
     """A parameter at the end of its range."""
     limits = f"{low:g} to {high:g} {unit.strip('-')}".rstrip()
-    return f"{mechanism}: {parameter} lies at an end of what is held possible ({limits})"
+    return f"{mechanism}: {parameter.replace('_', ' ')} lies at an end of what is held possible ({limits})"
 
 
 def line_noise(level: float) -> str:
@@ -246,9 +244,11 @@ def line_noise(level: float) -> str:
 
 def held_out(groups: Sequence[str], mechanisms: Sequence[str], before_percent: float, after_percent: float) -> str:
     """Mechanisms that predict held-out groups no better."""
+    left_out = " and ".join(groups) if len(groups) <= 2 else f"each of {len(groups)} parts in turn"
+    before, after = (float(f"{percent:.4g}") for percent in (before_percent, after_percent))  # as the report has them
     return (
-        f"what was left out ({', '.join(groups)}) is predicted no better with {' and '.join(mechanisms)}: "
-        f"{before_percent:.3g} % before, {after_percent:.3g} % after; do not extrapolate with it"
+        f"what was left out ({left_out}) is predicted no better with {' and '.join(mechanisms)}: "
+        f"{before:.3g} % before, {after:.3g} % after; do not extrapolate with it"
     )
 
 

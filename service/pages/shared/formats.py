@@ -8,9 +8,8 @@ from typing import Any
 import orjson
 from markupsafe import Markup, escape
 
-from service.pages.shared.plain_sentences import without_rig
+from underskin.diagnosis.reporting.typeset import in_readable_units, with_minus
 from underskin.findings.formatting import in_digits, in_percent, significant
-from underskin.findings.typeset import in_readable_units, with_minus
 from underskin.recordings.time_zone import time_zone
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
@@ -138,5 +137,5 @@ FILTERS: Mapping[str, Callable[..., Any]] = {
     "number": number, "given": given, "moment": moment, "json_inside": json_inside, "words": words, "short": short,
     "in_percent": in_percent, "interval": interval, "end_of": end_of, "change_in_percent": change_in_percent,
     "capitalize_first": capitalize_first, "limit": limit, "recordings": recordings, "reaches_up": reaches_up,
-    "in_readable_units": in_readable_units, "without_rig": without_rig,
+    "in_readable_units": in_readable_units,
 }  # fmt: skip

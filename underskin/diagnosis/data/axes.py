@@ -1,6 +1,8 @@
 """The campaign's axes as numbers: what each recording was made at, on a scale where like distances mean alike."""
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 
@@ -23,22 +25,24 @@ WORDS = {  # of each axis: what it is called, and its unit
     "displacement_mm": ("displacement", "mm"),
 }
 _FROM_ZERO = ("load_cycles", "dwell_s")  # log(1 + x)
+_SAME = 0.01  # on a logarithmic scale: values within a percent were meant to be one
 
 
 def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     """Of each axis on which the recordings differ, one row a recording (recordings, 1 or 2).
 
     `position_mm` is the contact's place seen from the sensor's centre, `sensor` the sensor's own place on the skin
-    [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out.
+    [mm], `recorded_at` is in hours from the first. An axis that a recording lacks is left out, and one on which all
+    agree, on a logarithmic scale within a percent.
     """
     entries = campaign.recordings
     columns_by_axis: dict[str, Floats] = {}
     for name in (*_LOGARITHMIC, *_FROM_ZERO):
-        values = [getattr(entry, name, None) for entry in entries]
+        values: list[Any] = [getattr(entry, name, None) for entry in entries]
         if None in values:
             continue
-        column = np.array(values, dtype=float)
-        columns_by_axis[name] = (np.log(column) if name in _LOGARITHMIC else np.log1p(column))[:, None]
+        if not agree(name, values):
+            columns_by_axis[name] = _scaled(name, values)[:, None]
     frf = [entry for entry in entries if isinstance(entry, FrfRecording)]
     if frf:
         columns_by_axis["position_mm"] = 1e3 * offsets(campaign)
@@ -48,6 +52,18 @@ def recording_axes(campaign: Campaign) -> dict[str, Floats]:
     if None not in times:
         columns_by_axis["recorded_at"] = hours(times)[:, None]
     return {name: column for name, column in columns_by_axis.items() if np.ptp(column, axis=0).max() > 1e-9}
+
+
+def agree(name: str, values: Sequence[float | None]) -> bool:
+    """Whether values on an axis of a logarithmic scale were meant to be one: they lie within a percent, or none is
+    known."""
+    known = [value for value in values if value is not None]
+    return len(known) in (0, len(values)) and (not known or float(np.ptp(_scaled(name, known))) <= _SAME)
+
+
+def _scaled(name: str, values: Sequence[float]) -> Floats:
+    column = np.array(values, dtype=float)
+    return np.asarray(np.log(column) if name in _LOGARITHMIC else np.log1p(column))
 
 
 def hours(times: list[str | None]) -> Floats:

@@ -10,7 +10,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.reporting.figure_style import AFTER, MEASURED, styled
 from underskin.diagnosis.reporting.numbers import multiple_of
-from underskin.findings.typeset import with_minus
+from underskin.diagnosis.reporting.typeset import with_minus
 from underskin.mechanisms.parameter import Parameter
 
 _BESIDE = 1.0  # of an interval: room beside it

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import recording_axes
+from underskin.diagnosis.data.axes import agree, recording_axes
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.diagnosis.screening.declared_values import unlikely
 from underskin.diagnosis.screening.exchanged_sensors import without_exchanges
@@ -143,7 +143,7 @@ def _alike(one: Complexes, other: Complexes) -> bool:
 def _constant_axes(entries: list[FrfRecording]) -> list[Finding]:
     findings = []
     if len(entries) > 1:
-        constant = [name for name in _AXES if len({getattr(entry, name) for entry in entries}) == 1]
+        constant = [name for name in _AXES if agree(name, [getattr(entry, name) for entry in entries])]
         findings += [Finding(Reason.CONSTANT_AXIS, "", name, {"axis": name}) for name in constant]
     if entries and max(len(lines_of(entry).values) for entry in entries) < 2:
         findings.append(Finding(Reason.ONE_LINE, "", "frequency_hz"))

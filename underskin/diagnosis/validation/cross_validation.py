@@ -125,7 +125,7 @@ def _parts_of_curves(lines: Lines) -> dict[str, Mask]:
     if back.any() or held.any():
         return {name: rows for name, rows in parts.items() if rows.any()}
     highest = np.maximum.reduceat(force, lines.first)[lines.recording]
-    return {f"force_n above {_FURTHEST:.0%}": force > _FURTHEST * highest}
+    return {f"force above {100 * _FURTHEST:.0f} % of the highest": force > _FURTHEST * highest}
 
 
 def thirds(lines: Lines, column: Floats) -> dict[str, Mask]:

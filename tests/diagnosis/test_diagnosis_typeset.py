@@ -2,7 +2,7 @@
 
 import pytest
 
-from underskin.findings.typeset import in_readable_units, with_minus, without_powers
+from underskin.diagnosis.reporting.typeset import in_readable_units, with_minus, without_powers
 
 
 @pytest.mark.parametrize(
