@@ -26,10 +26,9 @@ _HEAD = """\
 # Proof: the diagnosis judged on what it cannot know
 
 Everything on this page, figures and numbers, is written by `make proof` (`underskin prove`, `proof/`). The full run
-takes about five hours on two cores; it keeps what it has worked out and goes on from there, and what each part found is
-in `proof/results/`. Shares have
-Wilson's 95 % interval in brackets. The diagnosis is called as `underskin diagnose` calls it: it gets the campaign and
-nothing else.
+takes about five hours on two cores; it keeps what it has worked out and goes on from there. What each part found is in
+`proof/results/`. Shares have Wilson's 95 % interval in brackets. The diagnosis is called as `underskin diagnose` calls
+it: it gets the campaign and nothing else.
 
 An answer is *right* if the set of mechanisms that leads is exactly the set that was hidden: for nothing by the
 verdict `no_mismatch`, for physics outside the catalogue by the verdict `unexplained`. A leading set counts under

@@ -69,6 +69,8 @@ def test_two_prony_pairs_relax_as_their_sum() -> None:
     assert found[-8:] == pytest.approx(found[1999] * left, rel=1e-4)
     told = CATALOGUE["contact_creep"].told(values)
     assert told == f"The force relaxes by 15 % with {fast:.2g} s and by 35 % with {slow:.2g} s."
+    at_once = {**values, "time_spread": 0.001}
+    assert CATALOGUE["contact_creep"].told(at_once) == "The force relaxes by 50 % with 2 s."
 
 
 def test_the_radius_at_a_travel_has_that_travel_also_where_a_stiffening_law_ends() -> None:

@@ -88,12 +88,14 @@ class ContactCreep(Mechanism):
         return [(0.3, share * longest, spread, 0.5) for share in (0.02, 0.1, 0.4) for spread in (0.3, 2.0)]
 
     def told(self, values: Mapping[str, float]) -> str:
-        """Of two pairs, what each relaxes and in which time."""
+        """Of two pairs, what each relaxes and in which time; of two that have one time, what both do."""
         if "time_spread" not in values:
             return ""
         fraction, share = values["relaxed_fraction"], values["first_share"]
         time, spread = values["relaxation_time"], values["time_spread"]
         fast, slow = time * math.exp(-spread * (1.0 - share)), time * math.exp(spread * share)
+        if f"{fast:.2g}" == f"{slow:.2g}":
+            return f"The force relaxes by {100 * fraction:.2g} % with {time:.2g} s."
         shares = (fraction * share, fast), (fraction * (1.0 - share), slow)
         first, second = (f"{100 * part:.2g} % with {time:.2g} s" for part, time in shares)
         return f"The force relaxes by {first} and by {second}."
