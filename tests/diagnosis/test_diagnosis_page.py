@@ -138,7 +138,7 @@ def test_markup_in_a_campaign_stays_text(text: str, found: DiagnosisResult, docu
     assert f"Diagnosis of palm {HOSTILE}" in tags.text
     assert f"{HOSTILE}3" in tags.text
     assert tags.count("img") == tags.count("a") == 0
-    assert tags.count("script") == 3 + 5 + 1  # plotly's own, the colours', the paper's, one a figure, and the page's
+    assert tags.count("script") == 4 + 5 + 1  # plotly's, three of figures, one a figure, the page's
     assert "<script>alert" not in text
     # In the figures, too, texts reach plotly escaped: it would show <a> and <b> as such.
     texts = [one for figure in figures(found, document).values() for one in drawn_texts(json.loads(figure.to_json()))]

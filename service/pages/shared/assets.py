@@ -20,7 +20,7 @@ router = APIRouter()
 
 LIBRARY = "plotly.min.js"
 _FOLDER = Path(__file__).parents[1] / "static"
-_OF_FIGURES = dict.fromkeys((SCHEME.name, "paper.js"), SCHEME.parent)
+_OF_FIGURES = dict.fromkeys((SCHEME.name, "narrow.js", "paper.js"), SCHEME.parent)
 _ELSEWHERE = {LIBRARY: Path(plotly.__file__).parent / "package_data", **_OF_FIGURES}
 _TYPES = {".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml", ".csv": "text/csv"}
 _FOR_GOOD = "public, max-age=31536000, immutable"

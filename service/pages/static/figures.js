@@ -74,7 +74,7 @@ function point_at(id) {
 // Where a figure is narrow its legend has a line an entry, of a long name several, which panels one above the other
 // have no room for, and which may be as wide as the figure. Returns how many lines.
 const TOP = 30, OF_TITLE = 60; // pixels above a figure, and those of its title, which stands in the caption instead
-const NARROW = 500, LEGEND_LINE = 19, LONGEST_LINE = 30, RIGHT = 20;
+const RIGHT = 20;
 function in_legend(data, layout, margin) {
   if (!layout.yaxis2 || layout.yaxis2.matches || layout.showlegend === false) return 0;
   margin.r = Math.min(margin.r ?? RIGHT, RIGHT);
@@ -83,16 +83,6 @@ function in_legend(data, layout, margin) {
   const titles = Object.entries(layout).flatMap(([name, axis]) => (name.startsWith("xaxis") ? [axis.title ?? {}] : []));
   for (const title of titles) title.text = in_lines(title.text ?? "");
   return entries.flatMap((trace) => trace.name.split("<br>")).length;
-}
-
-function in_lines(text) {
-  const lines = [];
-  for (const word of text.split(" ")) {
-    const longer = `${lines.at(-1)} ${word}`;
-    if (lines.length && longer.length <= LONGEST_LINE) lines[lines.length - 1] = longer;
-    else lines.push(word);
-  }
-  return lines.join("<br>");
 }
 
 // With the JSON as it is now, in the reader's colours.

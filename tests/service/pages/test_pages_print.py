@@ -27,14 +27,18 @@ def made() -> Made:
     return made_of(resonant("array", lines=LINES))
 
 
-@pytest.fixture(params=["short", "long"])
+@pytest.fixture(params=first(3, ["short", "long", 3, 2, 4, 5]))
 def printed(request: pytest.FixtureRequest, made: Made) -> Made:
-    """A report as it comes, and one with as much to say as any of thousands had."""
+    """A report as it comes, some that have more to say, about where they are set smaller, and one with as much to say
+    as any of thousands had."""
     if request.param == "short":
         return made
     wordy = deepcopy(made.report)
-    first = wordy["statement"].partition(". ")[0]
-    wordy["statement"] = f"{first}. " + 13 * _SENTENCE
+    headline = wordy["statement"].partition(". ")[0]
+    if request.param != "long":
+        wordy["statement"] = f"{headline}, {_SENTENCE.rstrip('. ')}. " + request.param * _SENTENCE
+        return Made(wordy, made.figures)
+    wordy["statement"] = f"{headline}. " + 13 * _SENTENCE
     finding = {"code": "outlier", "recording": "r1", "field": "frf"}
     wordy["findings"] = [{**finding, "statement": f"{number}: {2 * _SENTENCE}"} for number in range(8)]
     return Made(wordy, made.figures)
@@ -178,3 +182,23 @@ def test_texts_of_figures_do_not_overlap_on_paper(reader: Visit, idle: Server, p
     page.goto(file.as_uri())
     require_texts_apart(page, ".three .plotly-graph-div")
     reader.wrong.clear()  # the file itself is not of the server
+
+
+def with_long_names(made: Made) -> Made:
+    """As many explanations as a report has, each of three mechanisms."""
+    names = [f"contact resonance +<br>sensor relaxation +<br>charge amplifier {number}" for number in range(7)]
+    bars = orjson.loads(made.figures["explanations"])
+    bars["data"][0] |= {"y": names, "x": [0.4] + [0.1] * 6, "text": ["40 %"] + ["10 %"] * 6}
+    return Made(made.report, {**made.figures, "explanations": orjson.dumps(bars).decode()})
+
+
+def test_names_of_explanations_do_not_overlap_on_paper(reader: Visit, idle: Server, printed: Made) -> None:
+    page, skin = reader.page, f"names{len(printed.report['statement'])}"
+    reader.go(f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), with_long_names(printed), skin)}")
+    bars = page.locator("#figure-explanations .plot")
+    bars.scroll_into_view_if_needed()
+    bars.locator(".main-svg").first.wait_for()
+    page.emulate_media(media="print")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    require_apart([one.bounding_box() for one in bars.locator(".ytick text").all()], "y")
+    assert sum("charge amplifier" in text for text in bars.locator(".ytick text").all_text_contents()) == 7

@@ -70,7 +70,7 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
         template=TEMPLATE,
         font={"size": 14, "color": "#222222"},
         height=height,
-        margin={"t": 80, "b": 130},
+        margin={"r": 20, "t": 80, "b": 130},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom", "tracegroupgap": 0},
     )
     if len(drawings) > 1:

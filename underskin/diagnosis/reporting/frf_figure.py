@@ -22,6 +22,7 @@ from underskin.units import Floats
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
+_LONG_TITLE = 11  # pixels: as long as a panel is high where a window is narrow
 _ROOM = 0.08  # at either end of an axis
 _IN_VIEW = 10.0  # times the noise's band: as far as residuals are in view at first
 _FEW = 3  # lines, up to which a model's have markers
@@ -78,6 +79,8 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
     titles = ("|FRF| [pC/N]", "phase [°]", "residual,<br>in phase [%]", "residual, out<br>of phase [%]")
     for row, title in enumerate(titles, start=1):
         figure.update_yaxes(title=title, row=row, col=1)
+    for row in (3, 4):
+        figure.update_yaxes(title_font_size=_LONG_TITLE, row=row, col=1)
     figure.update_yaxes(**WHOLE_NUMBERS, row=1, col=1)
     views = [_view(one, bool(before)) for one in recordings]
     for path, value in views[0].items():
@@ -87,7 +90,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
         template=TEMPLATE,
         font={"size": 14, "color": "#222222"},
         height=_HEIGHT,
-        margin={"l": 90, "t": 80, "b": 100},
+        margin={"l": 90, "r": 20, "t": 80, "b": 100},
         legend={"orientation": "h", "yref": "container", "y": 0, "yanchor": "bottom"},
         meta={
             "recordings": [one.name for one in recordings],

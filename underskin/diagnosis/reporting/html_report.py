@@ -57,7 +57,7 @@ _FILTERS = (
     *(acted_on, followed, first_and_rest, in_percent, lacking_part),
 )
 
-PAPER = SCHEME.with_name("paper.js")  # the script that makes figures fit a printed sheet, in a page or a file
+_SCRIPTS = (SCHEME, SCHEME.with_name("narrow.js"), SCHEME.with_name("paper.js"))  # which pages have too
 _OF_SUMMARY = ("frf", "curve", "where", "explanations", "population", "sensors", "before_after")
 Report = Mapping[str, Any]
 FigureHtml = Mapping[str, str]  # HTML of each figure, by its name
@@ -85,7 +85,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    scripts = (get_plotlyjs(), *(one.read_text("utf-8") for one in (SCHEME, PAPER))) if drawn else ()
+    scripts = (get_plotlyjs(), *(one.read_text("utf-8") for one in _SCRIPTS)) if drawn else ()
     return str(_macros("file.html").page(report, drawn, scripts))
 
 

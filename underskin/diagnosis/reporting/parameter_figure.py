@@ -14,7 +14,8 @@ from underskin.diagnosis.reporting.typeset import with_minus
 from underskin.mechanisms.parameter import Parameter
 
 _BESIDE = 1.0  # of an interval: room beside it
-_ROW, _BETWEEN = 120, 0.68  # height of a parameter's row [pixels], and the share of it that labels need
+_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it that labels need
+_TITLE = 13  # pixels
 
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
@@ -26,10 +27,11 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
         for parameter, prior in zip(entry["parameters"], shown.model.parameters[places[entry["name"]]], strict=True)
     ]
     titles = [
-        f"{name.replace('_', ' ')}: {_labelled(entry)}<br><sup>{_before(prior, scale, entry['unit'])}</sup>"
+        f"{name.replace('_', ' ')}<br>{_labelled(entry)}<br><sup>{_before(prior, scale, entry['unit'])}</sup>"
         for name, entry, prior, scale in rows
     ]
     figure = make_subplots(len(rows), 1, subplot_titles=titles, vertical_spacing=_BETWEEN / len(rows))
+    figure.update_annotations(font_size=_TITLE)
     for place, (_, entry, *_) in enumerate(rows, start=1):
         low, high = entry["low"], entry["high"]
         figure.add_scatter(

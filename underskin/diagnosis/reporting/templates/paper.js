@@ -4,6 +4,7 @@
 
 const TEXT = 8, LEAST = 6, TITLE = 11; // pixels, of texts
 const CHARACTER = 0.52, DIGIT = 0.64, LINE = 1.2; // over the height of a text: width of either, and from line to line
+const BESIDE_BARS = 0.6; // of a figure's width, for the names of bars
 const BESIDE_MAP = { l: 50, r: 60 }; // pixels, for its steps and for the scale of its colours
 
 const fitting = (text, room, most) => {
@@ -29,7 +30,25 @@ function on_sheet(plot, { width, height, margin }) {
     if (type === "log") layout[`${name}.dtick`] = (Math.log10(2) * length) / (range[1] - range[0]) < TEXT ? 1 : "D2";
     else layout[`${name}.nticks`] = Math.max(4, Math.floor(length / (2 * TEXT)));
   }
+  const [first] = plot.data;
+  if (first.orientation === "h") return [bars_on_sheet(first, width, room, layout), layout];
   return [map ? map_on_sheet(plot, map, room, layout) : {}, layout];
+}
+
+// Of bars the names beside them, in as many lines as a bar's share of the height has room for.
+function bars_on_sheet(bars, width, room, layout) {
+  const each = room.y / bars.y.length;
+  const lines = Math.max(1, Math.floor(each / (LINE * LEAST)));
+  const names = bars.y.map((name) => {
+    const parts = name.replaceAll("<br>", " ").split(" + ");
+    const shared = Math.ceil(parts.length / lines);
+    const starts = parts.flatMap((_, place) => (place % shared === 0 ? [place] : []));
+    return starts.map((start) => parts.slice(start, start + shared).join(" + ")).join(" +<br>");
+  });
+  const most = Math.max(...names.map((name) => name.split("<br>").length));
+  const sizes = names.map((name) => fitting(name, BESIDE_BARS * width, Math.min(TEXT, each / (LINE * most))));
+  layout["yaxis.tickfont.size"] = Math.min(...sizes);
+  return { y: [names] };
 }
 
 // Of a map also the numbers of its cells, the names of its steps, as many as have room, and the scale of its colours.
