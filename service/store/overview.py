@@ -28,7 +28,10 @@ class Glance:
     last: AnyRow | None  # campaign; None where none is current
     cursor: int
     d33: list[tuple[str, float]] = field(default_factory=list)
-    diagnosis: AnyRow | None = None  # the latest of the last campaign: of it alone, else of it with others
+    # the latest of the last campaign that has one, of it alone, else of it with others; and that campaign, where it is
+    # not the last
+    diagnosis: AnyRow | None = None
+    diagnosed: AnyRow | None = None
     model: AnyRow | None = None  # in force
     # d33 of the array in the last campaign that has one, as `D33.array` has it, by the model in force, and by the
     # paper's; None where not kept
@@ -67,20 +70,22 @@ def glances(
     by_skin = {row[0]: Glance(row[0], row[1], None, row[2]) for row in connection.execute(query)}
     recent = _recent(connection, list(by_skin))
     values = medians(connection, [row.number for row in recent], table_sha256)
+    numbers = [row.number for row in recent]
+    diagnosed = _latest_together(connection, numbers) | latest_diagnoses(connection, numbers)
     for row in recent:
         glance = by_skin[row.root_id]
         glance.last = row
         if row.number in values:
             glance.d33.append((row.time, values[row.number]))
-    numbers = [row.number for row in recent]
-    diagnosed = _latest_together(connection, numbers) | latest_diagnoses(connection, numbers)
+        if row.number in diagnosed:
+            glance.diagnosis, glance.diagnosed = diagnosed[row.number], row
     adopted = adopted_models.in_force_of(connection, list(by_skin))
     told = {row.root_id: row for row in recent if row.number in values}
     sensors = measured_sensors(connection, [row.number for row in told.values()], table_sha256)
     for root, glance in by_skin.items():
         glance.model = adopted.get(root)
         if glance.last is not None:
-            glance.diagnosis = diagnosed.get(glance.last.number)
+            glance.diagnosed = None if glance.diagnosed == glance.last else glance.diagnosed
             _add_d33(connection, glance, told.get(root, glance.last), table_sha256)
         if root in told:
             glance.measured = sensors.get(told[root].number)

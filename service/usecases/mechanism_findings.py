@@ -6,12 +6,11 @@ Reports do not change once they are made, so that what each states is read once 
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 from weakref import WeakKeyDictionary
 
 from sqlalchemy import Connection
 
-from service.store import Database, diagnoses
+from service.store import Database, diagnosed_together, diagnoses
 from service.store.tables import AnyRow, campaigns
 from service.store.tables import diagnoses as rows_of_diagnoses
 
@@ -43,7 +42,8 @@ class Findings:
 
 
 def findings(store: Database) -> Findings:
-    """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out."""
+    """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out; one whose
+    campaigns are all in a later one is not counted again."""
     latest = store.read(_latest)
     stated = _stated(store, [row.number for row in latest])
     found: dict[str, list[FoundIn]] = {}
@@ -66,11 +66,22 @@ def findings(store: Database) -> Findings:
 def _latest(connection: Connection) -> list[AnyRow]:
     done = (rows_of_diagnoses.c.state == "done") & (rows_of_diagnoses.c.without == "[]")
     query = diagnoses.rows().add_columns(campaigns.c.name.label("campaign_name")).where(done)
-    latest: dict[tuple[Any, ...], AnyRow] = {}
-    for row in connection.execute(query.order_by(rows_of_diagnoses.c.number)):
-        if diagnoses.outdated(row) is None:
-            latest[row.kind, row.campaign_id if row.kind == "campaign" else row.together_sha256] = row
-    return sorted(latest.values(), key=lambda row: -row.number)
+    ordered = connection.execute(query.order_by(rows_of_diagnoses.c.number.desc()))
+    rows = [row for row in ordered if diagnoses.outdated(row) is None]
+    members = diagnosed_together.members_of(connection, [row.number for row in rows if row.kind != "campaign"])
+    alone, together = set(), list[tuple[str, frozenset[int]]]()
+    latest: list[AnyRow] = []
+    for row in rows:
+        own = frozenset(one.number for one in members.get(row.number, ()))
+        if row.kind == "campaign":
+            covered = row.campaign in alone
+            alone.add(row.campaign)
+        else:
+            covered = any(kind == row.kind and own <= later for kind, later in together)
+            together.append((row.kind, own))
+        if not covered:
+            latest.append(row)
+    return latest
 
 
 def _stated(store: Database, numbers: Sequence[int]) -> Mapping[int, tuple[tuple[str, float], ...]]:

@@ -19,6 +19,8 @@ from underskin.units import Floats, Mask
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id
 _APART = {"color": COLOURS[1], "width": 3}  # the ring around one that stands out
 _ABSENT = {"color": "#5b6670", "width": 2}  # the edge of one that was not measured with the others
+_EDGE = {"color": "#5b6670", "width": 1}  # of the others
+_PALE, _RINGED = ("absent", "unknown"), ("absent", "unknown", "stands out")  # without a colour of a value; with a ring
 _BELOW = 6  # pixels, of a mark that is not seen, by which an id keeps off the edge of the disc above it
 _FROM_ZERO = ("zero", "bound")
 _SCALE = "Viridis"  # which has no grey: that means alike here
@@ -90,12 +92,13 @@ def array_map(
     figure, below = go.Figure(), []
     for name, own in (
         ("differs", coloured & plain),
-        ("alike", ~coloured & plain & ~away),
+        ("alike", ~coloured & plain & ~away & np.isfinite(value)),
+        ("unknown", plain & ~away & ~np.isfinite(value)),
         ("absent", plain & away),
         ("stands out", ~plain),
     ):
         if own.any():
-            rows, meta = np.flatnonzero(own).tolist(), "alike" if name == "absent" else name
+            rows, meta = np.flatnonzero(own).tolist(), "alike" if name in _PALE else name
             figure.add_scatter(
                 x=x[own].tolist(),
                 y=y[own].tolist(),
@@ -120,7 +123,7 @@ def array_map(
                     "line": {"width": 0},
                 },
                 meta=meta,
-                showlegend=name not in ("absent", "stands out"),
+                showlegend=name not in _RINGED,
             )
             if not inside and len(sensors) <= _MOST_WITH_ID:
                 edges = np.array([AROUND * radius if sensors[row] == chosen else radius for row in rows])
@@ -129,7 +132,12 @@ def array_map(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
     # In the legend as their discs are ringed.
-    for name, shown, border in (("absent", away & plain, _ABSENT), ("stands out", ~plain, _APART)):
+    unknown = plain & ~away & ~np.isfinite(value)
+    for name, shown, border in (
+        ("unknown", unknown, _EDGE),
+        ("absent", away & plain, _ABSENT),
+        ("stands out", ~plain, _APART),
+    ):
         if shown.any():
             ringed = {"symbol": "circle-open", "size": 10, "color": border["color"], "line": border}
             figure.add_scatter(x=[None], y=[None], mode="markers", marker=ringed, name=_names(quantity)[name])
@@ -137,7 +145,7 @@ def array_map(
     for row, name in enumerate(sensors):
         own_line = {"color": INK, "width": 4} if name == chosen else _APART if reasons[row] else None
         disc = {"x0": x[row] - radius, "x1": x[row] + radius, "y0": y[row] - radius, "y1": y[row] + radius}
-        line = own_line or ({**_ABSENT, "dash": "dot"} if away[row] else {"color": "#5b6670", "width": 1})
+        line = own_line or ({**_ABSENT, "dash": "dot"} if away[row] else _EDGE)
         discs.append(
             {"type": "circle", "fillcolor": colours[row], "line": line, "layer": "below", "name": "sensor", **disc}
         )
@@ -182,6 +190,7 @@ def _names(quantity: Quantity) -> dict[str, str]:
     return {
         "differs": quantity.name,
         "alike": alike[quantity.against],
+        "unknown": f"no {quantity.name} known",
         "absent": "not in this campaign",
         "stands out": "stands out",
     }

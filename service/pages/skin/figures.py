@@ -1,6 +1,7 @@
 """The figure of a skin's page: its array as a map."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any, Literal
@@ -41,7 +42,9 @@ def map_rows(
         name = place["id"]
         of_sensor = known.get(name)
         its = answered.get(name) or _last(of_sensor)
-        trend = {} if of_sensor is None or of_sensor.trend is None else _trend(of_sensor.trend, len(of_sensor.points))
+        trend: dict[str, Any] = {"no_trend": "never measured with FRFs" if of_sensor is None else of_sensor.no_trend}
+        if of_sensor is not None and of_sensor.trend is not None:
+            trend = _trend(of_sensor.trend, len(of_sensor.points))
         rows.append({"sensor": name, "x_mm": place["x_mm"], "y_mm": place["y_mm"], "absent": "", **its, **trend})
     return rows
 
@@ -101,8 +104,18 @@ def drawn_map(
     about += f"It tells of {measured} of the {len(rows)} sensors. " if measured < len(rows) else ""
     about += "The hollow ones stand at their last value, with its date under the pointer. " if any(absent) else ""
     about += f"{disc_size(x_mm, y_mm, radius)} {told_apart(compared, uncertainties, quantity)} "
-    about += _alone(rows) if show == "trend" else ""
+    about += _alone(rows) + _without_trend(rows) if show == "trend" else ""
     return drawn("map", figure, about + CLICK, f"/skins/{quote(root, safe='')}/map.csv?model={by}")
+
+
+def _without_trend(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many sensors have no trend, and the reason that most of them have."""
+    reasons = Counter(row["no_trend"] for row in rows if row.get("no_trend"))
+    if not reasons:
+        return ""
+    (most, count), of = reasons.most_common(1)[0], reasons.total()
+    have = "sensor has" if of == 1 else "sensors have"
+    return f"{of} {have} no trend, {'' if count == of else f'{count} of them since '}{most}. "
 
 
 def _alone(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -11,6 +11,7 @@ from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
 from tests.service.pages.test_pages_array import place_of
 from tests.support.blocks import block
+from tests.support.diagnosed import diagnosed, report, resonant, sent
 from tests.support.store_server import Place, Server, campaign, running
 
 SKIN = "aged"
@@ -118,3 +119,15 @@ def test_older_campaigns_are_on_the_pages_behind(idle: Server, reader: Visit) ->
     assert reader.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text() == first
     assert reader.page.get_by_label("Sensor", exact=True).input_value() == "s0"
     assert reader.page.get_by_label("Colour by").input_value() == "trend"
+
+
+def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(idle: Server, reader: Visit) -> None:
+    earlier, last = (resonant(name) for name in ("May", "September"))
+    diagnosed(idle, earlier, report(), skin="half")
+    reader.go("/?find=half")
+    row = reader.page.get_by_role("row").filter(has_text="half")
+    assert "not diagnosed" not in row.inner_text()
+    sent(idle, last, "half")
+    reader.go("/?find=half")
+    assert "contact resonance" in row.inner_text()
+    assert "of May; the last campaign is not diagnosed" in row.inner_text()

@@ -7,10 +7,13 @@ from xml.etree import ElementTree
 import pytest
 from playwright.sync_api import Browser, expect
 
+from service.store import database, diagnosed_together, diagnoses
+from service.usecases.mechanism_findings import findings
 from tests.service.pages.conftest import Visit, visit
 from tests.service.routes.test_mechanisms import SEVERAL, WARM, warmed
-from tests.support.diagnosed import diagnosed, report, resonant, sent
+from tests.support.diagnosed import diagnosed, report, resonant, sent, table
 from tests.support.store_server import Place, Server, running
+from underskin import __version__
 from underskin.mechanisms.registry import built_in
 
 
@@ -162,3 +165,21 @@ def test_the_lab_s_own_stand_beside_with_their_files(browser: Browser, tmp_path:
             assert warm.locator("pre").inner_text().strip() == WARM.strip()
             _require_accessible_at_both_widths(visitor)
         assert server.http.get("/mechanisms/warm_amplifier/picture.svg").status_code == 404
+
+
+def test_campaigns_diagnosed_together_count_once(idle: Server) -> None:
+    """A diagnosis of two of three, then of all three, then of two of them again."""
+    sent_ids = [sent(idle, resonant(f"counted {number}"), "counted") for number in range(3)]
+    store = database(idle.place.database_url, idle.place.folder)
+    with store.writing() as connection:
+        members = diagnosed_together.usable(connection, "counted")
+        assert [one.campaign_id for one in members] == sent_ids
+        basis = diagnoses.Basis(table().sha256, __version__)
+        for name, chosen in (("two", members[:2]), ("all", members), ("two again", members[:2])):
+            diagnoses.ask_together(connection, diagnosed_together.Together("skin", name, chosen, ()), basis, None)
+            claimed = diagnoses.claim(connection, "test", basis)
+            assert claimed is not None
+            assert diagnoses.finish(connection, claimed.number, "test", report())
+    names = [one.name for one in findings(store).by_mechanism["contact_resonance"] if one.skin_id == "counted"]
+    store.close()
+    assert names == ["two again", "all"]

@@ -81,6 +81,23 @@ def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
     assert "Taken alone, s37 would have a trend (95 %)" in about
 
 
+def test_sensors_without_a_trend_are_white_and_said_why() -> None:
+    places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(5)]
+    row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
+    of_skin = history([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], 0.001)
+    few = "a trend needs 3 campaigns, and there are 2"
+    short = [
+        SensorHistory(sensor=f"s{2 + number}", points=points([20.0, 20.1]), trend=None, no_trend=few)
+        for number in (0, 1)
+    ]
+    of_skin = of_skin.model_copy(update={"sensors": [*of_skin.sensors, *short]})
+    drawn = drawn_map("palm", row, map_rows(row, {"sensors": []}, of_skin, places), "trend", "paper", None)
+    assert f"3 sensors have no trend, 2 of them since {few}. " in drawn.about
+    figure = orjson.loads(str(drawn.json))
+    legend = [trace["name"] for trace in figure["data"] if trace.get("showlegend") is not False]
+    assert legend == ["trend", "not different from 0", "no trend known"]
+
+
 @pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])
 def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_significant(
     values: list[float],
