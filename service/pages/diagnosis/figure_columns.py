@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import orjson
 
+from underskin.diagnosis.reporting.wording import unit
+
 FigureColumns = dict[str, list[Any]]
 
 
@@ -27,7 +29,7 @@ def _explanations(report: Mapping[str, Any]) -> FigureColumns:
 def _parameters(report: Mapping[str, Any]) -> FigureColumns:
     names = ("mechanism", "parameter", "unit", "value", "low", "high")
     rows = [
-        (entry["name"], one["name"], *(one[name] for name in names[2:]))
+        (entry["name"], one["name"], unit(one["unit"]), *(one[name] for name in names[3:]))
         for entry in report["mechanisms"]
         for one in entry["parameters"]
     ]

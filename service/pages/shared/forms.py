@@ -187,9 +187,9 @@ def in_form_words(
 
 
 def unsigned(field: str, allowed: str) -> str:
-    """What is allowed, without the words on its magnitude where a field has no sign."""
+    """What is allowed, without the words on its magnitude where a field has no sign, or is one of a single file."""
     known = LAB.get(field.rpartition(".")[2])
-    return allowed if known is None or known.signed else allowed.replace(" in magnitude", "")
+    return allowed if known is not None and known.signed else allowed.replace(" in magnitude", "")
 
 
 def worded(allowed: str, label: Callable[[str], str], unlikely: str) -> str:

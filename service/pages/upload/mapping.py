@@ -152,8 +152,8 @@ def document_of(form: Mapping[str, str], base: Mapping[str, Any]) -> tuple[dict[
     document.pop("units_checked", None)
     if form.get("units_checked"):
         document["units_checked"] = True
-    named_twice = workbench.named_twice(form, CHANNELS)
-    return document, [*typed_values.refused(document), *strange, *twice, *unsaid, *mistimed, *named_twice]
+    rows = workbench.wrong_rows(form, CHANNELS)
+    return document, [*typed_values.refused(document), *strange, *twice, *unsaid, *mistimed, *rows]
 
 
 def sensors_text(document: Mapping[str, Any]) -> str:

@@ -201,11 +201,13 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
     units_checked = bool(said.get("units_checked"))
     values, wrong_of_files = single_files.values_of(of_files, pending.files, said["kind"], units_checked=units_checked)
     wrong += wrong_of_files
+    pending.refused = [entry for error in wrong for entry in field_errors(error)]
     try:
         rig = rig_description.from_dict(pending.draft)
     except InvalidInput as error:
         wrong.append(error)
-    pending.refused = [entry for error in wrong for entry in field_errors(error)]
+        told = {entry["field"] for entry in pending.refused}
+        pending.refused += [entry for entry in field_errors(error) if entry["field"] not in told]
     pending.of_files = of_files
     if not wrong:
         pending.say_of_files(of_files, values)

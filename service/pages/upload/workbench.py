@@ -7,7 +7,7 @@ from typing import Any
 
 from service.pages.shared.forms import number_or_text
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
-from underskin.errors import InvalidInput, not_unique
+from underskin.errors import InvalidInput, not_unique, required
 from underskin.recordings.channel_mapping import AUTOMATIC
 from underskin.recordings.readers import channel_arithmetic
 from underskin.recordings.readers.derived_channels import FIELD
@@ -58,8 +58,8 @@ def formulas(form: Mapping[str, str], words: Mapping[str, str], base: Mapping[st
     found: dict[str, str] = {}
     for number in _rows_in(form):
         text, name = form[f"{FIELD}-formula-{number}"].strip(), _name(form, number, words)
-        if text or form.get(f"{FIELD}-name-{number}", "").strip():
-            while name in found:  # refused by `named_twice`, and there to be put right
+        if _is_filled(form, number):
+            while name in found:  # refused by `wrong_rows`, and there to be put right
                 name += " again"
             found[name] = text
     return found or None
@@ -76,20 +76,23 @@ def with_derived(
     result = dict(channels)
     for number in _rows_in(form):
         field = form.get(f"{FIELD}-is-{number}", "")
-        if field and form[f"{FIELD}-formula-{number}"].strip():
+        if field and _is_filled(form, number):
             name = _name(form, number, words)
             known = before.get(field, {})
             result[field] = {**known, "channel": name} if known.get("channel") == name else {"channel": name}
     return result
 
 
-def named_twice(form: Mapping[str, str], words: Mapping[str, str]) -> list[InvalidInput]:
-    """The derived channels of a form whose name, or the field that they are for, another one has already."""
+def wrong_rows(form: Mapping[str, str], words: Mapping[str, str]) -> list[InvalidInput]:
+    """The derived channels of a form that have a name and no formula, or whose name, or the field that they are for,
+    another one has already."""
     wrong = []
     names: set[str] = set()
     fields: dict[str, str] = {}
     for number in _rows_in(form):
         if not form[f"{FIELD}-formula-{number}"].strip():
+            if named := form.get(f"{FIELD}-name-{number}", "").strip():
+                wrong.append(required(f"{FIELD}.{named}", "it has a name and no formula: write one, or clear its name"))
             continue
         name, field = _name(form, number, words), form.get(f"{FIELD}-is-{number}", "")
         if name in names:
@@ -170,6 +173,11 @@ def errors_of(refused: Sequence[Mapping[str, Any]], file: FileSummary) -> dict[s
 def _rows_in(form: Mapping[str, str]) -> list[int]:
     """The numbers of the rows of derived channels, as the page writes them; other names are none of its rows."""
     return sorted(int(row[1]) for row in map(_ROW.fullmatch, form) if row)
+
+
+def _is_filled(form: Mapping[str, str], number: int) -> bool:
+    """Whether a row has a formula, or a name at least."""
+    return any(form.get(f"{FIELD}-{part}-{number}", "").strip() for part in ("formula", "name"))
 
 
 def _name(form: Mapping[str, str], number: int, words: Mapping[str, str]) -> str:

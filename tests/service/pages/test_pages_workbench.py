@@ -84,6 +84,7 @@ def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     for typed, said in (
         ("'Height (nm)' ** 2", "'Height (nm)' ** 2: is not allowed"),
         ("'Height (nm)' - 5 [N]", "5 [N] has the unit N; only what has units of one kind"),
+        ("", "it has a name and no formula: write one, or clear its name"),
     ):
         formula = page.get_by_label("Formula of derived channel 1", exact=True)
         formula.fill(typed)
