@@ -3,6 +3,7 @@
 import argparse
 import os
 import platform
+import subprocess
 import time
 from functools import partial
 from importlib.metadata import version
@@ -28,7 +29,7 @@ from bench import (
     waits,
 )
 from bench import against as against_revision
-from bench.page import AGAINST, SOAK, keep, markdown, write
+from bench.page import AGAINST, SOAK, keep, keep_soak, markdown, write
 
 PARTS = {
     "requests": single_requests.measure,
@@ -61,9 +62,17 @@ def main(names: list[str], against: str | None) -> None:
         print(f"{name}: {about}", flush=True)
         figures = parts[name]()
         print(markdown(figures), flush=True)
-        if figures:
+        if figures and name == SOAK:
+            keep_soak(about, figures, commit())
+        elif figures:
             keep(name, about, figures)
     write()
+
+
+def commit() -> str:
+    """That of the code as it is, "-dirty" where it differs from it."""
+    command = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parent).stdout.strip()
 
 
 def machine() -> dict[str, str | int]:

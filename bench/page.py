@@ -79,8 +79,9 @@ diagnosis in a fresh process with one BLAS thread, the median of three.""",
     "nested": """Nothing and three single mechanisms on campaigns of 24 recordings × 20 lines of the virtual rig: the
 diagnosis' fits from many starts and Laplace's method, against dynesty with its own defaults. Both call the same code
 for a likelihood, with the same priors and noise. Differences are of all hypotheses within 10 nats of the winner.""",
-    SOAK: """By `make soak`, as far as it has come: the tests at full counts. A part that failed has no figure. In a
-power cut the disk forgets what was not synced, or keeps some sectors of it (`tests/support/power/`).""",
+    SOAK: """By `make soak`, as far as it has come: the tests at full counts, each on the commit that is named, since
+all of them take hours. A part that failed has no figure. In a power cut the disk forgets what was not synced, or keeps
+some sectors of it (`tests/support/power/`).""",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
 contacts' positions, under three mechanisms; processor time on one core.""",
 }
@@ -88,8 +89,23 @@ contacts' positions, under three mechanisms; processor time on one core.""",
 
 def keep(part: str, machine: Mapping[str, object], figures: Sequence[Figure]) -> None:
     """Store the results of one part in the place of its previous ones."""
+    _store(part, machine, [asdict(figure) for figure in figures])
+
+
+def keep_soak(machine: Mapping[str, object], figures: Sequence[Figure], commit: str) -> None:
+    """Store those of a soak of a commit beside what it has not measured yet: a soak takes hours, so that its parts may
+    be of several commits, each of which is named. Counts that have not reached their target replace nothing."""
+    kept = {entry["name"]: entry for entry in _results().get(SOAK, {}).get("figures", [])}
+    for figure in figures:
+        unfinished = figure.better == "higher" and figure.met is False
+        if not (unfinished and figure.name in kept):
+            kept[figure.name] = {**asdict(figure), "commit": commit}
+    _store(SOAK, machine, [kept[name] for name in sorted(kept)])
+
+
+def _store(part: str, machine: Mapping[str, object], figures: Sequence[Mapping[str, object]]) -> None:
     results = _results()
-    results[part] = {"machine": dict(machine), "figures": [asdict(figure) for figure in figures]}
+    results[part] = {"machine": dict(machine), "figures": [dict(figure) for figure in figures]}
     RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
 
 
@@ -99,11 +115,14 @@ def write() -> None:
     results = _results()
     for part, title in SECTIONS.items():
         if part in results:
+            commits = {
+                figure["name"]: figure.pop("commit") for figure in results[part]["figures"] if "commit" in figure
+            }
             figures = [Figure(**figure) for figure in results[part]["figures"]]
             machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
             command = "diagnosis --against 127b47b" if part == AGAINST else part
             text += f"\n## {title}\n\n`python -m bench {command}`. {EXPLANATIONS[part]}\n\n"
-            text += f"{markdown(figures)}\n\nMeasured on: {machine}.\n"
+            text += f"{markdown(figures, commits)}\n\nMeasured on: {machine}.\n"
     PAGE.write_text(text)
 
 
@@ -111,13 +130,15 @@ def _results() -> dict[str, Any]:
     return json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
 
 
-def markdown(figures: Sequence[Figure]) -> str:
-    """The figures as a table."""
+def markdown(figures: Sequence[Figure], commits: Mapping[str, str] | None = None) -> str:
+    """The figures as a table, with the commits that they are of, by name, where any are."""
     lines = ["| what | measured | target | met |", "|---|---|---|---|"]
+    lines = [f"{line} {cell} |" for line, cell in zip(lines, ("of commit", "---"), strict=True)] if commits else lines
     for f in figures:
         target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
         met = {None: "", True: "yes", False: "**no**"}[f.met]
-        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |")
+        commit = f" {commits.get(f.name, '')} |" if commits else ""
+        lines.append(f"| {f.name} | {_rounded(f.value)} {f.unit} | {target} | {met} |{commit}")
     return "\n".join(lines)
 
 

@@ -1,7 +1,7 @@
 """The soak: what `make soak` has done already, and what it measured; an interrupted run goes on where it was.
 
 Under `build/soak/`, in a folder for each state of the code: `passed`, a test a line, which is not run again; and
-`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md.
+`figures.jsonl`, which `python -m bench soak` writes into docs/validation.md, beside those of earlier commits.
 """
 
 import functools

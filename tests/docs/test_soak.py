@@ -3,11 +3,12 @@
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from bench import soak
+from bench import page, soak
 from bench.figures import Figure
 from tests.support.repository import ROOT
 
@@ -43,6 +44,17 @@ def test_nothing_is_kept_at_reduced_counts(folder: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(soak, "SOAK", False)
     soak.record(Figure("kills", 3, "", 250))
     assert not folder.exists()
+
+
+def test_parts_of_a_soak_are_of_the_commits_that_finished_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page, "RESULTS", tmp_path / "results.json")
+    monkeypatch.setattr(page, "PAGE", tmp_path / "validation.md")
+    kills, slowest = Figure("kills", 250, "", 250), Figure("slowest", 120.0, "ms", 300, "lower")
+    page.keep_soak({"cores": 2}, [kills, slowest], "a1")
+    page.keep_soak({"cores": 2}, [replace(kills, value=20), replace(slowest, value=400.0)], "b2")
+    page.write()
+    rows = [line for line in page.PAGE.read_text().splitlines() if line.startswith(("| kills", "| slowest"))]
+    assert rows == ["| kills | 250  | ≥ 250 | yes | a1 |", "| slowest | 400 ms | ≤ 300 | **no** | b2 |"]
 
 
 @pytest.mark.slow
