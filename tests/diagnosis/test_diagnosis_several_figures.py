@@ -47,6 +47,13 @@ def test_d33_of_each_sensor_is_drawn_over_the_campaigns_with_its_interval(togeth
     assert 'id="figure-sensors"' in page(together)
 
 
+def test_a_campaign_of_which_no_d33_is_told_has_its_place(together: dict[str, Any]) -> None:
+    rows = together["d33"]["per_sensor"]
+    figure = sensors_over_campaigns(rows, ["<b>may", "of curves", "june"])
+    assert list(figure.layout.xaxis.ticktext) == ["&lt;b&gt;may", "of curves<br>(no d33)", "june"]
+    assert {round(x) for trace in figure.data for x in trace.x} == {0, 2}
+
+
 def test_each_skin_stands_on_the_band_of_its_population(fleet: dict[str, Any]) -> None:
     figure = of_report(fleet)["population"]
     (d33,) = [entry for entry in fleet["population"] if entry["parameter"] == "d33"]
@@ -73,7 +80,7 @@ def test_of_many_sensors_the_median_the_range_and_those_apart_are_drawn_without_
             value = 0.7 * level if (name, number) == ("june", 31) else float(d33)
             rows.append({"campaign": name, "sensor": f"s{number}", "unit": "pC/N", "value": value})
             rows[-1] |= {"low": 0.98 * value, "high": 1.02 * value}
-    figure = sensors_over_campaigns(rows)
+    figure = sensors_over_campaigns(rows, list(dict.fromkeys(row["campaign"] for row in rows)))
     median, apart = figure.data
     assert figure.layout.showlegend is False
     for number, name in enumerate(("may", "june")):

@@ -27,20 +27,22 @@ def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
     drawn = {}
     rows = (document["d33"] or {}).get("per_sensor")
     if rows:
-        drawn["sensors"] = sensors_over_campaigns(rows)
+        drawn["sensors"] = sensors_over_campaigns(rows, document["campaigns"])
     if document.get("population"):
         drawn["population"] = skins_in_populations(document["population"])
     return drawn
 
 
-def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]]) -> go.Figure:
+def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> go.Figure:
     """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; of many their median, the range
-    of most and, by name, those that stand apart. `rows` are those of `d33.per_sensor`."""
-    campaigns = list(dict.fromkeys(row["campaign"] for row in rows))
+    of most and, by name, those that stand apart. `rows` are those of `d33.per_sensor`, `names` all campaigns in their
+    order: one of which no d33 is told has its place too."""
+    told = dict.fromkeys(row["campaign"] for row in rows)
+    campaigns = list(dict.fromkeys([*names, *told]))
     sensors = list(dict.fromkeys(row["sensor"] for row in rows))
     few = len(sensors) <= MOST_NAMED
     figure = go.Figure(list(_each(rows, campaigns, sensors) if few else _most(rows, campaigns)))
-    labels = [escape(name) for name in campaigns]
+    labels = [escape(name) + ("" if name in told else "<br>(no d33)") for name in campaigns]
     figure.update_xaxes(title="campaign", tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     figure.update_yaxes(title=f"d33 [{rows[0]['unit']}]" + (", 95 %" if few else ""))
     title = "d33 of each sensor over the campaigns"
@@ -71,17 +73,21 @@ def _each(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: 
 
 def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterator[go.Scatter]:
     """The median of each campaign's sensors with the range of 90 % of them, then those that stand apart."""
-    of_campaign = [[row for row in rows if row["campaign"] == name] for name in campaigns]
+    of_campaign = {
+        number: own
+        for number, name in enumerate(campaigns)
+        if (own := [row for row in rows if row["campaign"] == name])
+    }
     found = [
         many_sensors(
             np.array([row["value"] for row in own]),
             np.array([(row["high"] - row["low"]) / (2 * SDS_OF_95) for row in own]),
         )
-        for own in of_campaign
+        for own in of_campaign.values()
     ]
     ends = [{"value": one.median, "low": one.low, "high": one.high} for one in found]
     yield go.Scatter(
-        x=list(range(len(campaigns))),
+        x=list(of_campaign),
         y=[one.median for one in found],
         error_y=_reaching(ends),
         mode="lines+markers",
@@ -90,7 +96,11 @@ def _most(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterat
         marker={"symbol": "circle", "size": 9},
         hovertemplate="median %{y:.4g} pC/N<extra></extra>",
     )
-    apart = [(number, of_campaign[number][place]) for number, one in enumerate(found) for place in one.apart]
+    apart = [
+        (number, own[place])
+        for (number, own), one in zip(of_campaign.items(), found, strict=True)
+        for place in one.apart
+    ]
     yield go.Scatter(
         x=[number for number, _ in apart],
         y=[row["value"] for _, row in apart],
