@@ -1,5 +1,6 @@
 """A diagnosis: asked for, watched while it runs, read, saved, adopted."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from urllib.parse import quote
@@ -20,7 +21,7 @@ from service.pages.shared.figures import Drawn, attachment, csv_answer, drawn, d
 from service.pages.shared.forms import OWN_FORM, Form, see
 from service.pages.shared.html import page, render
 from service.problems import Refusal
-from service.store import AnyRow, Database, diagnoses, models, skins
+from service.store import AnyRow, Database, Missing, campaigns, diagnoses, models, skins
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
 router = APIRouter()
 
+_CAMPAIGN = re.compile(r"\bc-[0-9a-f]{16}\b")  # the id of one
 _ABOUT = {
     "where": "Each cell is the mean over the recordings in it, empty where there is none.",
     "frf": "One recording with the models before and after, the worst explained one first; below, measured less "
@@ -84,10 +86,10 @@ def diagnosis(
         own = next((model for model in of_skin if model.id == row.id), None)
         adopted_as = None if own is None else verdicts.adopted_versions(connection, [own])[0]
         members = diagnoses.members(connection, row)
+        outdated = _outdated(connection, row)
     alone = row.kind == "campaign"
     not_adopted = None if report is None or not alone else _not_adopted(report)
     planned = _planned(store, row, report) if report is not None and alone else []
-    place = f"/v1/diagnoses/{row.id}"
     return page(
         request,
         "diagnosis.html",
@@ -98,7 +100,7 @@ def diagnosis(
         shown=None if report is None else _shown(row, report, figures),
         array=shown_array(store, table, row, figures, sensor) if alone else None,
         lacks_figures=alone and report is not None and report["fit"] is not None and not figures,
-        outdated=diagnoses.outdated(row),
+        outdated=outdated,
         adopted_as=adopted_as,
         in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
         may_be_adopted=alone and report is not None and not_adopted is None,
@@ -112,8 +114,21 @@ def diagnosis(
         has_law=report is not None and report.get("unnamed") is not None,
         not_kept=None if report is None else _not_kept(report),
         not_adopted=not_adopted,
-        same=same_request.get(request, place, f"client.diagnoses.get({row.id!r})"),
+        same=same_request.get(request, f"/v1/diagnoses/{row.id}", f"client.diagnoses.get({row.id!r})"),
     )
+
+
+def _outdated(connection: Connection, row: AnyRow) -> str | None:
+    """Why it is not of its campaigns as they are now, with names for the ids of campaigns."""
+
+    def named(found: re.Match[str]) -> str:
+        try:
+            return f"“{campaigns.find(connection, found[0]).name}”"
+        except Missing:  # it stands in what a person wrote
+            return found[0]
+
+    why = diagnoses.outdated(row)
+    return None if why is None else _CAMPAIGN.sub(named, why)
 
 
 @router.get("/diagnoses/{diagnosis_id}/report.html")

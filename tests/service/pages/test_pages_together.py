@@ -65,6 +65,7 @@ def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
         for diagnosis_id, count, why in ((whole, 4, "excluded since"), (chosen, 2, "excluded since")):
             shown = form.get(f"/diagnoses/{diagnosis_id}").text
             assert why in shown
+            assert "campaign “b” was changed" in shown
             assert "Diagnose them again" in shown
             sent_form = {"form_token": token_of(shown), "without": "adhesion"}
             answer = form.post(f"/diagnoses/{diagnosis_id}/again", data=sent_form)
