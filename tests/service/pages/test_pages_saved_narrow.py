@@ -48,12 +48,12 @@ def test_texts_of_figures_are_whole_and_apart(reader: Visit, saved: Path) -> Non
         plot.scroll_into_view_if_needed()
         assert plot.evaluate(_CUT) == []
     frf, where = page.locator("#figure-frf"), page.locator("#figure-where")
-    for texts, start, size in (
-        (frf.locator("text[class^=y][class$=title]"), "y", "height"),
-        (where.locator(".xtick text"), "x", "width"),
+    titles = [box for one in frf.locator("text[class^=y][class$=title]").all() if (box := one.bounding_box())]
+    steps = [box for one in where.locator(".xtick text").all() if (box := one.bounding_box())]
+    for ends in (
+        sorted((box["y"], box["y"] + box["height"]) for box in titles),
+        sorted((box["x"], box["x"] + box["width"]) for box in steps),
     ):
-        boxes = [box for one in texts.all() if (box := one.bounding_box()) is not None]
-        ends = sorted((box[start], box[start] + box[size]) for box in boxes)
         assert len(ends) > 3
         assert all(one[1] <= following[0] + 1 for one, following in pairwise(ends)), ends
     below = where.bounding_box()
