@@ -72,7 +72,7 @@ openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
 
-proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (about five hours; resumes)
+proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (several hours; resumes)
 	$(VENV)/bin/underskin prove
 
 bench: $(VENV)/.dev $(PEERS:%=$(VENV)-%/.installed) ## measure speed, as ratios against peers in the same run

@@ -133,7 +133,8 @@ def _results() -> dict[str, Any]:
 def markdown(figures: Sequence[Figure], commits: Mapping[str, str] | None = None) -> str:
     """The figures as a table, with the commits that they are of, by name, where any are."""
     lines = ["| what | measured | target | met |", "|---|---|---|---|"]
-    lines = [f"{line} {cell} |" for line, cell in zip(lines, ("of commit", "---"), strict=True)] if commits else lines
+    if commits:
+        lines = ["| what | measured | target | met | of commit |", "|---|---|---|---|---|"]
     for f in figures:
         target = "" if f.target is None else f"{'≥' if f.better == 'higher' else '≤'} {f.target:,.10g}"
         met = {None: "", True: "yes", False: "**no**"}[f.met]

@@ -26,7 +26,7 @@ _HEAD = """\
 # Proof: the diagnosis judged on what it cannot know
 
 Everything on this page, figures and numbers, is written by `make proof` (`underskin prove`, `proof/`). The full run
-takes about five hours on two cores; it keeps what it has worked out and goes on from there. What each part found is in
+takes several hours on two cores; it keeps what it has worked out and goes on from there. What each part found is in
 `proof/results/`. Shares have Wilson's 95 % interval in brackets. The diagnosis is called as `underskin diagnose` calls
 it: it gets the campaign and nothing else.
 

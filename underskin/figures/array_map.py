@@ -89,11 +89,11 @@ def array_map(
     plain = np.array([not reason for reason in reasons])
     radius, apart = radius_of(x, y, sensor_radius_mm), smallest_distance(x, y)
     inside = radius >= _WITH_ROOM * apart
-    figure, below = go.Figure(), []
+    figure, below, unknown = go.Figure(), [], plain & ~away & ~np.isfinite(value)
     for name, own in (
         ("differs", coloured & plain),
-        ("alike", ~coloured & plain & ~away & np.isfinite(value)),
-        ("unknown", plain & ~away & ~np.isfinite(value)),
+        ("alike", ~coloured & plain & ~away & ~unknown),
+        ("unknown", unknown),
         ("absent", plain & away),
         ("stands out", ~plain),
     ):
@@ -132,7 +132,6 @@ def array_map(
         [go.Scatter(**ids, textfont={"size": 11 if len(sensors) <= 16 else 9, "color": INK}) for ids in below]
     )
     # In the legend as their discs are ringed.
-    unknown = plain & ~away & ~np.isfinite(value)
     for name, shown, border in (
         ("unknown", unknown, _EDGE),
         ("absent", away & plain, _ABSENT),
@@ -185,11 +184,10 @@ def _names(quantity: Quantity) -> dict[str, str]:
         "others": "not different from the others",
         "zero": "not different from 0",
         "bound": "0 within its ±",
-        "nothing": "not known",
     }
     return {
         "differs": quantity.name,
-        "alike": alike[quantity.against],
+        "alike": alike.get(quantity.against, ""),  # where nothing is compared, every known value has a colour
         "unknown": f"no {quantity.name} known",
         "absent": "not in this campaign",
         "stands out": "stands out",
