@@ -19,7 +19,9 @@ PYTEST = $(PYTHON) -m pytest --numprocesses 6 --dist loadfile --no-loadscope-reo
 # Modules stay compiled: servers, workers and commands start some hundred times in the tests.
 unexport PYTHONDONTWRITEBYTECODE
 
-PIP_INSTALL = $(PYTHON) -m pip install --quiet --disable-pip-version-check
+# What is imported is compiled then; the rest of a package never is.
+PIP = -m pip install --quiet --disable-pip-version-check --no-compile
+PIP_INSTALL = $(PYTHON) $(PIP)
 
 .DEFAULT_GOAL := help
 .PHONY: help serve unit test check docs tables paper tour openapi mechanisms proof bench soak lock clean
@@ -113,5 +115,5 @@ $(VENV)/.dev: $(VENV)/.runtime $(VENV)/.dev-packages
 $(VENV)-%/.installed: requirements-%.lock
 	@scripts/make-venv.sh $(VENV)-$*
 	@echo "Installing $* into $(VENV)-$* ..."
-	@$(VENV)-$*/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $<
+	@$(VENV)-$*/bin/python $(PIP) --require-hashes -r $<
 	@touch $@

@@ -1,5 +1,6 @@
 """The server that most tests over HTTP share, and the markers that say what a test needs."""
 
+import gc
 import os
 import signal
 import sys
@@ -44,6 +45,17 @@ def http(shared_server: Server) -> Iterator[httpx.Client]:
     """A client of it."""
     with httpx.Client(base_url=shared_server.url, timeout=60) as client:
         yield client
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect without looking for garbage: tests and their parameters are there to stay, and are many."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 @pytest.hookimpl(tryfirst=True)
