@@ -1,0 +1,23 @@
+"""docs/proof.md is what the kept results of all parts give, and one diagnosis made them all."""
+
+from itertools import zip_longest
+
+from proof.results import PARTS, stored_parts
+from proof.text import document
+from tests.support.repository import ROOT
+from tests.support.shown import is_as_shown
+
+_RESULTS = ROOT / "proof" / "results"
+
+
+def test_the_page_is_what_the_results_give() -> None:
+    page = (ROOT / "docs" / "proof.md").read_text(encoding="utf-8").splitlines()
+    given = document(stored_parts(_RESULTS)).splitlines()
+    differ = [pair for pair in zip_longest(page, given, fillvalue="") if not is_as_shown(*pair)]
+    assert differ == []
+
+
+def test_one_diagnosis_made_every_part() -> None:
+    parts = stored_parts(_RESULTS)
+    assert set(parts) == set(PARTS)
+    assert len({part["sources"] for part in parts.values()}) == 1
