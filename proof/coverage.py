@@ -7,12 +7,14 @@ Campaigns of the virtual rig with wide tails (`rig/wide_tails.py`) and the rig's
 import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from proof import seeds
 from proof.cases import DrawnCase
-from proof.stored import Work, reports
+from proof.own_rig import truth
+from proof.stored import Work, of_each, reports, sources
 from proof.text_wide import by_subset
 from rig.wide_tails import WIDE
 
@@ -27,8 +29,15 @@ def judge_coverage(work: Work, progress: Callable[[int, int], None]) -> dict[str
 
 def _judge(work: Work, seed: int, count: int, progress: Callable[[int, int], None]) -> dict[str, Any]:
     cases = [DrawnCase(seed, number, tails=WIDE) for number in range(count)]
+    truths = of_each(work, cases, partial(truth, work, sources("rig")), progress)
     answers = reports(work, cases, progress)
-    return {"seed": seed, "judged": [held(case, report) for case, report in zip(cases, answers, strict=True)]}
+    return {
+        "seed": seed,
+        "judged": [
+            held(case, report) | {"shows": bool(known["identifiable"])}
+            for case, known, report in zip(cases, truths, answers, strict=True)
+        ],
+    }
 
 
 def held(case: DrawnCase, report: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged
 from proof.phrases import percent, right
 from proof.statistics import calibration, share
+from rig.draw import UNKNOWN
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -67,8 +68,29 @@ def _unlisted(result: Result) -> str:
 def _coverage(result: Result) -> str:
     stated = [entry for entry in result["judged"] if entry["held"] is not None]
     held = percent(share([entry["held"] for entry in stated]))
+    showing = [entry for entry in stated if entry["shows"] or not set(entry["hidden"]) & set(UNKNOWN)]
+    but_hopeless = percent(share([entry["held"] for entry in showing]))
     quotable = percent(share([entry["held"] for entry in stated if entry["quotable"]]))
-    return f"**A d33 that is stated** lies in its 95 % interval in {held}; one that may be quoted in {quotable}."
+    return (
+        f"**A d33 that is stated** lies in its 95 % interval in {held}; without physics outside the catalogue that "
+        f"does not show, in {but_hopeless}; one that may be quoted in {quotable}."
+    )
+
+
+def _joint(result: Result) -> str:
+    beside_curves = [entry for entry in result["judged"] if entry["what"] in ("compression", "indentation")]
+    apart = [entry for entry in beside_curves if entry["apart"] and entry["identifiable"]]
+    alone, together = (
+        (
+            percent(share([entry["right"][how] for entry in beside_curves])),
+            percent(share([entry["named"][how] == entry["apart"] for entry in apart])),
+        )
+        for how in ("alone", "together")
+    )
+    return (
+        f"**A block or indentations beside the FRFs**: right in {together[0]}, by the FRFs alone in {alone[0]}; E, h "
+        f"and stiffening are told apart in {together[1]}, by the FRFs alone in {alone[1]}."
+    )
 
 
 def _slips(result: Result) -> str:
@@ -104,6 +126,7 @@ _LINES: dict[str, Callable[[Result], str]] = {
     "quiet": _quiet,
     "curves": _curves,
     "unlisted": _unlisted,
+    "joint": _joint,
     "coverage": _coverage,
     "slips": _slips,
     "recordings": _recordings,

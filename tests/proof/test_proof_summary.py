@@ -40,6 +40,14 @@ def test_each_line_is_of_its_part() -> None:
     assert summary({}) == ""
 
 
+def test_curves_beside_frfs_are_counted_over_blocks_and_indentations() -> None:
+    told = {"right": {"alone": False, "together": True}, "apart": ["modulus_error"], "identifiable": True}
+    told |= {"named": {"alone": [], "together": ["modulus_error"]}}
+    every = [told | {"what": what} for what in ("compression", "indentation", "dates")]
+    text = summary({"joint": {"judged": every}})
+    assert [one.partition(":")[0] for one in _SHARE.findall(text)] == ["2 of 2", "0 of 2", "2 of 2", "0 of 2"]
+
+
 def test_the_page_says_in_short_what_its_sections_say() -> None:
     page = (ROOT / "docs" / "proof.md").read_text(encoding="utf-8")
     _, _, rest = page.partition("## In short")
@@ -50,7 +58,7 @@ def test_the_page_says_in_short_what_its_sections_say() -> None:
         ("On a rig that this project has never seen", (0,)),
         ("False alarms.", (0,)),
         ("Physics that nobody listed", (0, 1)),
-        ("A d33 that is stated", (0, 1)),
+        ("A d33 that is stated", (0, 1, 2)),
     ):
         for place in places:
             assert lines[heading][place] in below, heading

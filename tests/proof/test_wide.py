@@ -61,11 +61,14 @@ def test_other_priors_last_as_long_as_their_context() -> None:
 
 
 def test_tables_count_what_they_say() -> None:
-    entry = {"hidden": [], "verdict": "explained", "quotable": True, "sensors": 2, "held": True}
-    shown = by_subset([entry, {**entry, "held": False, "hidden": ["rattle"]}, {**entry, "held": None}])
-    assert "| all | 1 of 2" in shown
-    assert "| physics outside the catalogue hidden | 0 of 1" in shown
-    assert "| two sensors, nothing or effects of the catalogue hidden | 1 of 1" in shown
+    entry = {"hidden": [], "verdict": "explained", "quotable": True, "sensors": 2, "held": True, "shows": False}
+    unseen = {**entry, "held": False, "hidden": ["rattle"]}
+    shown = by_subset([entry, unseen, {**unseen, "shows": True}, {**entry, "held": None}])
+    assert "| all | 1 of 3" in shown
+    assert "| physics outside the catalogue hidden | 0 of 2" in shown
+    assert "| the same, where it does not | 0 of 1" in shown
+    assert "| all but these | 1 of 2" in shown
+    assert "| two sensors, but for what does not show outside the catalogue | 1 of 2" in shown
     agreeing = [{**entry, "verdict": "no_mismatch", "hidden": hidden} for hidden in ([], ["ageing"], ["rattle"])]
     shown = by_subset([*agreeing, {**agreeing[1], "held": False}, {**entry, "hidden": ["ageing"]}])
     assert "| `no_mismatch` | 3 of 4" in shown
