@@ -56,7 +56,12 @@ class Cluster:
     def start(self, **settings: str) -> None:
         """Start it, with these variables in its environment."""
         given = (f"--pgdata={self.data}", f"--log={self.folder}/log", f"--options={self._options}")
-        _run("pg_ctl", "start", "--wait", *given, **settings)
+        try:
+            _run("pg_ctl", "start", "--wait", *given, **settings)
+        except AssertionError as error:
+            log = (self.folder / "log").read_text(encoding="utf-8", errors="replace")
+            error.add_note("\n".join(log.splitlines()[-30:]))
+            raise
 
     def stop(self) -> None:
         """End its processes at once, where they run: the next start recovers from the write-ahead log."""
