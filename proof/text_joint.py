@@ -10,10 +10,19 @@ from proof.statistics import share
 Result = Mapping[str, Any]
 
 
+BESIDE_CURVES = ("compression", "indentation")
+
+
+def told_apart(entries: Sequence[Result], how: str) -> list[bool]:
+    """Of campaigns that hide an error of E, of h or stiffening, identifiable, whether each is told apart `how`: from
+    the FRFs `alone`, or `together` with curves."""
+    return [entry["named"][how] == entry["apart"] for entry in entries if entry["apart"] and entry["identifiable"]]
+
+
 def joint(result: Result) -> str:
     """Of joint campaigns what is told together and apart."""
     judged = result["judged"]
-    kinds = [entry for entry in judged if entry["what"] in ("compression", "indentation")]
+    kinds = [entry for entry in judged if entry["what"] in BESIDE_CURVES]
     dates = [entry for entry in judged if entry["what"] == "dates"]
     skins = [entry for entry in judged if entry["what"] == "skins"]
     return f"""\
@@ -32,15 +41,15 @@ own equations tell from an error of E are counted.
 
 def _of_kinds(entries: Sequence[Result]) -> str:
     rows = []
-    for what, called in (("compression", "FRFs and a block"), ("indentation", "FRFs and indentations")):
-        own = [entry for entry in entries if entry["what"] == what]
-        apart = [entry for entry in own if entry["apart"] and entry["identifiable"]]
+    for what, called in zip(
+        (BESIDE_CURVES[:1], BESIDE_CURVES[1:], BESIDE_CURVES),
+        ("FRFs and a block", "FRFs and indentations", "both"),
+        strict=True,
+    ):
+        own = [entry for entry in entries if entry["what"] in what]
         row = [called, str(len(own))]
         for how in ("alone", "together"):
-            row += [
-                _of([entry["right"][how] for entry in own]),
-                _of([entry["named"][how] == entry["apart"] for entry in apart]),
-            ]
+            row += [_of([entry["right"][how] for entry in own]), _of(told_apart(own, how))]
         held = [one for entry in own for one in entry["modulus_held"]]
         rows.append([*row, _of(held), str(sum(entry["contradicted"] for entry in own))])
     of_each = ["right, FRFs alone", "told apart, FRFs alone", "right, together", "told apart, together"]

@@ -8,7 +8,8 @@ from proof.concealed import judged_of
 from proof.judge import QUIET, Judged
 from proof.phrases import percent, right
 from proof.statistics import calibration, share
-from rig.draw import UNKNOWN
+from proof.text_joint import BESIDE_CURVES, told_apart
+from proof.text_wide import that_show
 from rig.identifiable import THRESHOLD
 
 Result = Mapping[str, Any]
@@ -68,23 +69,18 @@ def _unlisted(result: Result) -> str:
 def _coverage(result: Result) -> str:
     stated = [entry for entry in result["judged"] if entry["held"] is not None]
     held = percent(share([entry["held"] for entry in stated]))
-    showing = [entry for entry in stated if entry["shows"] or not set(entry["hidden"]) & set(UNKNOWN)]
-    but_hopeless = percent(share([entry["held"] for entry in showing]))
+    told = percent(share([entry["held"] for entry in that_show(stated)]))
     quotable = percent(share([entry["held"] for entry in stated if entry["quotable"]]))
     return (
         f"**A d33 that is stated** lies in its 95 % interval in {held}; without physics outside the catalogue that "
-        f"does not show, in {but_hopeless}; one that may be quoted in {quotable}."
+        f"does not show, in {told}; one that may be quoted in {quotable}."
     )
 
 
 def _joint(result: Result) -> str:
-    beside_curves = [entry for entry in result["judged"] if entry["what"] in ("compression", "indentation")]
-    apart = [entry for entry in beside_curves if entry["apart"] and entry["identifiable"]]
+    beside = [entry for entry in result["judged"] if entry["what"] in BESIDE_CURVES]
     alone, together = (
-        (
-            percent(share([entry["right"][how] for entry in beside_curves])),
-            percent(share([entry["named"][how] == entry["apart"] for entry in apart])),
-        )
+        (percent(share([entry["right"][how] for entry in beside])), percent(share(told_apart(beside, how))))
         for how in ("alone", "together")
     )
     return (

@@ -32,6 +32,11 @@ rig's equations, with d33 free.
 {by_subset(judged)}"""
 
 
+def that_show(entries: Sequence[Result]) -> list[Result]:
+    """All but those that hide physics outside the catalogue which no recording of theirs can tell from another d33."""
+    return [entry for entry in entries if entry["shows"] or not set(entry["hidden"]) & set(UNKNOWN)]
+
+
 def by_subset(judged: Sequence[Result]) -> str:
     """The share held: in all, by what is hidden and by verdict, where quotable, by number of sensors."""
     stated = [entry for entry in judged if entry["held"] is not None]
@@ -39,8 +44,8 @@ def by_subset(judged: Sequence[Result]) -> str:
     subsets = {"all": stated, "nothing or effects of the catalogue hidden": [e for e in stated if e not in outside]}
     subsets["physics outside the catalogue hidden"] = outside
     subsets["the same, where it shows"] = [entry for entry in outside if entry["shows"]]
-    subsets["the same, where it does not"] = hopeless = [entry for entry in outside if not entry["shows"]]
-    subsets["all but these"] = [entry for entry in stated if entry not in hopeless]
+    subsets["the same, where it does not"] = [entry for entry in outside if not entry["shows"]]
+    subsets["all but these"] = that_show(stated)
     for verdict in _VERDICTS:
         subsets[f"`{verdict}`"] = [entry for entry in stated if entry["verdict"] == verdict]
     agreeing = [entry for entry in stated if entry["verdict"] == "no_mismatch"]
@@ -52,7 +57,8 @@ def by_subset(judged: Sequence[Result]) -> str:
     subsets["quotable"] = [entry for entry in stated if entry["quotable"]]
     subsets["one sensor"] = [entry for entry in stated if entry["sensors"] == 1]
     subsets["two sensors"] = two = [entry for entry in stated if entry["sensors"] == 2]
-    subsets["two sensors, but for what does not show outside the catalogue"] = [e for e in two if e not in hopeless]
+    subsets["two sensors, nothing or effects of the catalogue hidden"] = [e for e in two if e not in outside]
+    subsets["two sensors, all but what does not show outside the catalogue"] = that_show(two)
     subsets["more sensors"] = [entry for entry in stated if entry["sensors"] > 2]
     rows = [[name, percent(share([entry["held"] for entry in own]))] for name, own in subsets.items() if own]
     return table(["campaigns", "d33 held by its 95 % interval"], rows)

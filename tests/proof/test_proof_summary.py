@@ -58,6 +58,7 @@ def test_the_page_says_in_short_what_its_sections_say() -> None:
         ("On a rig that this project has never seen", (0,)),
         ("False alarms.", (0,)),
         ("Physics that nobody listed", (0, 1)),
+        ("A block or indentations beside the FRFs", (0, 1, 2, 3)),
         ("A d33 that is stated", (0, 1, 2)),
     ):
         for place in places:

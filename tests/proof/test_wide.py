@@ -68,7 +68,8 @@ def test_tables_count_what_they_say() -> None:
     assert "| physics outside the catalogue hidden | 0 of 2" in shown
     assert "| the same, where it does not | 0 of 1" in shown
     assert "| all but these | 1 of 2" in shown
-    assert "| two sensors, but for what does not show outside the catalogue | 1 of 2" in shown
+    assert "| two sensors, nothing or effects of the catalogue hidden | 1 of 1" in shown
+    assert "| two sensors, all but what does not show outside the catalogue | 1 of 2" in shown
     agreeing = [{**entry, "verdict": "no_mismatch", "hidden": hidden} for hidden in ([], ["ageing"], ["rattle"])]
     shown = by_subset([*agreeing, {**agreeing[1], "held": False}, {**entry, "hidden": ["ageing"]}])
     assert "| `no_mismatch` | 3 of 4" in shown
