@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,6 +16,7 @@ _PATH = os.pathsep.join([_BIN, os.environ["PATH"]])
 INITDB = shutil.which("initdb", path=_PATH)
 USER = "postgres"
 WAL_SEGMENT_MB = 1  # a test of power cuts copies those that are synced
+_GONE_WITHIN_S = 60
 
 
 def available() -> bool:
@@ -64,9 +66,19 @@ class Cluster:
             raise
 
     def stop(self) -> None:
-        """End its processes at once, where they run: the next start recovers from the write-ahead log."""
-        if (self.data / "postmaster.pid").exists():
+        """End its processes at once, where they run: the next start recovers from the write-ahead log.
+
+        Returns when no process has the server's number any more: a start after a power cut finds the old lock file, and
+        refuses while the number in it is taken, be it by a dead process that nobody has waited for yet.
+        """
+        lock = self.data / "postmaster.pid"
+        if lock.exists():
+            number = int(lock.read_text().split()[0])
             _run("pg_ctl", "stop", "--mode=immediate", f"--pgdata={self.data}")
+            given_up = time.monotonic() + _GONE_WITHIN_S
+            while Path(f"/proc/{number}").exists():
+                assert time.monotonic() < given_up, f"PostgreSQL (process {number}) is still there after its end"
+                time.sleep(0.02)
 
     def new_database(self, tablespace: Path | None = None) -> str:
         """An empty database, its tables in `tablespace`.
