@@ -21,7 +21,8 @@ def test_memory_is_flat_over_many_diagnoses(tmp_path: Path) -> None:
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     memory_mb = []
-    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
+    # As a lab's server runs: one process loads the program and forks a worker for each of them.
+    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="1", UNDERSKIN_DIAGNOSIS_READY="true") as server:
         for number in range(DIAGNOSES):
             campaign_id = sent(server, resonant(f"array-{number}", seed=number), f"palm-{number % 25}")
             assert awaited(server, asked(server, campaign_id))["state"] == "done"
