@@ -1,10 +1,12 @@
 """The server that most tests over HTTP share, and the markers that say what a test needs."""
 
+import fcntl
 import gc
 import os
 import signal
 import sys
 from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -52,10 +54,26 @@ def pytest_collection() -> Generator[None, object, object]:
     """Collect without looking for garbage: tests and their parameters are there to stay, and are many."""
     gc.disable()
     try:
-        return (yield)
+        with _after_one_has_compiled():
+            return (yield)
     finally:
         gc.freeze()
         gc.enable()
+
+
+@contextmanager
+def _after_one_has_compiled() -> Iterator[None]:
+    """Of several processes in a fresh clone let one collect first, and so compile for all: most of it is compiling."""
+    compiled = Path(__file__).parent / "tablegen" / "__pycache__"  # of the last that are collected
+    if "PYTEST_XDIST_WORKER" not in os.environ or sys.dont_write_bytecode or compiled.exists():
+        yield
+        return
+    with Path(__file__).open(encoding="utf-8") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            fcntl.flock(lock, fcntl.LOCK_SH)  # once the first has collected
+        yield
 
 
 @pytest.hookimpl(tryfirst=True)
