@@ -3,7 +3,6 @@
 import errno
 import gc
 import ipaddress
-import resource
 import socket
 import tempfile
 from pathlib import Path
@@ -73,14 +72,13 @@ def serve(
         max_upload_bytes=settings.max_upload_bytes,
     )
     limits = ConnectionLimits(1000 * settings.max_header_kb, settings.idle_seconds, settings.max_connections)
-    descriptors, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     config = uvicorn.Config(
         create_app(settings, table, access, store),
         access_log=False,
         log_config=None,
         server_header=False,
         proxy_headers=False,
-        http=limited(limits.within(descriptors)),
+        http=limited(limits.within_descriptors()),
         timeout_graceful_shutdown=10,
     )
     _collect_seldom()

@@ -108,7 +108,9 @@ class WorkerProcess:
 
     def wait(self) -> int | None:
         """Its exit code, or −signal, once it has ended; None where the process that forked it has ended before."""
-        select.select([self.descriptor], [], [])
+        ended = select.poll()  # select() takes no descriptor beyond 1,023
+        ended.register(self.descriptor, select.POLLIN)
+        ended.poll()
         code = self.status.read()
         return int(code) if code else None
 

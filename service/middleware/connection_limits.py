@@ -1,6 +1,7 @@
 """What a connection may take: bytes of headers, time without progress, and how many there may be at once."""
 
 import logging
+import resource
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -10,14 +11,15 @@ from prometheus_client import Counter
 
 logger = logging.getLogger("underskin")
 
-Limit = Literal["header_size", "idle_headers", "idle_body", "idle_answer", "connections"]
+Limit = Literal["header_size", "idle_headers", "idle_body", "idle_answer", "connections", "pipelining"]
 
 SPARE = 32  # connections beyond the limit, on which `/health` is answered still
-_FILES = 96  # descriptors of the process that are for files, the store and other processes
+_FILES = 64  # descriptors of the process that are for other files, the store and other processes
+_PER_CONNECTION = 2
 _FEWEST = 8
 _LOG_EVERY_S = 10.0
 _LEAST_BODY_BYTES = 10_000  # that a body brings in the time after which a connection is idle, unless it ends
-_BODY_WAIT_S = 1.0  # without data, after which a body gives way to a new connection
+_SERVED_WAIT_S = 1.0  # without data, after which a body or an answer gives way to a new connection
 
 _reached = Counter(
     "underskin_limits_reached", "Connections that reached a limit (docs/settings.md), by limit", ["limit"]
@@ -30,8 +32,8 @@ class Connection(Protocol):
     def waits_for_client_s(self) -> float | None:
         """Seconds since the client sent something, while it is the client's turn; None while it is the server's."""
 
-    def sends_body(self) -> bool:
-        """Whether a body is under way."""
+    def is_served(self) -> bool:
+        """Whether a body, or an answer, is under way."""
 
     def give_way(self) -> None:
         """Close it, since others need its place."""
@@ -44,28 +46,37 @@ class ConnectionLimits:
     head_bytes: int
     idle_s: float
     connections: int
-    watched: bool = False  # whether connections are looked at every now and then
+    watched: bool = False  # whether the progress of connections is checked
     _logged: dict[Limit, tuple[float, int]] = field(default_factory=dict)
 
-    def within(self, descriptors: int) -> "ConnectionLimits":
-        """The same with no more connections than a process of so many descriptors can have."""
-        most = max(_FEWEST, descriptors - _FILES - SPARE)
-        return ConnectionLimits(self.head_bytes, self.idle_s, min(self.connections, most))
+    def within_descriptors(self) -> "ConnectionLimits":
+        """The same with no more connections than this process has descriptors for: two each, since what is uploaded on
+        one is kept in a file. Raises the process's soft limit on them where that is needed and allowed."""
+        needed = _FILES + _PER_CONNECTION * (self.connections + SPARE)
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        allowed, most = (needed if limit == resource.RLIM_INFINITY else limit for limit in (soft, hard))
+        if allowed < needed:
+            allowed = min(needed, most)
+            resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, hard))
+        connections = max(_FEWEST, (allowed - _FILES) // _PER_CONNECTION - SPARE)
+        return ConnectionLimits(self.head_bytes, self.idle_s, min(self.connections, connections))
 
     def is_body_too_slow(self, received: int) -> bool:
         """Whether so many bytes of a body are too few for the time after which a connection is idle."""
         return received < _LEAST_BODY_BYTES
 
-    def make_room(self, connections: Iterable[Connection], *, urgently: bool) -> bool:
-        """Close the connection that has kept the server waiting for the longest, if any, and say so: one without a
-        request before one whose body has stopped, `urgently` for however short a time."""
-        waiting = [(one, wait) for one in connections if (wait := one.waits_for_client_s()) is not None]
-        idle = [(one, wait) for one, wait in waiting if urgently or wait > _BODY_WAIT_S or not one.sends_body()]
-        if not idle:
-            return False
-        longest, _ = max(idle, key=lambda entry: (not entry[0].sends_body(), entry[1]))
-        longest.give_way()
-        return True
+    def make_room(self, connections: Iterable[Connection], places: int, *, urgently: bool) -> bool:
+        """Close so many connections that have kept the server waiting for the longest, and say whether there were as
+        many: those without a request, or that are answered, before those whose body or answer has stopped; `urgently`
+        for however short a time."""
+        waiting = [
+            (one.is_served(), -wait, one) for one in connections if (wait := one.waits_for_client_s()) is not None
+        ]
+        waiting.sort(key=lambda entry: entry[:2])
+        idle = [one for served, wait, one in waiting if urgently or not served or -wait > _SERVED_WAIT_S]
+        for one in idle[:places]:
+            one.give_way()
+        return len(idle) >= places
 
     def reached(self, limit: Limit, what: str) -> None:
         """Count a connection that reached a limit; `what` is logged, with how many were not."""

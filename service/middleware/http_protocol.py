@@ -1,17 +1,36 @@
 """HTTP/1.1 as uvicorn speaks it, with limits on what takes memory, time and places without a key: headers and trailers
-without end, clients that stop sending or reading, and many connections.
+without end, requests sent ahead of their answers, clients that stop sending or reading, and many connections.
 """
 
+from collections.abc import Sized
 from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from service.middleware.connection_limits import SPARE, ConnectionLimits, Limit
 
 OVERLOADED = "overloaded"  # in the scope of a request that came on a connection beyond the limit
-_LOOKS = 8  # in the time after which a connection is idle
-_LONGEST_LOOK_S = 1.0
+_MOST_AHEAD = 100  # requests that wait for the answers before theirs
+_CHECKS = 8  # of progress, in the time after which a connection is idle
+_SELDOMEST_CHECK_S = 1.0
+
+
+class _TooFarAheadError(Exception):
+    """More requests were sent ahead than may wait."""
+
+
+class _Flow(FlowControl):
+    """Reads no more while requests wait for the answers before theirs."""
+
+    def __init__(self, transport: Any, waiting: Sized) -> None:
+        super().__init__(transport)
+        self._waiting = waiting
+
+    def resume_reading(self) -> None:
+        if not self._waiting:
+            super().resume_reading()
 
 
 class LimitedHttpProtocol(HttpToolsProtocol):
@@ -27,15 +46,17 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self._body_bytes = 0  # since `_progress`
         self._progress = self._heard = self.loop.time()
         self._unsent = 0
+        self._answered: float | None = None  # when a request was whose body still comes
 
     def connection_made(self, transport: Any) -> None:
         """Beyond the limit others give way, or `/health` alone is answered."""
         super().connection_made(transport)
+        self.flow = _Flow(transport, self.pipeline)
         if len(self.connections) > self.limits.connections:
             self._find_room()
         if not self.limits.watched:
             self.limits.watched = True
-            self._look_at_all()
+            self._check_all()
 
     def data_received(self, data: bytes) -> None:
         """What the client sent next."""
@@ -51,7 +72,11 @@ class LimitedHttpProtocol(HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         """A body, or the next request, follows."""
+        if len(self.pipeline) >= _MOST_AHEAD:
+            self.limits.reached("pipelining", f"a client sent more than {_MOST_AHEAD} requests ahead: disconnected")
+            raise _TooFarAheadError
         self._head_bytes = 0
+        self._answered = None
         self._in_head, self._in_body = False, True
         self._progress, self._body_bytes = self._heard, 0
         super().on_headers_complete()
@@ -67,15 +92,33 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         self._in_body = False
         super().on_message_complete()
 
+    def on_response_complete(self) -> None:
+        """The next request's turn, or the client's."""
+        if self._in_body and not self.pipeline:
+            self._answered = self._progress = self.loop.time()
+        super().on_response_complete()
+
+    def send_400_response(self, msg: str) -> None:
+        """Refuse what was sent; without a word where that would stand within or before another answer."""
+        if self.pipeline or (self.cycle is not None and self.cycle.response_started and not self._is_answered()):
+            self.transport.close()
+        else:
+            super().send_400_response(msg)
+
     def waits_for_client_s(self) -> float | None:
         """As `Connection`."""
-        if self._is_turn_of_server() or self.transport.is_closing():
+        if self.transport.is_closing():
             return None
-        return self.loop.time() - self._heard
+        now = self.loop.time()
+        if self._answered is not None:
+            return now - self._answered
+        if self.transport.get_write_buffer_size():
+            return now - self._progress
+        return None if self._is_turn_of_server() else now - self._heard
 
-    def sends_body(self) -> bool:
+    def is_served(self) -> bool:
         """As `Connection`."""
-        return self._in_body
+        return self._answered is None and (self._in_body or self.transport.get_write_buffer_size() > 0)
 
     def give_way(self) -> None:
         """As `Connection`."""
@@ -86,9 +129,13 @@ class LimitedHttpProtocol(HttpToolsProtocol):
 
     def _is_turn_of_server(self) -> bool:
         """Whether a request is being answered, or the server does not take more of its body now."""
-        if self.cycle is None or self.cycle.response_complete:
+        if self.cycle is None or self._is_answered():
             return False
         return not self._in_body or self.flow.read_paused or self.cycle.waiting_for_100_continue
+
+    def _is_answered(self) -> bool:
+        """Whether the last request is."""
+        return self.cycle is not None and bool(self.cycle.response_complete)
 
     def _others(self) -> list["LimitedHttpProtocol"]:
         """The other connections that are open."""
@@ -102,20 +149,21 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             return
         said = f"{most} connections are open (UNDERSKIN_MAX_CONNECTIONS): new ones take the place of idle ones"
         self.limits.reached("connections", said)
-        full = len(others) >= most + SPARE
-        made = self.limits.make_room(others, urgently=full)
-        if full and not made:
-            self.transport.abort()
-        elif full or not made:
+        if self.limits.make_room(others, len(others) - most + 1, urgently=False):
+            return
+        left = self._others()
+        if len(left) < most + SPARE or self.limits.make_room(left, 1, urgently=True):
             self.app = _overloaded(self.app)
+        else:
+            self.transport.abort()
 
-    def _look_at_all(self) -> None:
+    def _check_all(self) -> None:
         for one in list(self.connections):
             if isinstance(one, LimitedHttpProtocol):
-                one.look()
-        self.loop.call_later(min(_LONGEST_LOOK_S, self.limits.idle_s / _LOOKS), self._look_at_all)
+                one.check_progress()
+        self.loop.call_later(min(_SELDOMEST_CHECK_S, self.limits.idle_s / _CHECKS), self._check_all)
 
-    def look(self) -> None:
+    def check_progress(self) -> None:
         """End the connection where the client has made no progress for too long."""
         now = self.loop.time()
         unsent = self.transport.get_write_buffer_size()
@@ -130,7 +178,9 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         elif self._in_head:
             self._end("idle_headers", "does not end its headers")
         elif self._in_body:
-            if self.limits.is_body_too_slow(self._body_bytes):
+            if self._answered is not None:
+                self._end("idle_body", "goes on with a body whose request was answered")
+            elif self.limits.is_body_too_slow(self._body_bytes):
                 self._end("idle_body", "sends next to nothing of its body")
             else:
                 self._progress, self._body_bytes = now, 0

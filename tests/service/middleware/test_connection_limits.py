@@ -14,25 +14,36 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.auth.keys import KeyStore
 from tests.service.connections import HEAD, connect, read_answer
+from tests.support.memory import family_mb
 from tests.support.server import Server, free_port, running
 
 IDLE_S = 1.0
 CONNECTIONS = 20
 BODY = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: 60000\r\n\r\n"
 DESCRIPTORS = 256
+LIMITS = {
+    "UNDERSKIN_IDLE_SECONDS": str(IDLE_S),
+    "UNDERSKIN_MAX_CONNECTIONS": str(CONNECTIONS),
+    "UNDERSKIN_MAX_HEADER_KB": "8",
+    "UNDERSKIN_DIAGNOSIS_WORKERS": "0",
+}
 
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """One with limits that a test can reach."""
-    limits = {
-        "UNDERSKIN_IDLE_SECONDS": str(IDLE_S),
-        "UNDERSKIN_MAX_CONNECTIONS": str(CONNECTIONS),
-        "UNDERSKIN_MAX_HEADER_KB": "8",
-        "UNDERSKIN_DIAGNOSIS_WORKERS": "0",
-    }
-    with running(tmp_path_factory.mktemp("connections"), limits) as started:
+    with running(tmp_path_factory.mktemp("connections"), LIMITS) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def locked(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """One that asks for a key, with the same limits, but that gives slow clients longer than a test takes."""
+    folder = tmp_path_factory.mktemp("locked")
+    (folder / "token").write_text(KeyStore(folder / "data").create("shaker", "write"))
+    with running(folder, LIMITS | {"UNDERSKIN_IDLE_SECONDS": "60"}) as started:
         yield started
 
 
@@ -43,9 +54,10 @@ def is_well(server: Server) -> bool:
 
 def counted(server: Server, limit: str) -> float:
     """How often a limit was reached, by the metrics."""
-    found = re.search(
-        rf'underskin_limits_reached_total{{limit="{limit}"}} (\S+)', httpx.get(f"{server.url}/metrics").text
-    )
+    token = server.log.parent / "token"
+    headers = {"Authorization": f"Bearer {token.read_text()}"} if token.exists() else {}
+    metrics = httpx.get(f"{server.url}/metrics", headers=headers).raise_for_status().text
+    found = re.search(rf'underskin_limits_reached_total{{limit="{limit}"}} (\S+)', metrics)
     return float(found[1]) if found else 0.0
 
 
@@ -56,7 +68,9 @@ def reaching(server: Server, limit: str) -> Iterator[None]:
     yield
     assert counted(server, limit) > before
     lines = [json.loads(line) for line in server.log.read_text().splitlines() if line.startswith("{")]
-    assert any(line.get("limit") == limit and "UNDERSKIN_" in line["message"] for line in lines)
+    said = [line["message"] for line in lines if line.get("limit") == limit]
+    assert said
+    assert all("UNDERSKIN_" in line or limit == "pipelining" for line in said)
 
 
 def seconds_until_closed(connection: socket.socket, drip: bytes = b"", every_s: float = 0.1) -> float:
@@ -153,6 +167,63 @@ def opened(server: Server, count: int, begun: str, stack: ExitStack) -> Sequence
         with suppress(ConnectionError):
             connection.sendall(begun.encode())
     return connections
+
+
+def test_requests_sent_ahead_are_answered_in_their_order(server: Server) -> None:
+    """A hundred, and a last one whose body comes later."""
+    body = json.dumps({"a_over_h": 0.3, "rt_over_h": 0.6}).encode().ljust(60_000)
+    with connect(server) as connection:
+        connection.sendall(f"GET /v1/nothing HTTP/1.1\r\n{HEAD}\r\n".encode())
+        for _ in range(49):
+            connection.sendall(f"GET /health HTTP/1.1\r\n{HEAD}\r\nGET /ready HTTP/1.1\r\n{HEAD}\r\n".encode())
+        connection.sendall(BODY.encode() + body[:100])
+        answers = [read_answer(connection) for _ in range(99)]
+        connection.sendall(body[100:])
+        last = read_answer(connection)
+    assert [status for status, _, _ in answers] == [404] + 98 * [200]
+    assert [b"table" in text for _, _, text in answers[1:]] == 49 * [False, True]
+    assert last[0] == 200
+    assert "sigma" in json.loads(last[2])
+
+
+def test_a_client_far_ahead_of_its_answers_is_disconnected(server: Server) -> None:
+    """However much it sends and however little it reads, the memory stays and others are answered."""
+    request = f"GET /v1/tables HTTP/1.1\r\n{HEAD}\r\n".encode()
+    before = family_mb(server.process.pid)
+    with reaching(server, "pipelining"), ExitStack() as stack:
+        for _ in range(5):
+            connection = stack.enter_context(connect(server))
+            connection.settimeout(2)
+            with suppress(ConnectionError, TimeoutError):
+                for _ in range(40):
+                    connection.sendall(2000 * request)
+            assert is_well(server)
+    assert family_mb(server.process.pid) < before + 40
+
+
+REFUSED = BODY.replace("60000", "6000000")  # without a key
+UNREAD = 2 * f"GET /static/plotly.min.js HTTP/1.1\r\n{HEAD}\r\n"
+
+
+@pytest.mark.parametrize("begun", [REFUSED, UNREAD], ids=["refused", "unread"])
+def test_who_was_refused_or_does_not_read_gives_way(locked: Server, begun: str) -> None:
+    """Though the refused body goes on, and though a second request waits behind the answer that is not read."""
+    with ExitStack() as stack:
+        connections = [one for _ in range(4) for one in opened(locked, CONNECTIONS, begun, stack)]
+        deadline = time.monotonic() + 30
+        while httpx.get(f"{locked.url}/v1/tables", timeout=10).status_code != 401:
+            assert time.monotonic() < deadline
+            for connection in connections if begun is REFUSED else []:
+                with suppress(ConnectionError):
+                    connection.sendall(b" " * 500)
+            assert is_well(locked)
+
+
+def test_a_body_that_goes_on_after_its_answer_is_given_up(server: Server) -> None:
+    with reaching(server, "idle_body"), connect(server) as connection:
+        connection.sendall(BODY.replace("60000", "6000000").replace("/v1/sigma", "/v1/nothing").encode() + b"{")
+        assert read_answer(connection)[0] == 404
+        assert IDLE_S - 0.3 < seconds_until_closed(connection, 3000 * b" ") < 10 * IDLE_S
 
 
 @pytest.mark.parametrize("begun", ["", "GET /health HTTP/1.1\r\n", BODY], ids=["silent", "headers", "bodies"])
