@@ -202,12 +202,12 @@ def test_a_client_far_ahead_of_its_answers_is_disconnected(server: Server) -> No
 
 
 REFUSED = BODY.replace("60000", "6000000")  # without a key
-UNREAD = 2 * f"GET /static/plotly.min.js HTTP/1.1\r\n{HEAD}\r\n"
+UNREAD = 9 * f"GET /static/plotly.min.js HTTP/1.1\r\n{HEAD}\r\n"
 
 
 @pytest.mark.parametrize("begun", [REFUSED, UNREAD], ids=["refused", "unread"])
 def test_who_was_refused_or_does_not_read_gives_way(locked: Server, begun: str) -> None:
-    """Though the refused body goes on, and though a second request waits behind the answer that is not read."""
+    """Though the refused body goes on, and though other requests wait behind the answer that is not read."""
     with ExitStack() as stack:
         connections = [one for _ in range(4) for one in opened(locked, CONNECTIONS, begun, stack)]
         deadline = time.monotonic() + 30
