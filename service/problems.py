@@ -2,9 +2,10 @@
 
 import math
 import reprlib
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
 from http import HTTPStatus
+from itertools import islice
 from typing import Any, TypeVar
 
 import orjson
@@ -14,6 +15,8 @@ from underskin.errors import ErrorCode, InvalidInput
 from underskin.several_errors import SeveralInvalid
 
 _MOST_LOGGED = 3
+_MOST_TOLD = 100  # errors of one body
+_MOST_FIELDS = 200  # of one body: no request has a quarter of them, and each unknown one is an error
 RETRY_LATER = {"Retry-After": "5"}  # seconds
 MEDIA_TYPE = "application/problem+json"
 _Model = TypeVar("_Model", bound=BaseModel)
@@ -37,7 +40,9 @@ class Problem(BaseModel):
     status: int = Field(description="The HTTP status.", examples=[422])
     detail: str = Field(description="What happened and what to do.")
     request_id: str = Field(description="Finds this request in the server's log; also in X-Request-ID.")
-    errors: list[FieldError] = Field(description="The values that were refused; empty for other problems.")
+    errors: list[FieldError] = Field(
+        description="The values that were refused, the first hundred of them; empty for other problems."
+    )
 
 
 class Refusal(Exception):
@@ -108,8 +113,10 @@ def _is_umbridge(path: str) -> bool:
 
 
 def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
-    """The problem of values that cannot be used: 422."""
-    shortened = [_shortened(error) for error in errors]
+    """The problem of values that cannot be used, of which the first hundred are told: 422."""
+    remaining = iter(errors)
+    shortened = [_shortened(error) for error in islice(remaining, _MOST_TOLD)]
+    more = sum(1 for _ in remaining)
     entries = [
         {
             "code": str(error.code),
@@ -120,7 +127,8 @@ def invalid_input(errors: Iterable[InvalidInput]) -> Refusal:
         }
         for error in shortened
     ]
-    return Refusal(422, "; ".join(str(error) for error in shortened), title="Invalid input", errors=entries)
+    detail = "; ".join([*map(str, shortened), *([f"and {more:,} more"] if more else [])])
+    return Refusal(422, detail, title="Invalid input", errors=entries)
 
 
 def _shortened(error: InvalidInput) -> InvalidInput:
@@ -147,9 +155,18 @@ def from_validation(errors: ValidationError | Sequence[Any]) -> Refusal:
     return invalid_input(_listed(errors))
 
 
-def _listed(errors: ValidationError | Sequence[Any]) -> list[InvalidInput]:
+def require_few_fields(document: Any) -> None:
+    """Raises Refusal (422) where a body has more fields than any request."""
+    if isinstance(document, dict) and len(document) > _MOST_FIELDS:
+        raise Refusal(
+            422, f"The body has {len(document):,} fields; no request has more than {_MOST_FIELDS}.",
+            title="Invalid input",
+        )  # fmt: skip
+
+
+def _listed(errors: ValidationError | Sequence[Any]) -> Iterator[InvalidInput]:
     details = errors.errors(include_url=False) if isinstance(errors, ValidationError) else errors
-    return [_as_invalid_input(detail) for detail in details]
+    return map(_as_invalid_input, details)
 
 
 def _guessed(error: InvalidInput, known: Collection[str]) -> InvalidInput:
@@ -167,6 +184,7 @@ def _nearest(name: str, known: Collection[str]) -> str | None:
 
 def validated(kind: type[_Model], document: Any) -> _Model:
     """The model of a document; raises Refusal with all that is wrong."""
+    require_few_fields(document)
     try:
         return kind.model_validate(document)
     except ValidationError as error:

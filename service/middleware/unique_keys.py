@@ -11,7 +11,7 @@ from fastapi.routing import APIRoute
 from starlette.concurrency import run_in_threadpool
 
 from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of
-from service.problems import Refusal, given_twice
+from service.problems import Refusal, given_twice, require_few_fields
 from underskin.recordings.readers.repeated_keys import repeated_key
 
 _long = asyncio.Semaphore(2)  # long bodies that are parsed at once
@@ -31,14 +31,17 @@ class _JsonRequest(Request):
                 return await run_in_threadpool(_long_document, body)
         document = await super().json()
         require_unique_keys(body)
+        require_few_fields(document)
         return document
 
 
 def _long_document(body: bytes) -> Any:
     try:
-        return as_lists(document_of(body))
+        document = document_of(body)
     except NotJson as error:
         raise Refusal(400, f"The body is not JSON: {error}.") from None
+    require_few_fields(document)
+    return as_lists(document)
 
 
 class JsonRoute(APIRoute):

@@ -5,7 +5,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 
 _Zero = Annotated[int, Field(strict=True, ge=0, le=0)]
-_Vector = list[Annotated[float, Field(strict=True, allow_inf_nan=False)]]
+# Of a long one the first wrong number is told: as many errors as numbers would hold up all other requests.
+_Vector = Annotated[list[Annotated[float, Field(strict=True, allow_inf_nan=False)]], Field(fail_fast=True)]
 _EXAMPLE = [[0.3, 0.6, 0.01]]
 
 # Checked by the route, since the protocol has an error of its own for another name.
@@ -27,6 +28,7 @@ class Evaluation(ModelRequest):
     input: list[_Vector] = Field(
         description="One vector: a/h, rT/h, L for `sigma`; mm, MPa, mm, mm, N, pC/N for `frf`.",
         examples=[_EXAMPLE],
+        fail_fast=True,
         json_schema_extra={"minItems": 1, "maxItems": 1},
     )
 

@@ -20,6 +20,7 @@ from tests.support.store_server import campaign
 pytestmark = pytest.mark.slow
 
 LARGE = 20_000_000  # bytes; the limit is 64 MB
+SHORT = 900_000
 MOST_HELD_S = 0.5  # of the server's processor time within another request; a parser in its process took seconds
 MOST_MEMORY = 6  # times the body, of the server's process and the one that parses, beside what their programs take
 PROGRAMS = 100_000_000  # bytes: the interpreter and NumPy of the one, what the first batch loads of the other
@@ -35,9 +36,9 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield started
 
 
-def filled(start: str, entry: str, end: str) -> bytes:
-    """A body of LARGE bytes whose middle is one entry again and again."""
-    return f"{start}{entry * ((LARGE - len(start) - len(end)) // len(entry))}{end}".encode()
+def filled(start: str, entry: str, end: str, length: int = LARGE) -> bytes:
+    """A body of so many bytes whose middle is one entry again and again."""
+    return f"{start}{entry * ((length - len(start) - len(end)) // len(entry))}{end}".encode()
 
 
 def of_campaign(**fields: Any) -> bytes:
@@ -135,6 +136,51 @@ def test_what_takes_much_memory_is_refused(server: Server, case: str) -> None:
     answer = attacked(server, path, body())
     problem_of(answer, status)
     assert len(answer.content) < 2000
+
+
+# Too short to be parsed apart: each of their entries was an error of its own.
+WRONG: dict[str, tuple[str, Body, int]] = {
+    "words in a vector": ("/umbridge/Evaluate", lambda: filled(POINT, '"a",', "1]]}", SHORT), 400),
+    "words for vectors": (
+        "/umbridge/Evaluate",
+        lambda: filled('{"name": "sigma", "input": [', '"a",', "1]}", SHORT),
+        400,
+    ),
+    "words in a column": ("/v1/sigma", lambda: filled(COLUMN, '"a",', "1]}", SHORT), 422),
+    "words for ids": ("/v1/fleets/diagnosis", lambda: filled('{"name": "a", "skins": [', "1,", "1]}", SHORT), 422),
+    **{
+        f"unknown fields to {path}": (
+            path,
+            lambda: json.dumps({f"f{n}": 0 for n in range(SHORT // 13)}).encode(),
+            status,
+        )
+        for path, status in (
+            ("/v1/sigma", 422),
+            ("/v1/fleets/diagnosis", 422),
+            ("/v1/design", 422),
+            ("/v1/campaigns", 422),
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_wrong_throughout_is_refused_at_once(server: Server, case: str) -> None:
+    path, body, status = WRONG[case]
+    before_s, before = processor_s(server.process.pid), memory_bytes(server.process.pid)
+    answer = httpx.post(server.url + path, content=body(), headers=JSON, timeout=300)
+    assert processor_s(server.process.pid) - before_s < MOST_HELD_S
+    assert memory_bytes(server.process.pid) - before < PROGRAMS
+    problem_of(answer, status)
+    assert len(answer.content) < 30_000
+
+
+def test_the_first_hundred_errors_are_told(server: Server) -> None:
+    columns = {f"unknown_{number}": 0 for number in range(150)}
+    answer = httpx.post(f"{server.url}/v1/sigma", json=columns)
+    problem = problem_of(answer, 422)
+    assert len(problem["errors"]) == 100
+    assert problem["detail"].endswith("; and 52 more")  # with the two that are missing
 
 
 def test_a_large_campaign_is_kept(server: Server) -> None:
