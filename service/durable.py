@@ -10,6 +10,16 @@ def replace(written: Path, place: Path) -> None:
     keep_entries(place.parent)
 
 
+def write_text(place: Path, text: str) -> None:
+    """Write a small file, whole or not at all; durable once this returns."""
+    written = place.with_name(f"{place.name}.part")
+    with written.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    replace(written, place)
+
+
 def keep_entries(folder: Path) -> None:
     """Have the disk keep which files a folder holds: a rename, or a new name, is lost with the power until then."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)

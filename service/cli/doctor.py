@@ -51,7 +51,10 @@ def doctor(
     The exit status is that of monitoring systems: 0 where all is well, 1 with warnings, 2 where something keeps the
     server from its work or endangers what it keeps.
     """
-    settings = read_settings()
+    try:
+        settings = read_settings()
+    except typer.Exit:
+        raise typer.Exit(Level.CRITICAL) from None  # no server starts with these settings
     use_folder_of_lab(settings)
     findings = [*examine(settings), _of_workers(settings)]
     if as_json:

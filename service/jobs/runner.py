@@ -75,11 +75,20 @@ class Runner:
                     thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
                     with self._lock:
                         self._jobs[thread] = None
-                    thread.start()
+                    self._start(thread, row)
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
             if not self._stirred.wait(_POLL_S):
                 self._processes.get_ready()  # now that nothing else is going on
+
+    def _start(self, thread: threading.Thread, row: AnyRow) -> None:
+        try:
+            thread.start()
+        except RuntimeError as error:  # the system has no room for a thread now
+            with self._lock:
+                del self._jobs[thread]
+            self._release(row)
+            raise OSError(str(error)) from error
 
     def _claim(self) -> AnyRow | None:
         row = self._store.write(diagnoses.claim, self._server, basis(self._processes.table_sha256))

@@ -8,7 +8,7 @@ import shutil
 import sqlite3
 import stat
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -18,6 +18,7 @@ from pathlib import Path
 from sqlalchemy import ColumnElement, Connection, func, select
 from sqlalchemy.exc import DBAPIError
 
+from service.auth.access_control import LOOPBACK_NAMES
 from service.auth.keys import KeyStore, KeysUnreadable
 from service.settings import Settings
 from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
@@ -74,7 +75,7 @@ def examine(settings: Settings) -> Iterator[Observation]:
                     yield store.read(look)
         except (DBAPIError, StoreMoved, OSError) as error:
             yield Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
-        yield from _of_keys(KeyStore(settings.data), needed=needed, made=store.is_made())
+        yield from _of_keys(settings, needed=needed, made=store.is_made())
 
 
 def _of_folder(folder: Path) -> Iterator[Observation]:
@@ -92,12 +93,17 @@ def _of_folder(folder: Path) -> Iterator[Observation]:
         yield Observation("data folder", Level.WARNING, f"everybody may enter {folder} (mode {mode:o})", "chmod 700 it")
     else:
         yield Observation("data folder", Level.OK, f"{folder}, mode {mode:o}")
-    open_to_all = [
-        path.name for path in sorted(folder.glob("*")) if path.is_file() and stat.S_IMODE(path.stat().st_mode) & 0o007
-    ]
-    if open_to_all:
-        named = ", ".join(open_to_all[:5])
-        yield Observation("data folder", Level.WARNING, f"everybody may read {named}", "chmod 600 these files")
+    yield from _open_to_others("data folder", [folder, folder / "backups", folder / "mechanisms"])
+
+
+def _open_to_others(check: str, folders: Sequence[Path]) -> Iterator[Observation]:
+    """Files in these folders that others than their owner may read or write."""
+    files = [path for folder in folders for path in sorted(folder.glob("*")) if path.is_file()]
+    others = [str(path) for path in files if stat.S_IMODE(path.stat().st_mode) & 0o077]
+    if others:
+        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
+        said = f"others than their owner may open {', '.join(others[:3])}{more}"
+        yield Observation(check, Level.WARNING, said, "chmod 600 these files")
 
 
 def _of_disk(settings: Settings) -> Iterator[Observation]:
@@ -156,8 +162,9 @@ def _damage(store: Database) -> str:
     return "" if found == "ok" else found
 
 
-def _of_keys(keys: KeyStore, *, needed: bool | None, made: bool) -> Iterator[Observation]:
+def _of_keys(settings: Settings, *, needed: bool | None, made: bool) -> Iterator[Observation]:
     """`needed`: None where the store could not be asked; `made`: whether there is a store."""
+    keys = KeyStore(settings.data)
     if not keys.file_exists():
         if needed is None and made:
             yield Observation("keys", Level.WARNING, f"{keys.path} is missing; whether keys are needed cannot be told",
@@ -165,6 +172,9 @@ def _of_keys(keys: KeyStore, *, needed: bool | None, made: bool) -> Iterator[Obs
         elif needed:
             yield Observation("keys", Level.CRITICAL, f"they are needed, and {keys.path} is missing",
                           "put it back, or make a key with `underskin key create NAME`")  # fmt: skip
+        elif not settings.host_names <= LOOPBACK_NAMES:
+            yield Observation("keys", Level.CRITICAL, f"there is none, and without one none serves as {settings.hosts}",
+                              "make one with `underskin key create NAME`, or unset UNDERSKIN_HOSTS")  # fmt: skip
         else:
             yield Observation("keys", Level.OK, "none: the server answers on this machine only")
         return
@@ -182,11 +192,18 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
         yield Observation("backups", Level.WARNING, "the server makes none by itself",
                       "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
         return
-    if words := foreign(store, settings.backup_to):
+    try:
+        words = foreign(store, settings.backup_to)
+    except (DBAPIError, StoreError, StoreMoved, OSError):
+        words = ""
+        yield Observation("backups", Level.WARNING, f"whose those in {settings.backup_to} are cannot be told",
+                          "see to the store first")  # fmt: skip
+    if words:
         yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",
                           "set UNDERSKIN_BACKUP_TO to a folder of its own; if it is this store after all, "
                           f"delete {settings.backup_to / OWNER}")  # fmt: skip
         return
+    yield from _open_to_others("backups", [settings.backup_to])
     ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -_SKEW_S]
     if ahead:
         yield Observation("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
@@ -206,6 +223,10 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
     except (StoreError, OSError) as error:
         yield Observation("backups", Level.CRITICAL, str(error), "see to the disk, then `underskin backup FILE`")
         return
+    if (count := len(kept(settings.backup_to))) > settings.backup_keep + 1:
+        yield Observation("backups", Level.WARNING, f"{count} are kept, more than UNDERSKIN_BACKUP_KEEP = "
+                          f"{settings.backup_keep}: none is deleted while the newest is far smaller than the largest",
+                          "see whether the store lacks anything; if not, delete the larger ones")  # fmt: skip
     yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole")
 
 

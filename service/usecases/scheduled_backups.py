@@ -32,7 +32,7 @@ _SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
 _SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
-_LOOK_S = 60.0  # how often it is looked whether one is due
+_LOOK_S = 60.0  # how often the folder is looked into
 _RETRY_S = 600.0  # after a failure
 _JOIN_S = 30.0
 _HOUR_S = 3600.0
@@ -74,13 +74,15 @@ def newest(folder: Path) -> Kept | None:
 
 
 def foreign(store: Database, folder: Path) -> str:
-    """That a folder is for the backups of another store, or perhaps is, in words; empty where it is not."""
+    """In words, that a folder holds the backups of another store, or that it cannot be told whose; else empty."""
     try:
         owner = (folder / OWNER).read_text().strip()
     except (FileNotFoundError, NotADirectoryError):
         return ""
     except OSError as error:
         return f"whose backups {folder} holds cannot be read ({OWNER}: {error.strerror})"
+    if not owner:
+        return ""
     own = store.read(identity.find)
     if owner == own:
         return ""
@@ -96,6 +98,8 @@ class ScheduledBackups:
         self._every_s, self._keep = every_hours * _HOUR_S, keep
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="backups", daemon=True)
+        self._seen: Kept | None = None
+        self._seen_bytes = 0
 
     @property
     def folder(self) -> Path:
@@ -124,12 +128,21 @@ class ScheduledBackups:
         wait = 0.0
         while not self._ending.wait(wait):
             try:
+                self._see()
                 self._make_if_due()
+                self._see()
                 wait = min(_LOOK_S, self._every_s / 10)
             except Exception as error:  # the thread has no caller to raise to, and must go on
                 _failed.inc()
-                logger.warning("no scheduled backup could be made: %s", str(error).splitlines()[0])
+                reason = next(iter(str(error).splitlines()), type(error).__name__)
+                logger.warning("no scheduled backup could be made: %s", reason)
                 wait = min(_RETRY_S, self._every_s / 10)
+
+    def _see(self) -> None:
+        """Keep what `/metrics` says of the newest, which waits for no disk and no database."""
+        last = self._newest()
+        self._seen_bytes = 0 if last is None else last.path.stat().st_size
+        self._seen = last
 
     def _make_if_due(self) -> None:
         durable.make_folder(self._folder, 0o700)
@@ -161,8 +174,8 @@ class ScheduledBackups:
         if words := foreign(self._store, self._folder):
             raise StoreError(f"{words}; give each store a folder of its own (UNDERSKIN_BACKUP_TO)")
         owner = self._folder / OWNER
-        if not owner.exists():
-            owner.write_text(self._store.read(identity.find) or self._store.write(identity.ensure))
+        if not owner.exists() or not owner.read_text().strip():  # one that ran into a full disk is empty
+            durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
 
     def _newest(self) -> Kept | None:
         """The newest one of this store."""
@@ -182,12 +195,10 @@ class ScheduledBackups:
             old.path.unlink()
 
     def _age_s(self) -> float:
-        last = self._newest()
-        return float("nan") if last is None else last.age_s
+        return float("nan") if self._seen is None else self._seen.age_s
 
     def _size(self) -> float:
-        last = self._newest()
-        return 0.0 if last is None else last.path.stat().st_size
+        return self._seen_bytes
 
 
 @contextmanager

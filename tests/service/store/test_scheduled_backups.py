@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import sqlite3
 import time
 from contextlib import closing
@@ -11,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from service.usecases.scheduled_backups import kept
+from service.usecases.scheduled_backups import OWNER, kept
 from tests.service.backends import BACKENDS
+from tests.support import postgres
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -115,7 +117,7 @@ def test_what_a_wrong_clock_dated_ahead_makes_none_superfluous(place: Place, tmp
     folder = tmp_path / "backups"
     folder.mkdir()
     ahead = folder / "underskin-20990101T000000Z.sqlite3"
-    ahead.write_bytes(b"")
+    ahead.touch(0o600)
     with running(place, **scheduled(folder)):
         (_, made) = wait_for(folder, 2)
     assert made.stat().st_size > 0
@@ -197,6 +199,38 @@ def test_a_store_restored_from_a_backup_of_before_it_had_a_schedule_goes_on_with
         wait_for(folder, 2)
 
 
+def test_an_empty_note_of_whose_folder_it_is_ends_no_schedule(place: Place, tmp_path: Path) -> None:
+    """What an older version left where the disk was full, or the power failed."""
+    folder = tmp_path / "backups"
+    folder.mkdir()
+    (folder / OWNER).touch()
+    with running(place, **scheduled(folder)):
+        wait_for(folder, 1)
+    assert (folder / OWNER).read_text()
+
+
+def test_metrics_wait_for_no_database(tmp_path: Path) -> None:
+    if not postgres.available():
+        pytest.skip("PostgreSQL (Debian's package postgresql) is not installed")
+    folder, backups = tmp_path / "data", tmp_path / "backups"
+    folder.mkdir()
+    with postgres.running() as cluster:
+        place = Place(folder, cluster.new_database())
+        with running(place, **scheduled(backups)) as server:
+            (file,) = wait_for(backups, 1)
+            deadline = time.monotonic() + 60
+            while metric(server, "underskin_backup_bytes") == 0:
+                assert time.monotonic() < deadline
+                time.sleep(0.05)
+            cluster.stop()
+            assert server.http.get("/health").status_code == 200
+            assert metric(server, "underskin_backup_bytes") == file.stat().st_size
+            status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), **_NONE)
+    assert status == 2
+    assert "does not answer" in found["store"]["found"]
+    assert (found["store"]["level"], found["backups"]["level"]) == ("critical", "warning")
+
+
 def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     place.folder.chmod(0o700)
@@ -236,8 +270,9 @@ def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
 def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
     folder = tmp_path / "data"
     folder.mkdir()
-    place = Place(folder)
-    with running(place, **_NONE) as server:
+    place, backups = Place(folder), tmp_path / "backups"
+    with running(place, **scheduled(backups)) as server:
+        wait_for(backups, 1)
         for number in range(4):
             sent(server, campaign(f"kept {number}", lines=200))
         server.process.terminate()
@@ -246,6 +281,34 @@ def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
     content = bytearray(file.read_bytes())
     content[8192 : len(content) // 2] = os.urandom(len(content) // 2 - 8192)
     file.write_bytes(content)
-    status, found = doctor(place, **_NONE)
-    assert status == 2
-    assert found["store"]["level"] == "critical"
+    for damage in (content, bytearray(5000)):
+        file.write_bytes(damage)
+        status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), **_NONE)
+        assert status == 2
+        assert found["store"]["level"] == "critical"
+        assert "backups" in found
+
+
+def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp_path: Path) -> None:
+    place, backups = Place(tmp_path / "data"), tmp_path / "backups"
+    place.folder.mkdir(0o700)
+    with running(place, **scheduled(backups)):
+        (file,) = wait_for(backups, 1)
+    for number in range(3):
+        shutil.copy(file, backups / f"underskin-2026010{number + 1}T000000Z.sqlite3")
+    file.chmod(0o640)
+    (place.folder / "underskin.sqlite3").chmod(0o640)
+    settings = {"UNDERSKIN_BACKUP_TO": str(backups), "UNDERSKIN_BACKUP_KEEP": "2", **_NONE}
+    _, found = doctor(place, **settings)
+    assert "underskin.sqlite3" in found["data folder"]["found"]
+    assert file.name in found["backups"]["found"]
+    file.chmod(0o600)
+    _, found = doctor(place, **settings)
+    assert "4 are kept" in found["backups"]["found"]
+    _, found = doctor(place, UNDERSKIN_HOSTS="skin.example.org", **_NONE)
+    assert (found["keys"]["level"], place.command("serve", UNDERSKIN_HOSTS="skin.example.org").returncode) == (
+        "critical",
+        1,
+    )
+    wrong = place.command("doctor", UNDERSKIN_BACKUP_EVERY="often")
+    assert (wrong.returncode, "UNDERSKIN_BACKUP_EVERY" in wrong.stderr) == (2, True)
