@@ -4,30 +4,37 @@ import threading
 import time
 from collections import OrderedDict
 
-AT_ONCE, SECONDS = 10, 6.0  # tries that fail at once, and the seconds until one more is free
+AT_ONCE, SECONDS = 10, 6.0  # tries at once, and the seconds until one more is free
 _MOST_ADDRESSES = 10_000  # remembered; the one that was not heard of for the longest is forgotten first
 
 
 class LoginThrottle:
-    """Failed tries by address, each of which is forgotten after a while. For any number of threads."""
+    """Failed tries, and those under way, by address; each is forgotten after a while. For any number of threads."""
 
     def __init__(self) -> None:
         """Nobody has failed yet."""
         self._lock = threading.Lock()
         self._used: OrderedDict[str, tuple[float, float]] = OrderedDict()  # tries that count still, and when they did
 
-    def wait_s(self, address: str) -> float:
-        """Seconds until this address may try again; 0 where it may."""
+    def begin(self, address: str) -> float:
+        """Count a try; else the seconds until this address may try again, where it may not now."""
         with self._lock:
-            return max(0.0, (self._counting(address) - AT_ONCE + 1) * SECONDS)
+            counting = self._counting(address)
+            if counting + 1 > AT_ONCE:
+                return (counting + 1 - AT_ONCE) * SECONDS
+            self._count(address, counting + 1)
+            return 0.0
 
-    def failed(self, address: str) -> None:
-        """Count a key that was wrong."""
+    def succeeded(self, address: str) -> None:
+        """Forget a try: the key was right."""
         with self._lock:
-            self._used[address] = self._counting(address) + 1, time.monotonic()
-            self._used.move_to_end(address)
-            while len(self._used) > _MOST_ADDRESSES:
-                self._used.popitem(last=False)
+            self._count(address, max(0.0, self._counting(address) - 1))
+
+    def _count(self, address: str, tries: float) -> None:
+        self._used[address] = tries, time.monotonic()
+        self._used.move_to_end(address)
+        while len(self._used) > _MOST_ADDRESSES:
+            self._used.popitem(last=False)
 
     def _counting(self, address: str) -> float:
         tries, at = self._used.get(address, (0.0, 0.0))

@@ -39,7 +39,7 @@ pid {folder}/nginx.pid;
 error_log stderr;
 events {{ }}
 http {{
-    access_log off;
+    access_log {folder}/access.log combined;
     client_body_temp_path {folder}/body;
     proxy_temp_path {folder}/proxy;
     fastcgi_temp_path {folder}/fastcgi;
@@ -253,7 +253,7 @@ def test_who_does_not_go_on_is_disconnected(proxy: tuple[httpx.Client, int], beg
 
 @pytest.mark.parametrize("path", ["/v1/skins/{}", "/v1/skins/%75s{}", "/v1/sigma?key={}", "/login?next=/{}"])
 def test_no_log_has_a_key_that_came_in_an_address(proxy: tuple[httpx.Client, int], folder: Path, path: str) -> None:
-    client, _ = proxy
+    client, plain = proxy
     key = client.headers["Authorization"].removeprefix("Bearer ")
     sent = path.format(key.removeprefix("us") if "%75s" in path else key)
     answer = ask(client, "GET", sent, headers={"X-Request-ID": key, "Referer": f"https://{NAME}{sent}"})
@@ -262,7 +262,12 @@ def test_no_log_has_a_key_that_came_in_an_address(proxy: tuple[httpx.Client, int
     while not all(answer.headers["X-Request-ID"] in log.read_text() for log in logs):
         assert time.monotonic() < deadline, "the request was not logged"
         time.sleep(0.05)
-    assert not any(key.removeprefix("us_") in log.read_text() for log in logs)
+    httpx.get(f"http://127.0.0.1:{plain}{sent}", headers={"Host": NAME})
+    with raw(client) as connection:  # to no name of the site
+        connection.sendall(f"GET {sent} HTTP/1.1\r\nHost: elsewhere.example.org\r\nConnection: close\r\n\r\n".encode())
+        connection.recv(100)
+    every = [*logs, folder / "access.log"]
+    assert not any(key.removeprefix("us_") in log.read_text() for log in every)
 
 
 def test_two_host_headers_are_refused(proxy: tuple[httpx.Client, int]) -> None:

@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from service.auth import session
 from service.auth.access_control import AccessControl
+from service.auth.client_address import client_address, network_of
 from service.auth.keys import Key
 from service.auth.login_throttle import LoginThrottle
 from service.pages.shared.forms import OWN_FORM, Form, see
@@ -31,8 +32,8 @@ def login(request: Request, sent: Form) -> Response:
     """Starts a session."""
     access: AccessControl = request.app.state.access
     throttle: LoginThrottle = request.app.state.login_throttle
-    address = request.client.host if request.client else ""
-    wait_s = throttle.wait_s(address)
+    address = client_address(request)
+    wait_s = throttle.begin(network_of(address))
     if wait_s:
         seconds = math.ceil(wait_s)
         again = f"Too many keys from this address were wrong: try again in {seconds} s."
@@ -40,10 +41,10 @@ def login(request: Request, sent: Form) -> Response:
     key = access.key_of_login(sent.get("key", ""))
     back = sent.get("next", "/")
     if key is None:
-        throttle.failed(address)
         request.scope["why"] = "the key that was typed is not known"
         missing = access.keys_missing()
         return page(request, "login.html", status=401, back=back, unsent=False, refused=True, missing=missing)
+    throttle.succeeded(network_of(address))
     answer = see(_own(back))
     set_session(request, answer, access.sessions.begin(key, address, request.headers.get("user-agent", "")))
     return answer

@@ -1,6 +1,8 @@
 """Keys that are guessed on the login page: a few at once, then one every few seconds."""
 
+from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import httpx
@@ -20,9 +22,10 @@ def guarded(tmp_path: Path) -> Iterator[tuple[str, str]]:
         yield server.url, key
 
 
-def tried(url: str, key: str) -> httpx.Response:
-    """The answer to the login page's form with this key."""
-    with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}, timeout=60) as browser:
+def tried(url: str, key: str, forwarded: str | None = None) -> httpx.Response:
+    """The answer to the login page's form with this key; `forwarded`: what a proxy says of whom it is for."""
+    headers = {"Origin": url, **BROWSING, **({} if forwarded is None else {"X-Forwarded-For": forwarded})}
+    with httpx.Client(base_url=url, headers=headers, timeout=60) as browser:
         form = browser.get("/login")
         return browser.post("/login", data={"key": key, "form_token": token_of(form.text)})
 
@@ -46,15 +49,32 @@ def test_tries_are_counted_by_address_and_forgotten(monkeypatch: pytest.MonkeyPa
     now = 1000.0
     monkeypatch.setattr("service.auth.login_throttle.time.monotonic", lambda: now)
     throttle = LoginThrottle()
-    for _ in range(AT_ONCE):
-        assert throttle.wait_s("a") == 0
-        throttle.failed("a")
-    assert throttle.wait_s("a") == pytest.approx(SECONDS)
-    assert throttle.wait_s("b") == 0
+    assert [throttle.begin("a") for _ in range(AT_ONCE)] == [0] * AT_ONCE
+    assert throttle.begin("a") == pytest.approx(SECONDS)
+    assert throttle.begin("b") == 0
     now += SECONDS
-    assert throttle.wait_s("a") == pytest.approx(0.0)
-    throttle.failed("a")
-    assert throttle.wait_s("a") == pytest.approx(SECONDS)
+    assert throttle.begin("a") == 0
+    assert throttle.begin("a") == pytest.approx(SECONDS)
+    throttle.succeeded("a")
+    assert throttle.begin("a") == 0
     now += 100 * SECONDS
-    throttle.failed("a")
-    assert throttle.wait_s("a") == 0
+    assert [throttle.begin("a") for _ in range(AT_ONCE)] == [0] * AT_ONCE
+
+
+def test_tries_at_the_same_time_count_as_those_one_after_the_other(guarded: tuple[str, str]) -> None:
+    url, _ = guarded
+    with ThreadPoolExecutor(30) as senders:
+        seen = Counter(answer.status_code for answer in senders.map(tried, [url] * 30, ["us_" + 32 * "0"] * 30))
+    assert seen[401] <= AT_ONCE + 5  # another is free after each six seconds, should it take so long
+    assert seen[401] + seen[429] == 30
+
+
+def test_addresses_behind_a_proxy_on_this_machine_are_told_apart(guarded: tuple[str, str]) -> None:
+    url, key = guarded
+    wrong = "us_" + 32 * "0"
+    for number in range(AT_ONCE):
+        assert tried(url, wrong, f"203.0.113.9, 2001:db8::{number}").status_code == 401
+    assert tried(url, key, "2001:db8::ffff").status_code == 429  # the same network
+    assert tried(url, key, "2001:db8:0:1::1").status_code == 303
+    assert tried(url, key, "198.51.100.7").status_code == 303
+    assert tried(url, key, "nonsense").status_code == 303  # counts as the proxy itself
