@@ -42,12 +42,15 @@ class Sessions:
         return session.id_of(cookie) in self._ended
 
     def begin(self, key: Key, address: str, browser: str) -> str:
-        """The cookie of a new session, which is noted; raises as Database.writing."""
+        """The cookie of a new session; noted where the store takes it, else the log says why it is listed nowhere."""
         cookie = session.logged_in(key)
         expires_at = stored(datetime.fromtimestamp(session.expires(cookie), UTC).isoformat())
         shown = "".join(letter for letter in browser if letter.isprintable())[:_LONGEST_BROWSER]
         noted = sessions.NewSession(session.id_of(cookie), key.name, key.sha256, address, shown, expires_at)
-        self._store.write(sessions.add, noted)
+        try:
+            self._store.write(sessions.add, noted)
+        except _STORE_FAILED as error:  # on a full disk what is kept can be read, by who logs in now, too
+            self._failure.log("a login cannot be noted: the session ends with its key, or when it expires", error)
         return cookie
 
     def listed(self, key: Key) -> Sequence[AnyRow]:

@@ -12,12 +12,14 @@ import orjson
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, select, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError
+from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from service.store.errors import StoreError
 from service.store.sqlite_files import SqliteFiles
-from service.store.write_turns import WAIT_S, WriteTurns
+from service.store.write_turns import WAIT_S, WriteTurns, busy
 
 SQLITE_FILE = "underskin.sqlite3"
+CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
 _PG_DISK_FULL = "53100"
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
@@ -68,7 +70,7 @@ class Database:
         Of an SQLite store whose files were removed or replaced, connections that are open go on reading them, so that
         what is in them can be saved; for others it raises StoreMoved.
         """
-        with self.engine.connect() as connection:
+        with _connected(self.engine) as connection:
             if not self.is_sqlite:
                 connection.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
             yield connection
@@ -81,7 +83,11 @@ class Database:
         room; StoreMoved where it would be kept in a file that is not the one on the disk.
         """
         try:
-            with self._turn(), self._writers.connect().execution_options(write=True) as connection, connection.begin():
+            with (
+                self._turn(),
+                _connected(self._writers).execution_options(write=True) as connection,
+                connection.begin(),
+            ):
                 if not self.is_sqlite:
                     connection.execute(text(f"SET LOCAL lock_timeout = '{WAIT_S:g}s'"))
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
@@ -193,6 +199,7 @@ def upsert(connection: Connection, table: Table) -> sqlite.Insert | postgresql.I
 
 def _engine(url: URL, files: SqliteFiles | None) -> Engine:
     options: dict[str, Any] = {
+        "pool_timeout": CONNECTION_WAIT_S,
         "json_serializer": lambda value: orjson.dumps(value).decode(),
         "json_deserializer": orjson.loads,
     }
@@ -203,6 +210,14 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
     # A commit waits for the disk whatever the server's default. No statement is prepared: a restore replaces tables.
     durable = {"options": "-c synchronous_commit=on -c timezone=UTC", "prepare_threshold": None, "connect_timeout": 10}
     return create_engine(url, connect_args=durable, pool_pre_ping=True, **options)
+
+
+def _connected(engine: Engine) -> Connection:
+    """A connection; raises OperationalError where all are in use for too long."""
+    try:
+        return engine.connect()
+    except NoConnectionError:
+        raise busy("a connection") from None
 
 
 def _begin_sqlite(connection: Connection) -> None:

@@ -9,8 +9,9 @@ import threading
 from pathlib import Path
 
 from service.store.errors import StoreError, StoreMoved
+from service.store.write_turns import WAIT_S
 
-_BUSY_S = 60.0  # how long a write waits for another process's write
+_BUSY_S = WAIT_S  # how long a write waits for one of another program, which takes no turn
 _SUFFIXES = ("", "-wal", "-shm")  # the database, its write-ahead log, and the log's index
 
 _Identity = tuple[int, int] | None  # device and inode; None where there is no such file

@@ -36,13 +36,13 @@ class WriteTurns:
     def require_hope(self) -> None:
         """Raises OperationalError where somebody has just waited in vain, and nobody has written since."""
         if time.monotonic() - self._in_vain_at < VAIN_S:
-            raise _busy()
+            raise busy("a turn to write")
 
     @contextmanager
     def place(self) -> Iterator[None]:
         """A place among those that write or wait for a turn; raises OperationalError where none gets free soon."""
         if not self._places.acquire(timeout=FOR_A_PLACE_S):
-            raise _busy()
+            raise busy("a turn to write")
         try:
             yield
         finally:
@@ -53,12 +53,12 @@ class WriteTurns:
         """The only writer of all processes, by a lock on a file; raises OperationalError where it takes too long."""
         ends = time.monotonic() + WAIT_S
         if not self._first.acquire(timeout=WAIT_S):  # of this process, so that one at a time looks at the file
-            raise _busy()
+            raise busy("a turn to write")
         try:
             with lock_file.open("a") as lock:
                 while not _taken(lock):
                     if time.monotonic() > ends:
-                        raise _busy()
+                        raise busy("a turn to write")
                     time.sleep(_LOOK_S)
                 yield
         finally:
@@ -73,6 +73,6 @@ def _taken(lock: IO[str]) -> bool:
     return True
 
 
-def _busy() -> OperationalError:
-    """What SQLite itself says of a lock that it does not get in time."""
-    return OperationalError("a turn to write", {}, sqlite3.OperationalError("database is locked"))
+def busy(awaited: str) -> OperationalError:
+    """What SQLite itself says of a lock that it does not get in time; `awaited`: what was not had."""
+    return OperationalError(awaited, {}, sqlite3.OperationalError("database is locked"))

@@ -5,11 +5,15 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
+import httpx
 import orjson
 import pytest
 
+from service.auth.keys import KeyStore
+from tests.service.pages.forms import BROWSING, token_of
 from tests.support import postgres
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -73,6 +77,22 @@ def test_an_upload_that_does_not_fit_is_refused_as_it_streams(small_disk: Path) 
         answer = server.http.post("/v1/campaigns", files={"file": ("big.json", document)})
         assert answer.status_code == 507
         assert server.http.post("/v1/campaigns", json=campaign("small")).status_code == 201
+
+
+def test_who_has_a_key_can_log_in_to_read(small_disk: Path) -> None:
+    key = KeyStore(small_disk).create("lab", "read")
+    with running(Place(small_disk), key=key) as server:
+        with (small_disk / "filling").open("wb", buffering=0) as file:
+            for size in (1_000_000, 1000, 1):
+                with suppress(OSError):
+                    while file.write(size * b"x") == size:
+                        pass
+        url = str(server.http.base_url)
+        with httpx.Client(base_url=url, headers={"Origin": url, **BROWSING}, timeout=60) as browser:
+            form = token_of(browser.get("/login").text)
+            assert browser.post("/login", data={"key": key, "form_token": form}).status_code == 303
+            assert browser.get("/").status_code == 200
+    assert "a login cannot be noted" in (small_disk.parent / f"{small_disk.name}.log").read_text()
 
 
 def require_kept(server: Server, acknowledged: dict[str, str]) -> None:

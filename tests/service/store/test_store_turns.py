@@ -17,6 +17,7 @@ from sqlalchemy.exc import OperationalError
 
 from service.routes.columns_body import XLSX
 from service.store import Database, open_store, write_turns
+from tests.service.backends import BACKENDS
 from tests.support.store_server import Place, Server, campaign
 
 WRITERS = 45
@@ -113,6 +114,35 @@ def test_a_write_that_waits_too_long_is_refused_and_keeps_nothing(
         assert 0.2 < time.monotonic() - began < 5.0
         with store.writing() as connection:
             assert connection.execute(text("SELECT 1")).scalar() == 1
+
+
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
+def test_of_many_that_wait_in_vain_each_is_told_so(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    """More than a pool has connections."""
+    monkeypatch.setattr(write_turns, "WAIT_S", 0.6)
+    monkeypatch.setattr("service.store.engine.WAIT_S", 0.6)
+    monkeypatch.setattr("service.store.engine.CONNECTION_WAIT_S", 0.3)
+    with closing(store_of(place)) as store, ThreadPoolExecutor(WRITERS) as pool:
+
+        def write() -> None:
+            with store.writing():
+                raise AssertionError("nobody else may write")
+
+        began = time.monotonic()
+        with locked(place):
+            errors = [one.exception() for one in [pool.submit(write) for _ in range(WRITERS)]]
+        assert {type(error) for error in errors} == {OperationalError}
+        assert time.monotonic() - began < 20.0
+
+
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
+def test_a_reader_without_a_connection_is_told_so(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("service.store.engine.CONNECTION_WAIT_S", 0.3)
+    with closing(store_of(place)) as store, ExitStack() as stack:
+        for _ in range(15):  # all that its pool may have
+            stack.enter_context(store.reading())
+        with pytest.raises(OperationalError):
+            stack.enter_context(store.reading())
 
 
 def test_no_more_wait_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
