@@ -7,28 +7,21 @@ Progress is told as what is done, in how many bytes, of how many; None where tha
 """
 
 import os
-import shutil
 import sqlite3
-import subprocess
-import tempfile
-import time
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import closing
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from typing import IO
 
 from service import durable
-from service.store import identity
+from service.store import identity, pg_dumps
 from service.store.engine import Database
 from service.store.errors import StoreError
-from service.store.tables import metadata
 
 Progress = Callable[[str, int, int | None], object]
 _BACKING_UP, _READING_BACK, _RESTORING = "backing up", "reading back", "restoring"
 STEP_PAGES = 1000  # of an SQLite database, copied between two words of progress
-_STEP_BYTES = 1 << 20
-_LOOK_S = 0.1
 
 
 def untold(_what: str, _done: int, _of: int | None) -> None:
@@ -51,7 +44,7 @@ def make(database: Database, file: Path, progress: Progress = untold) -> None:
             _copy_sqlite(_sqlite_file(database), part, _BACKING_UP, progress)
             _make_one_file(part)
         else:
-            _dump_pg(database, part, progress)
+            pg_dumps.dump(database, part, partial(progress, _BACKING_UP))
         progress(_READING_BACK, 0, None)
         verify(database, part)
         progress(_READING_BACK, part.stat().st_size, part.stat().st_size)
@@ -84,11 +77,9 @@ def verify(database: Database, file: Path) -> str:
         rows = [str(number) for (number,) in versions]
     else:
         try:
-            _run("pg_restore", "--file=/dev/null", str(file))
-            dumped = _run("pg_restore", "--data-only", "--table=alembic_version", "--file=-", str(file)).splitlines()
+            rows = pg_dumps.versions(file)
         except StoreError as error:
             raise StoreError(f"{file} is not a backup of a PostgreSQL store, or damaged: {error}") from error
-        rows = [dumped[number + 1] for number, line in enumerate(dumped) if line.startswith("COPY ")]
     if not rows:
         raise StoreError(f"{file} is not a backup of a store")
     return rows[0]
@@ -105,7 +96,7 @@ def replace_with(database: Database, file: Path, progress: Progress = untold) ->
             if own and not identity.number_in(store):  # a backup of before stores had one
                 identity.put(store, own)
     else:
-        _replace_pg(database, file, progress)
+        pg_dumps.replace(database, file, partial(progress, _RESTORING))
 
 
 def _copy_sqlite(source: Path, target: Path, what: str, progress: Progress) -> None:
@@ -138,84 +129,3 @@ def _open_sqlite(file: Path) -> sqlite3.Connection:
 def _sqlite_file(database: Database) -> Path:
     assert database.url.database is not None
     return Path(database.url.database)
-
-
-def _dump_pg(database: Database, part: Path, progress: Progress) -> None:
-    _require("pg_dump")
-    address, password = _address(database)
-    command = ["pg_dump", "--dbname", address, "--format=custom", "--no-owner", "--file", str(part)]
-    with (
-        tempfile.TemporaryFile() as complaints,
-        subprocess.Popen(command, env=os.environ | password, stderr=complaints) as dump,
-    ):
-        while dump.poll() is None:
-            time.sleep(_LOOK_S)
-            progress(_BACKING_UP, part.stat().st_size if part.exists() else 0, None)
-        complaints.seek(0)
-        if dump.returncode != 0:
-            raise StoreError(f"pg_dump failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
-
-
-def _replace_pg(database: Database, file: Path, progress: Progress) -> None:
-    """All tables away and those of the backup there; `pg_restore --clean` knows only the latter, and a table that the
-    backup's version lacks would hold on to them."""
-    for program in ("psql", "pg_restore"):
-        _require(program)
-    address, password = _address(database)
-    ours = ", ".join([*metadata.tables, "alembic_version"])
-    command = ["psql", "--dbname", address, "--quiet", "--no-psqlrc", "--set=ON_ERROR_STOP=1", "--output=/dev/null"]
-    with (
-        tempfile.TemporaryFile() as complaints,
-        subprocess.Popen(command, env=os.environ | password, stdin=subprocess.PIPE, stderr=complaints) as psql,
-    ):
-        assert psql.stdin is not None
-        whole = False
-        with suppress(BrokenPipeError), psql.stdin as script:  # where it has ended, it says why
-            script.write(f"BEGIN; DROP TABLE IF EXISTS {ours};\n".encode())
-            script.flush()
-            whole = _script_of(file, script, complaints, progress)
-            script.write(b"COMMIT;\n" if whole else b"ROLLBACK;\n")
-        psql.wait()
-        complaints.seek(0)
-        if psql.returncode != 0 or not whole:
-            raise StoreError(f"the restore failed: {complaints.read().decode(errors='replace').strip()[-500:]}")
-
-
-def _script_of(file: Path, script: IO[bytes], complaints: IO[bytes], progress: Progress) -> bool:
-    """Write a dump as SQL into a pipe; whether all of it was good."""
-    command = ["pg_restore", "--no-owner", "--file=-"]
-    size, done = file.stat().st_size, 0
-    with (
-        file.open("rb") as dump,
-        subprocess.Popen(command, stdin=subprocess.PIPE, stdout=script, stderr=complaints) as made,
-    ):
-        assert made.stdin is not None
-        with suppress(BrokenPipeError), made.stdin as sink:  # where it has ended, it says why
-            while chunk := dump.read(_STEP_BYTES):
-                sink.write(chunk)
-                done += len(chunk)
-                progress(_RESTORING, done, size)
-    return made.returncode == 0
-
-
-def _address(database: Database) -> tuple[str, dict[str, str]]:
-    """Where the database is, and the password for the environment."""
-    url = database.url.set(drivername="postgresql")
-    password = {} if url.password is None else {"PGPASSWORD": str(url.password)}
-    return url.set(password=None).render_as_string(), password
-
-
-def _require(program: str) -> None:
-    if shutil.which(program) is None:
-        raise StoreError(f"{program}, which backs up and restores PostgreSQL, is not installed (postgresql-client)")
-
-
-def _run(program: str, *arguments: str, environment: dict[str, str] | None = None) -> str:
-    """What a program of PostgreSQL printed; raises StoreError with what it complained of."""
-    _require(program)
-    done = subprocess.run(
-        [program, *arguments], env=os.environ | (environment or {}), capture_output=True, text=True, check=False
-    )
-    if done.returncode != 0:
-        raise StoreError(f"{program} failed: {done.stderr.strip()[-500:]}")
-    return done.stdout

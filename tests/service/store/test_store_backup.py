@@ -3,6 +3,7 @@
 import sqlite3
 import subprocess
 import threading
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import pytest
 
 from service.store import Database, backup, campaigns, open_store
 from service.store.migrate import restore
+from tests.service.backends import BACKENDS
 from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.campaign import parse
 
@@ -113,6 +115,30 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
     with store.reading() as connection:
         assert [row.name for row in campaigns.listed(connection, campaigns.CampaignFilters(), None, 9)] == ["meanwhile"]
     store.close()
+
+
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
+def test_readers_are_answered_while_a_restore_goes_on(
+    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backup, "STEP_PAGES", 1)  # a small store is copied in several steps, too
+    file = tmp_path / "backup"
+    with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        kept = server.http.post("/v1/campaigns", json=campaign("before")).json()["id"]
+        assert place.command("backup", str(file)).returncode == 0
+        later = server.http.post("/v1/campaigns", json=campaign("after")).json()["id"]
+        seen: list[list[int]] = []
+
+        def read(what: str, *_: object) -> None:
+            if what == "restoring" and not seen:
+                time.sleep(0.5)  # whatever has been begun is under way
+                seen.append([server.http.get(f"/v1/campaigns/{one}", timeout=10).status_code for one in (kept, later)])
+
+        with closing(open_store(place.database_url, place.folder)) as store, store.without_writers():
+            backup.replace_with(store, file, read)
+        assert seen[0] == [200, 200]
+        assert [server.http.get(f"/v1/campaigns/{one}").status_code for one in (kept, later)] == [200, 404]
+        assert server.http.post("/v1/campaigns", json=campaign("after it")).status_code == 201
 
 
 def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> None:
