@@ -34,6 +34,12 @@ def place(database: Database, folder: Path, occasion: str) -> Path:
     return folder / "backups" / f"{occasion}-{datetime.now(UTC):%Y%m%dT%H%M%S.%fZ}{suffix}"
 
 
+def remove_parts(folder: Path, occasion: str) -> None:
+    """Remove what was left of backups for an occasion by processes that were killed; nobody may be writing one."""
+    for part in (folder / "backups").glob(f"{occasion}-*.part*"):
+        part.unlink()
+
+
 def make(database: Database, file: Path, progress: Progress = untold) -> None:
     """Write a verified backup; what bears that name is replaced only by a whole one. Raises StoreError, OSError."""
     durable.make_folder(file.parent)

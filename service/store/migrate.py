@@ -32,7 +32,9 @@ def migrate(database: Database, folder: Path) -> None:
             return
         if before is not None:
             require_known(before)
-            backup.make(database, backup.place(database, folder, f"before-{VERSIONS[-1]}"))
+            occasion = f"before-{VERSIONS[-1]}"
+            backup.remove_parts(folder, occasion)
+            backup.make(database, backup.place(database, folder, occasion))
         _upgrade(database)
 
 

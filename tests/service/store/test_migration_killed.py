@@ -18,7 +18,8 @@ import alembic.command  # noqa: F401  # for the processes that are forked here, 
 import pytest
 from sqlalchemy import Engine, event
 
-from bench.soak import SOAK
+from bench.figures import Figure
+from bench.soak import SOAK, record
 from service.store import backup, database, migrate
 from tests.service.backends import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, take_over
@@ -50,7 +51,11 @@ def test_a_killed_migration_leaves_the_old_store_or_the_new_one(
 ) -> None:
     whole = new_place(version)
     old = content(whole)
+    backups = whole.folder / "backups"
+    backups.mkdir()
+    (backups / f"before-{migrate.VERSIONS[-1]}-20260101T000000.0Z.sqlite3.part").touch()  # of one killed as it copied
     assert migrated(whole, kill_at=0) == 0
+    assert not list(backups.glob("*.part*"))
     new = content(whole)
     assert new != old
     left: list[list[str]] = []
@@ -68,6 +73,7 @@ def test_a_killed_migration_leaves_the_old_store_or_the_new_one(
         assert content(place) == new
     assert left == sorted(left, key=lambda found: found == new), "what was done came undone at a later point"
     assert len(left) >= 40 // STEP, "there were hardly any points to kill it at"
+    record(Figure("Migrations killed, each left the old store or the new one", len(left), ""))
 
 
 def migrated(place: Place, kill_at: int) -> int:

@@ -11,7 +11,8 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
-from bench.soak import SOAK
+from bench.figures import Figure
+from bench.soak import SOAK, record
 from service.store import database, migrate
 from service.store.tables import metadata
 from tests.service.store.old_stores.contents import LANDED, SECOND, WITH_THE_NEXT, answers, asked_of, take_over
@@ -61,6 +62,7 @@ def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, metadata) == []
     store.close()
+    record(Figure("Stores of earlier versions that answer as they did", 1, "", 2 * len(LANDED)))
 
 
 def test_every_earlier_schema_has_a_store_here() -> None:
