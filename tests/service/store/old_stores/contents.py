@@ -31,7 +31,7 @@ LANDED = {
 }
 """The first commit on the main branch whose server runs and fills a store of each version of the schema."""
 
-WITH_THE_NEXT = ("0014", "0015")  # versions that came together with the one after them: no server had them alone
+WITH_THE_NEXT = ("0014", "0015")  # versions that the one after them followed within the hour: no lab had them alone
 
 DIAGNOSES_SINCE = "0003"
 FIRST, SECOND = "palm", "finger"  # skins
