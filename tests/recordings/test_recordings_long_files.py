@@ -87,6 +87,19 @@ def test_what_is_wrong_in_a_long_template_is_named_by_its_line(change: tuple[str
     assert refused.value.place.split(",")[0] == "line 718"
 
 
+@pytest.mark.parametrize("per_recording", [2, 300])
+def test_a_number_that_is_none_is_refused_by_its_recording_or_its_line(per_recording: int) -> None:
+    lines = template(per_recording)
+    start = len((ABOVE + HEADINGS).splitlines())
+    lines[start] = lines[start].replace("1.5", "nan")
+    again = lines[start + 1].replace(",,,,", ",,,nan,")
+    (problem,) = read_file("\n".join([*lines[: start + 1], again, *lines[start + 2 :]]).encode(), "a.csv").problems
+    assert (problem.recording, problem.field) == ("r0", "preload_n")
+    other = lines[start + 1].replace(",,,,", ",,,1.5,")
+    with pytest.raises(FileError, match=re.escape(f"line {start + 2}: preload_n = 1.5, but nan above it")):
+        read([*lines[: start + 1], other, *lines[start + 2 :]])
+
+
 def test_an_empty_cell_in_a_long_template_is_refused_with_its_recording() -> None:
     lines = template(300)
     lines[717] = lines[717].rpartition(",")[0] + ","

@@ -44,7 +44,8 @@ COUNT = 10_000 if SOAK else 200
 COUNT_APART = 200 if SOAK else 2
 # Read by libraries in C, which damage can make crash, loop or ask for all memory: what the process apart is for.
 FOREIGN = ("HDF5", "MATLAB")
-CONTAINED = ("no memory", f"died: {-signal.SIGSEGV}", f"died: {-signal.SIGABRT}", f"died: {-signal.SIGALRM}")
+_SIGNALS = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGALRM)
+CONTAINED = ("no memory", *(f"died: {-number}" for number in _SIGNALS))
 
 
 def sound_files() -> dict[str, list[bytes]]:

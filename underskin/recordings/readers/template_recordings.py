@@ -1,6 +1,7 @@
 """The recordings in the table of the CSV template: rows by row, or many rows of one recording at once."""
 
 import cmath
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, Protocol
@@ -174,6 +175,11 @@ def _with_parts(lines: dict[str, Floats | None]) -> dict[str, Floats | None] | N
     return {**others, PARTS[0]: values.real.copy(), PARTS[1]: values.imag.copy()}
 
 
+def _are_nan(*values: Any) -> bool:
+    """Whether all are NaN, which equals nothing and is refused once the table is read."""
+    return all(isinstance(value, float) and math.isnan(value) for value in values)
+
+
 class _Recording:
     """A recording under way: what it has once, and its columns in parts."""
 
@@ -184,8 +190,9 @@ class _Recording:
     def contradiction(self, once: Mapping[str, Any]) -> str:
         """What contradicts the rows above, in words."""
         for field, value in once.items():
-            if value is not None and self.once.get(field, value) != value:
-                return f"{field} = {value!r}, but {self.once[field]!r} above it"
+            above = self.once.get(field)
+            if value is not None and above is not None and above != value and not _are_nan(above, value):
+                return f"{field} = {value!r}, but {above!r} above it"
         return ""
 
     def add(self, line: Mapping[str, Any]) -> str:
