@@ -1,30 +1,36 @@
 """Whose request it is: the address of the client, also where it comes through a proxy on this machine."""
 
 import ipaddress
+from typing import TypeAlias
 
 from starlette.requests import Request
 
+_Address: TypeAlias = ipaddress.IPv4Address | ipaddress.IPv6Address
 _IPV6_PREFIX = 64  # one subscriber has all the addresses of such a network
 
 
 def client_address(request: Request) -> str:
     """The peer's address; of a peer on this machine the last in `X-Forwarded-For`, which the proxy there has set."""
     peer = request.client.host if request.client else ""
-    forwarded = request.headers.get("x-forwarded-for", "").rpartition(",")[2].strip()
-    try:
-        if ipaddress.ip_address(peer).is_loopback:
-            return str(ipaddress.ip_address(forwarded))
-    except ValueError:
-        pass
-    return peer
+    own = _parsed(peer)
+    if own is not None and own.is_loopback:
+        forwarded = _parsed(request.headers.get("x-forwarded-for", "").rpartition(",")[2].strip())
+        own = own if forwarded is None else forwarded
+    return peer if own is None else str(own)
 
 
 def network_of(address: str) -> str:
     """What tries are counted by: an address, of IPv6 its network of 64 bits."""
-    try:
-        known = ipaddress.ip_address(address)
-    except ValueError:
-        return address
-    if known.version == 4:
-        return address
+    known = _parsed(address)
+    if known is None or known.version == 4:
+        return str(known or address)
     return str(ipaddress.ip_network((int(known), _IPV6_PREFIX), strict=False))
+
+
+def _parsed(text: str) -> _Address | None:
+    """An address; one of IPv4 also where a socket of IPv6 writes it as `::ffff:192.0.2.7`. None where it is none."""
+    try:
+        address = ipaddress.ip_address(text)
+    except ValueError:
+        return None
+    return (address.ipv4_mapped if isinstance(address, ipaddress.IPv6Address) else None) or address

@@ -8,6 +8,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from service.auth.client_address import network_of
 from service.auth.keys import KeyStore
 from service.auth.login_throttle import AT_ONCE, SECONDS, LoginThrottle
 from tests.service.pages.forms import BROWSING, token_of
@@ -78,3 +79,10 @@ def test_addresses_behind_a_proxy_on_this_machine_are_told_apart(guarded: tuple[
     assert tried(url, key, "2001:db8:0:1::1").status_code == 303
     assert tried(url, key, "198.51.100.7").status_code == 303
     assert tried(url, key, "nonsense").status_code == 303  # counts as the proxy itself
+
+
+def test_addresses_of_ipv4_are_told_apart_on_a_socket_of_ipv6() -> None:
+    assert network_of("::ffff:192.0.2.7") == network_of("192.0.2.7") == "192.0.2.7"
+    assert network_of("::ffff:192.0.2.8") == "192.0.2.8"
+    assert network_of("2001:db8::7") == network_of("2001:db8::8") == "2001:db8::/64"
+    assert network_of("") == ""
