@@ -1,0 +1,94 @@
+"""What `underskin doctor` says of a server that is well, and of what keeps one from its work."""
+
+import os
+import shutil
+from pathlib import Path
+
+from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
+from tests.support.diagnosed import sent
+from tests.support.store_server import Place, campaign, running
+
+BACKEND = "sqlite"
+
+
+def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    place.folder.chmod(0o700)
+    with running(place, **scheduled(folder)) as server:
+        sent(server, campaign("kept"))
+        wait_for(folder, 1)
+        status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(folder))
+    assert {entry["level"] for name, entry in found.items() if not name.startswith("disk")} == {"ok"}, found
+    assert status <= 1  # the disk of a test machine may be nearly full
+    assert found["store"]["found"].startswith("1 campaigns")
+    assert "trial diagnosis ended" in found["workers"]["found"]
+
+
+def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    place = Place(folder)
+    with running(place, **NO_WORKERS) as server:
+        sent(server, campaign("kept"))
+        assert place.command("key", "create", "lab").returncode == 0
+    (folder / "keys.json").unlink()
+    folder.chmod(0o755)
+    backups = tmp_path / "backups"
+    backups.mkdir()
+    (backups / "underskin-20200101T000000Z.sqlite3").write_bytes(b"")
+    tables = tmp_path / "tables"
+    tables.mkdir()
+    status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), UNDERSKIN_TABLES=str(tables))
+    assert status == 2
+    assert {name: entry["level"] for name, entry in found.items() if entry["level"] != "ok" and "disk" not in name} == {
+        "data folder": "warning", "tables": "critical", "backups": "critical", "keys": "critical",
+        "workers": "critical",
+    }  # fmt: skip
+    assert all(entry["advice"] for entry in found.values() if entry["level"] != "ok")
+
+
+def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    place, backups = Place(folder), tmp_path / "backups"
+    with running(place, **scheduled(backups)) as server:
+        wait_for(backups, 1)
+        for number in range(4):
+            sent(server, campaign(f"kept {number}", lines=200))
+        server.process.terminate()
+        server.process.wait(30)
+    file = folder / "underskin.sqlite3"
+    content = bytearray(file.read_bytes())
+    content[8192 : len(content) // 2] = os.urandom(len(content) // 2 - 8192)
+    file.write_bytes(content)
+    for damage in (content, bytearray(5000)):
+        file.write_bytes(damage)
+        status, found = doctor(place, UNDERSKIN_BACKUP_TO=str(backups), **NO_WORKERS)
+        assert status == 2
+        assert found["store"]["level"] == "critical"
+        assert "backups" in found
+
+
+def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp_path: Path) -> None:
+    place, backups = Place(tmp_path / "data"), tmp_path / "backups"
+    place.folder.mkdir(0o700)
+    with running(place, **scheduled(backups)):
+        (file,) = wait_for(backups, 1)
+    for number in range(3):
+        shutil.copy(file, backups / f"underskin-2026010{number + 1}T000000Z.sqlite3")
+    file.chmod(0o640)
+    (place.folder / "underskin.sqlite3").chmod(0o640)
+    settings = {"UNDERSKIN_BACKUP_TO": str(backups), "UNDERSKIN_BACKUP_KEEP": "2", **NO_WORKERS}
+    _, found = doctor(place, **settings)
+    assert "underskin.sqlite3" in found["data folder"]["found"]
+    assert file.name in found["backups"]["found"]
+    file.chmod(0o600)
+    _, found = doctor(place, **settings)
+    assert "4 are kept" in found["backups"]["found"]
+    _, found = doctor(place, UNDERSKIN_HOSTS="skin.example.org", **NO_WORKERS)
+    assert (found["keys"]["level"], place.command("serve", UNDERSKIN_HOSTS="skin.example.org").returncode) == (
+        "critical",
+        1,
+    )
+    wrong = place.command("doctor", UNDERSKIN_BACKUP_EVERY="often")
+    assert (wrong.returncode, "UNDERSKIN_BACKUP_EVERY" in wrong.stderr) == (2, True)
