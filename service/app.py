@@ -90,6 +90,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     processes = WorkerProcesses(
         settings.tables / SIGMA_TABLE, table.sha256, memory_bytes, keeps_ready=settings.diagnosis_ready
     )
+    metrics.watch_disk(settings.data)
     api.state.runner = Runner(store, processes, settings.diagnosis_workers)
     api.state.backups = (
         None

@@ -1,6 +1,7 @@
 """Settings, from the environment (docs/settings.md)."""
 
 import os
+import re
 from pathlib import Path
 
 from pydantic import Field, field_validator
@@ -8,6 +9,16 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service import durable
 from underskin.surrogate.sigma_table import tables_folder
+
+_PREFIX = "UNDERSKIN_"
+_READ_ELSEWHERE = tuple(  # by the library, commands and tests
+    f"{_PREFIX}{name}"
+    for name in (
+        "URL", "API_KEY", "MECHANISMS", "TIME_ZONE", "READING_MEMORY_MB", "READING_SECONDS", "READING_EXPANSION",
+        "SOAK", "ORACLE", "RECORDINGS", "CAMPAIGNS",
+    )
+)  # fmt: skip
+_HOST_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*|\[[0-9A-Fa-f:.]+\]")
 
 
 def make_data_folder(folder: Path) -> None:
@@ -18,7 +29,7 @@ def make_data_folder(folder: Path) -> None:
 class Settings(BaseSettings):
     """Read from variables named UNDERSKIN_ and the field in capitals."""
 
-    model_config = SettingsConfigDict(env_prefix="UNDERSKIN_", env_ignore_empty=True, validate_default=True)
+    model_config = SettingsConfigDict(env_prefix=_PREFIX, env_ignore_empty=True, validate_default=True)
 
     data: Path = Field(
         default=Path("~/.local/share/underskin"),
@@ -99,6 +110,14 @@ class Settings(BaseSettings):
         except RuntimeError as error:
             raise ValueError(f"{error} Name the folder in full.") from error
 
+    @field_validator("hosts")
+    @classmethod
+    def _names(cls, hosts: str) -> str:
+        for name in filter(None, map(str.strip, hosts.split(","))):
+            if not _HOST_NAME.fullmatch(name):
+                raise ValueError(f"{name!r} must be a name or an address, without scheme, port and path")
+        return hosts
+
     @property
     def max_body_bytes(self) -> int:
         """`max_body_mb` in bytes."""
@@ -113,3 +132,9 @@ class Settings(BaseSettings):
     def host_names(self) -> frozenset[str]:
         """`hosts`, in lower case."""
         return frozenset(name.strip().lower() for name in self.hosts.split(",") if name.strip())
+
+
+def unknown_settings() -> list[str]:
+    """Variables of the environment that are named like settings and are none, as where one was misspelt."""
+    read = {f"{_PREFIX}{field.upper()}" for field in Settings.model_fields} | set(_READ_ELSEWHERE)
+    return sorted(name for name in os.environ if name.startswith(_PREFIX) and name not in read)

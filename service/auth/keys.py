@@ -80,7 +80,7 @@ class KeyStore:
         except FileNotFoundError:
             stamp, self._keys, self._damage = None, (), ""
         except (OSError, ValueError, KeyError, TypeError) as error:
-            stamp, self._damage = (), f"the keys in {self.path} cannot be read: {error!r}"
+            stamp, self._damage = (), f"the keys in {self.path} cannot be read: {_reason(error)}"
         self._stamp = stamp
 
     def _readable(self) -> tuple[Key, ...]:
@@ -169,3 +169,10 @@ def _write(path: Path, keys: list[Key]) -> None:
         file.flush()
         os.fsync(file.fileno())
     durable.replace(Path(partial), path)
+
+
+def _reason(error: Exception) -> str:
+    """Of a file of keys that cannot be read, in words."""
+    if isinstance(error, OSError):
+        return str(error.strerror)
+    return str(error) if isinstance(error, ValueError) else "it lacks what a key has"

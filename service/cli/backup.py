@@ -7,9 +7,9 @@ from typing import Annotated
 import typer
 
 from service.auth.keys import KeyStore, keys_missing
-from service.cli.shared import read_settings, use_folder_of_lab
+from service.cli.shared import STORE_ERRORS, first_line, read_settings, use_folder_of_lab
 from service.settings import make_data_folder
-from service.store import Database, StorageFull, StoreError, database, key_requirement, migrate
+from service.store import Database, StorageFull, database, key_requirement, migrate
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
@@ -28,9 +28,9 @@ def backup(file: Annotated[Path, typer.Argument(help="Where to write it; a file 
         _remember_mechanisms(store)
         with byte_steps() as progress:
             backups.make(store, file, progress)
-    except (StoreError, OSError) as error:
-        raise UnderskinError(str(error)) from error
-    typer.echo(f"{file}: {file.stat().st_size / 1e6:.1f} MB, read back and whole")
+    except (*STORE_ERRORS, OSError) as error:
+        raise UnderskinError(first_line(error)) from error
+    typer.echo(f"{file}: {file.stat().st_size / 1e6:.3g} MB, read back and whole")
 
 
 def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin backup` wrote.")]) -> None:
@@ -47,8 +47,8 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
         with byte_steps() as progress:
             migrate.restore(store, file, before, progress)
         needed = store.read(key_requirement.is_needed)
-    except (StoreError, OSError) as error:
-        raise UnderskinError(str(error)) from error
+    except (*STORE_ERRORS, OSError) as error:
+        raise UnderskinError(first_line(error)) from error
     typer.echo(f"restored {file}" + (f"; what was there before is in {before}" if before.exists() else ""))
     try:
         _say_of_mechanisms(store.read(mechanism_files.put_back))

@@ -10,7 +10,6 @@ from service.jobs import WorkerProcesses
 from service.jobs.process import Given
 from service.settings import Settings
 from service.usecases.checkup import Level, Observation, examine
-from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LIMIT_S = 120.0
@@ -51,12 +50,11 @@ def doctor(
     The exit status is that of monitoring systems: 0 where all is well, 1 with warnings, 2 where something keeps the
     server from its work or endangers what it keeps.
     """
-    try:
-        settings = read_settings()
-    except typer.Exit:
-        raise typer.Exit(Level.CRITICAL) from None  # no server starts with these settings
+    settings = read_settings()  # one that is wrong ends this with 2 as well: no server starts with it
     use_folder_of_lab(settings)
-    findings = [*examine(settings), _of_workers(settings)]
+    findings = list(examine(settings))
+    tables = next(one for one in findings if one.check == "tables")
+    findings.append(_of_workers(settings, has_tables=tables.level is Level.OK))
     if as_json:
         entries = [
             {"check": one.check, "level": one.level.name.lower(), "found": one.found, "advice": one.advice}
@@ -65,15 +63,17 @@ def doctor(
         typer.echo(json.dumps(entries, indent=1, ensure_ascii=False))
     else:
         for one in findings:
-            advice = f"\n{'':23}→ {one.advice}" if one.advice else ""
-            typer.echo(f"{_MARKS[one.level]:>9}  {one.check:12}{one.found}{advice}")
+            advice = f"\n{'':31}→ {one.advice}" if one.advice else ""
+            typer.echo(f"{_MARKS[one.level]:>9}  {one.check:20}{one.found}{advice}")
     raise typer.Exit(max(one.level for one in findings))
 
 
-def _of_workers(settings: Settings) -> Observation:
+def _of_workers(settings: Settings, *, has_tables: bool) -> Observation:
     """A small campaign, diagnosed in a process of its own as a server does it."""
     if settings.diagnosis_workers == 0:
         return Observation("workers", Level.OK, "this server runs no diagnoses")
+    if not has_tables:
+        return Observation("workers", Level.CRITICAL, "no diagnosis can be tried without tables", "see to those first")
     path = settings.tables / SIGMA_TABLE
     try:
         processes = WorkerProcesses(
@@ -84,7 +84,7 @@ def _of_workers(settings: Settings) -> Observation:
                 worker.news.clear()
             failure = "" if "report" in worker.said else worker.failure if worker.ended else "it did not end"
         processes.stop()
-    except (TableError, OSError) as error:
+    except OSError as error:
         failure = str(error)
     if failure:
         advice = "see the memory that is free, and UNDERSKIN_DIAGNOSIS_MEMORY_MB"

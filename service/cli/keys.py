@@ -8,7 +8,7 @@ import typer
 from sqlalchemy import Connection
 
 from service.auth.keys import KeyStore, Scope, keys_missing
-from service.cli.shared import STORE_ERRORS, fail, read_settings
+from service.cli.shared import STORE_ERRORS, fail, first_line, read_settings
 from service.settings import Settings
 from service.store import Missing, StoreError, database, key_requirement, sessions
 from underskin import UnderskinError
@@ -26,11 +26,13 @@ def create_key(
     try:
         typer.echo(KeyStore(settings.data).create(name, scope))
     except (UnderskinError, OSError, ValueError) as error:
-        fail(str(error))
+        fail(error)
     try:
         _note(settings, key_requirement.require)
     except (*STORE_ERRORS, OSError) as error:
-        typer.echo(f"underskin: the key is made; the store will note it when the service runs: {error}", err=True)
+        typer.echo(
+            f"underskin: the key is made; the store will note it when the service runs: {first_line(error)}", err=True
+        )
 
 
 @key.command("list")
@@ -44,7 +46,7 @@ def list_keys() -> None:
         if not keys.file_exists() and _keys_needed(settings):
             typer.echo(f"underskin: {keys_missing(keys)}", err=True)
     except (*STORE_ERRORS, OSError, ValueError) as error:
-        fail(str(error))
+        fail(error)
 
 
 @key.command("revoke")
@@ -53,7 +55,7 @@ def revoke_key(name: Annotated[str, typer.Argument(help="As it was created.")]) 
     try:
         KeyStore(read_settings().data).revoke(name)
     except (UnderskinError, OSError, ValueError) as error:
-        fail(str(error))
+        fail(error)
 
 
 @key.command("sessions")
@@ -67,7 +69,7 @@ def list_sessions() -> None:
                 entry = (row.id, row.key_name, row.started_at, row.expires_at, row.address, row.browser)
                 typer.echo("\t".join(entry))
     except (*STORE_ERRORS, OSError) as error:
-        fail(str(error))
+        fail(error)
 
 
 @key.command("end-session")
@@ -80,7 +82,7 @@ def end_session(session_id: Annotated[str, typer.Argument(help="As `underskin ke
                 raise StoreError("the store has no sessions yet")
             store.write(sessions.end, session_id)
     except (*STORE_ERRORS, Missing, OSError) as error:
-        fail(str(error))
+        fail(error)
 
 
 @key.command("open")

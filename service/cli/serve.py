@@ -3,6 +3,7 @@
 import errno
 import gc
 import ipaddress
+import logging
 import socket
 import tempfile
 from pathlib import Path
@@ -20,13 +21,15 @@ from service.cli.shared import STORE_ERRORS, fail, read_settings, use_folder_of_
 from service.log import configure_logging
 from service.middleware.connection_limits import ConnectionLimits
 from service.middleware.http_protocol import limited
-from service.settings import make_data_folder
+from service.settings import make_data_folder, unknown_settings
 from service.store import open_store
 from underskin import ExtensionError, TableError
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.readers.formats import formats_of_other_packages
 from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
+
+logger = logging.getLogger("underskin")
 
 _COLLECTIONS = 50_000, 20, 100  # a whole one after some 10^8 objects more than were freed
 
@@ -58,8 +61,10 @@ def serve(
         sessions.look()
         listener = _listen(host, port)
     except (TableError, ExtensionError, *STORE_ERRORS, OSError, ValueError) as error:
-        fail(str(error))
+        fail(error)
     configure_logging()
+    if unknown := unknown_settings():
+        logger.warning("nothing reads %s (docs/settings.md lists what is read)", ", ".join(unknown))
     address = f"http://{_host_name(host)}:{listener.getsockname()[1]}"
     typer.echo(f"underskin serves on {address}, with its data in {settings.data} (Ctrl+C ends it)")
     access = AccessControl(

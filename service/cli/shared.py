@@ -9,22 +9,33 @@ from sqlalchemy.exc import DBAPIError
 
 from service.settings import Settings
 from service.store import StorageFull, StoreError, StoreMoved
+from underskin import InvalidInput
 from underskin.mechanisms.declared.document import FOLDER
+from underskin.recordings.time_zone import time_zone
 
 STORE_ERRORS = (StoreError, StoreMoved, StorageFull, DBAPIError)
 
 
-def fail(reason: str) -> NoReturn:
-    """Say why on standard error, and end with status 1."""
-    typer.echo(f"underskin: {reason}", err=True)
-    raise typer.Exit(1)
+def fail(reason: object) -> NoReturn:
+    """Say why, in one line on standard error, and end with status 2."""
+    typer.echo(f"underskin: {first_line(reason)}", err=True)
+    raise typer.Exit(2)
+
+
+def first_line(reason: object) -> str:
+    """Of what may have more, as what a database's driver says has."""
+    return next(iter(str(reason).splitlines()), type(reason).__name__)
 
 
 def read_settings() -> Settings:
     """The settings; a wrong one ends the command. What the command writes from here on is its owner's alone."""
     os.umask(0o077)
     try:
-        return Settings()
+        settings = Settings()
+        time_zone()
+        return settings
+    except InvalidInput as error:
+        fail(error)
     except ValidationError as error:
         first = error.errors()[0]
         reason = first["msg"].removeprefix("Value error, ")

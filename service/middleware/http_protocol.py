@@ -17,8 +17,8 @@ _CHECKS = 8  # of progress, in the time after which a connection is idle
 _SELDOMEST_CHECK_S = 1.0
 
 
-class _TooFarAheadError(Exception):
-    """More requests were sent ahead than may wait."""
+class _RefusedError(Exception):
+    """A request that is not parsed further; its client was told."""
 
 
 class _Flow(FlowControl):
@@ -65,16 +65,17 @@ class LimitedHttpProtocol(HttpToolsProtocol):
             self._in_head, self._progress = True, self._heard
         self._head_bytes += len(data)
         super().data_received(data)
-        if self._head_bytes > self.limits.head_bytes and not self.transport.is_closing():
-            kb = self.limits.head_bytes // 1000
-            self.limits.reached("header_size", f"a request's headers exceed {kb} kB (UNDERSKIN_MAX_HEADER_KB)")
-            self.send_400_response(f"The request line and headers exceed {kb} kB.")
+        if self._head_bytes > self.limits.head_bytes:
+            self._refuse_head()
 
     def on_headers_complete(self) -> None:
         """A body, or the next request, follows."""
+        if len(self.url) + sum(len(name) + len(value) + 4 for name, value in self.headers) > self.limits.head_bytes:
+            self._refuse_head()
+            raise _RefusedError
         if len(self.pipeline) >= _MOST_AHEAD:
             self.limits.reached("pipelining", f"a client sent more than {_MOST_AHEAD} requests ahead: disconnected")
-            raise _TooFarAheadError
+            raise _RefusedError
         self._head_bytes = 0
         self._answered = None
         self._in_head, self._in_body = False, True
@@ -99,11 +100,19 @@ class LimitedHttpProtocol(HttpToolsProtocol):
         super().on_response_complete()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what was sent; without a word where that would stand within or before another answer."""
+        """Refuse what was sent; without a word where that would stand within, before or after another answer."""
+        if self.transport.is_closing():
+            return
         if self.pipeline or (self.cycle is not None and self.cycle.response_started and not self._is_answered()):
             self.transport.close()
         else:
             super().send_400_response(msg)
+
+    def _refuse_head(self) -> None:
+        if not self.transport.is_closing():
+            kb = self.limits.head_bytes // 1000
+            self.limits.reached("header_size", f"a request's headers exceed {kb} kB (UNDERSKIN_MAX_HEADER_KB)")
+            self.send_400_response(f"The request line and headers exceed {kb} kB.")
 
     def waits_for_client_s(self) -> float | None:
         """As `Connection`."""

@@ -70,7 +70,7 @@ def _line(request: Answered) -> bytes:
     path = without_keys(request.path)[:200]
     fields = {
         "time": datetime.fromtimestamp(request.ended, UTC),
-        "level": "info",
+        "level": "info" if request.status < 500 else "warning",
         "logger": "underskin.request",
         "message": f"{request.method} {path} {request.status}",
         "request_id": request.request_id,

@@ -1,11 +1,28 @@
-"""Counts and durations of requests, for Prometheus."""
+"""Counts and durations of requests, free disk and the rest of what the service measures, for Prometheus."""
+
+import shutil
+from pathlib import Path
 
 from fastapi import APIRouter, Response
-from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
+from prometheus_client import CONTENT_TYPE_LATEST, Gauge, generate_latest
 
 from service.middleware import request_log
 
 router = APIRouter(tags=["metrics"])
+
+_FREE = Gauge("underskin_disk_free_bytes", "Free on the disk of the data folder; NaN where the folder is gone.")
+
+
+def watch_disk(folder: Path) -> None:
+    """Have the metrics tell how much is free where `folder` is."""
+
+    def free() -> float:
+        try:
+            return shutil.disk_usage(folder).free
+        except OSError:
+            return float("nan")
+
+    _FREE.set_function(free)
 
 
 @router.get(

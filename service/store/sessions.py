@@ -49,9 +49,9 @@ def ended(connection: Connection) -> frozenset[str]:
 
 
 def end(connection: Connection, session_id: str, key_sha256: str | None = None) -> None:
-    """End a session, where a key is given one of that key; raises Missing where there is none that goes on."""
+    """End a session, where a key is given one of that key; raises Missing where no such session is open."""
     this = (sessions.c.id == session_id) & sessions.c.ended_at.is_(None)
     if key_sha256 is not None:
         this &= sessions.c.key_sha256 == key_sha256
     if not connection.execute(update(sessions).where(this).values(ended_at=now())).rowcount:
-        raise Missing(f"There is no session {session_id!r} that goes on.")
+        raise Missing(f"There is no open session {session_id!r}.")

@@ -20,7 +20,7 @@ from sqlalchemy.exc import DBAPIError
 
 from service.auth.access_control import LOOPBACK_NAMES
 from service.auth.keys import KeyStore, KeysUnreadable
-from service.settings import Settings
+from service.settings import Settings, unknown_settings
 from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
@@ -54,6 +54,7 @@ class Observation:
 
 def examine(settings: Settings) -> Iterator[Observation]:
     """One finding or more of every check; a check that cannot be carried out says so."""
+    yield from _of_settings()
     yield from _of_folder(settings.data)
     yield from _of_disk(settings)
     yield _of_tables(settings.tables)
@@ -63,7 +64,7 @@ def examine(settings: Settings) -> Iterator[Observation]:
         yield Observation("store", Level.CRITICAL, str(error), "set UNDERSKIN_DATABASE_URL right")
         return
     with closing(store):
-        answers = _of_store(store, settings.data)
+        answers = _of_store(store, settings)
         yield answers
         yield from _of_backups(settings, store)
         needed: bool | None = None
@@ -74,8 +75,14 @@ def examine(settings: Settings) -> Iterator[Observation]:
                 for look in (_of_clock, _of_queue):
                     yield store.read(look)
         except (DBAPIError, StoreMoved, OSError) as error:
-            yield Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
+            if answers.level is not Level.CRITICAL:  # else it is said already
+                yield _unanswered(error)
         yield from _of_keys(settings, needed=needed, made=store.is_made())
+
+
+def _of_settings() -> Iterator[Observation]:
+    if unknown := unknown_settings():
+        yield Observation("settings", Level.WARNING, f"nothing reads {', '.join(unknown)}", "see docs/settings.md")
 
 
 def _of_folder(folder: Path) -> Iterator[Observation]:
@@ -112,7 +119,7 @@ def _of_disk(settings: Settings) -> Iterator[Observation]:
             continue
         free = shutil.disk_usage(folder).free / 1e6
         level = Level.CRITICAL if free < _TOO_LITTLE_MB else Level.WARNING if free < _LITTLE_MB else Level.OK
-        advice = "" if level is Level.OK else f"make room: below {_TOO_LITTLE_MB} MB nothing more may be kept"
+        advice = "" if level is Level.OK else "make room: what finds none is refused (507), and backups fail"
         yield Observation(name, level, f"{free:,.0f} MB free in {folder}", advice)
 
 
@@ -124,10 +131,9 @@ def _of_tables(folder: Path) -> Observation:
     return Observation("tables", Level.OK, f"{folder / SIGMA_TABLE}, SHA-256 {table.sha256[:12]}…")
 
 
-def _of_store(store: Database, folder: Path) -> Observation:
+def _of_store(store: Database, settings: Settings) -> Observation:
     if not store.is_made():
-        return Observation("store", Level.WARNING, f"there is none in {folder} yet", "start the server once, or set "
-                       "UNDERSKIN_DATA to its folder")  # fmt: skip
+        return _of_none(settings)
     try:
         version = migrate.version(store)
         if version is None:
@@ -138,14 +144,31 @@ def _of_store(store: Database, folder: Path) -> Observation:
     except (StoreError, StoreMoved) as error:
         return Observation("store", Level.CRITICAL, str(error), "see docs/store.md")
     except (DBAPIError, OSError) as error:
-        return Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}",
-                       _DATABASE)  # fmt: skip
+        return _unanswered(error)
     if damage:
         return Observation("store", Level.CRITICAL, f"it is damaged: {damage}", "stop the server and restore a backup")
     if version != migrate.VERSIONS[-1]:
         return Observation("store", Level.WARNING, f"its schema is {version}, the newest {migrate.VERSIONS[-1]}",
                        "start this server: it backs the store up and brings it up to date")  # fmt: skip
     return Observation("store", Level.OK, f"{count:,} campaigns, schema {version}")
+
+
+def _of_none(settings: Settings) -> Observation:
+    """Where there is no SQLite store, and perhaps was one."""
+    folder = settings.data
+    left = [path for path in (folder / f"underskin.sqlite3{suffix}" for suffix in ("-wal", ".lock")) if path.exists()]
+    last = None if settings.backup_to is None else newest(settings.backup_to)
+    if left or last is not None:
+        sign = left[0] if last is None else last.path
+        return Observation("store", Level.CRITICAL, f"there is none in {folder}, and there was: {sign} is left of it",
+                       "mount its disk, or put underskin.sqlite3 back, or restore a backup, before the server is "
+                       "started, which would begin an empty one")  # fmt: skip
+    return Observation("store", Level.WARNING, f"there is none in {folder} yet",
+                   "start the server once, or set UNDERSKIN_DATA to its folder, or mount its disk")  # fmt: skip
+
+
+def _unanswered(error: Exception) -> Observation:
+    return Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
 
 
 def _count_campaigns(connection: Connection) -> int:
@@ -196,7 +219,7 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
         words = foreign(store, settings.backup_to)
     except (DBAPIError, StoreError, StoreMoved, OSError):
         words = ""
-        yield Observation("backups", Level.WARNING, f"whose those in {settings.backup_to} are cannot be told",
+        yield Observation("backups", Level.WARNING, f"of which store those in {settings.backup_to} are cannot be told",
                           "see to the store first")  # fmt: skip
     if words:
         yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",
@@ -211,7 +234,7 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
     last = newest(settings.backup_to)
     if last is None:
         yield Observation("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
-                      "start the server; its log says why none can be made")  # fmt: skip
+                      "see that its disk is mounted and a server runs; its log says why it makes none")  # fmt: skip
         return
     hours = last.age_s / 3600
     if hours > 2 * settings.backup_every:
@@ -221,13 +244,19 @@ def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
     try:
         backup.verify(store, last.path)
     except (StoreError, OSError) as error:
-        yield Observation("backups", Level.CRITICAL, str(error), "see to the disk, then `underskin backup FILE`")
+        yield Observation("backups", Level.CRITICAL, str(error),
+                      "see that it is of this store and its disk is sound; then `underskin backup FILE`")  # fmt: skip
         return
     if (count := len(kept(settings.backup_to))) > settings.backup_keep + 1:
         yield Observation("backups", Level.WARNING, f"{count} are kept, more than UNDERSKIN_BACKUP_KEEP = "
                           f"{settings.backup_keep}: none is deleted while the newest is far smaller than the largest",
                           "see whether the store lacks anything; if not, delete the larger ones")  # fmt: skip
-    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole")
+    beside = ", on the disk of the store itself" if _on_one_disk(settings.data, settings.backup_to) else ""
+    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole{beside}")
+
+
+def _on_one_disk(*folders: Path) -> bool:
+    return len({folder.stat().st_dev for folder in folders if folder.is_dir()}) == 1
 
 
 def _of_clock(connection: Connection) -> Observation:

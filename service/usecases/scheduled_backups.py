@@ -96,6 +96,7 @@ class ScheduledBackups:
     def __init__(self, store: Database, folder: Path, every_hours: float, keep: int) -> None:
         self._store, self._folder = store, folder
         self._every_s, self._keep = every_hours * _HOUR_S, keep
+        self._owned = False  # whether the folder has been seen to be this store's
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="backups", daemon=True)
         self._seen: Kept | None = None
@@ -135,7 +136,7 @@ class ScheduledBackups:
             except Exception as error:  # the thread has no caller to raise to, and must go on
                 _failed.inc()
                 reason = next(iter(str(error).splitlines()), type(error).__name__)
-                logger.warning("no scheduled backup could be made: %s", reason)
+                logger.warning("no scheduled backup could be made in %s: %s", self._folder, reason)
                 wait = min(_RETRY_S, self._every_s / 10)
 
     def _see(self) -> None:
@@ -145,7 +146,10 @@ class ScheduledBackups:
         self._seen = last
 
     def _make_if_due(self) -> None:
-        durable.make_folder(self._folder, 0o700)
+        if not self._owned:
+            durable.make_folder(self._folder, 0o700)
+        elif not (self._folder / OWNER).exists():
+            raise StoreError(f"the folder is empty or gone, and held backups before ({OWNER}): is its disk mounted?")
         with _locked(self._folder) as ours:
             last = newest(self._folder)
             if not ours:
@@ -176,6 +180,7 @@ class ScheduledBackups:
         owner = self._folder / OWNER
         if not owner.exists() or not owner.read_text().strip():  # one that ran into a full disk is empty
             durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
+        self._owned = True
 
     def _newest(self) -> Kept | None:
         """The newest one of this store."""

@@ -40,7 +40,7 @@ def keys_in(folder: Path) -> KeyStore:
 def refusal(folder: Path, *arguments: str, **environment: str) -> str:
     """The one line with which a command ends."""
     ended = command(folder, *arguments, **environment)
-    assert (ended.returncode, ended.stdout) == (1, "")
+    assert (ended.returncode, ended.stdout) == (2, "")
     (line,) = ended.stderr.splitlines()
     assert line.startswith("underskin: ")
     return line

@@ -172,7 +172,7 @@ def test_the_command_line_ends_a_session_on_every_server_also_after_a_restart(
         }
     assert found == {"lost": LOGIN_FIRST, "kept": 200}
     again = place.command("key", "end-session", session_id)
-    assert (again.returncode, again.stderr) == (1, f"underskin: There is no session '{session_id}' that goes on.\n")
+    assert (again.returncode, again.stderr) == (2, f"underskin: There is no open session '{session_id}'.\n")
 
 
 def test_the_cookie_is_kept_nowhere(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:

@@ -23,7 +23,7 @@ def refusal(folder: Path, *options: str, **environment: str) -> str:
     """The one line on stderr with which `underskin serve` ends."""
     settings = {**os.environ, "UNDERSKIN_DATA": str(folder / "data"), **environment}
     ended = preloaded.run("serve", "--port", "0", *options, environment=settings)
-    assert (ended.returncode, ended.stdout) == (1, "")
+    assert (ended.returncode, ended.stdout) == (2, "")
     (line,) = ended.stderr.splitlines()
     assert line.startswith("underskin: ")
     return line
@@ -77,6 +77,9 @@ def test_keys_that_cannot_be_read_end_the_start(tmp_path: Path) -> None:
         ("UNDERSKIN_MAX_BODY_MB", "inf", "less than or equal to 1000000"),
         ("UNDERSKIN_MAX_BODY_MB", "64 MB", "a valid number"),
         ("UNDERSKIN_DATA", "~nobody-of-this-name/data", "home directory"),
+        ("UNDERSKIN_HOSTS", "skin.example.org:8743", "without scheme, port and path"),
+        ("UNDERSKIN_HOSTS", "localhost, https://skin.example.org", "without scheme, port and path"),
+        ("UNDERSKIN_TIME_ZONE", "Mars/Base", "such as Europe/Rome"),
     ],
 )
 def test_a_wrong_setting_is_named(tmp_path: Path, variable: str, value: str, says: str) -> None:

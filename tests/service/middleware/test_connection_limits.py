@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -149,15 +149,28 @@ def test_a_request_that_takes_the_server_long_is_not_given_up(tmp_path: Path) ->
     assert len(answer.raise_for_status().json()["sigma"]) == 1_000_000
 
 
-def test_the_length_of_headers_is_a_setting(server: Server) -> None:
-    def status(length: int) -> int:
-        with connect(server) as connection:
-            connection.sendall(f"GET /health HTTP/1.1\r\n{HEAD}X-Long: {'k' * length}\r\n\r\n"[: length + 40].encode())
-            return read_answer(connection)[0]
-
-    with reaching(server, "header_size"):
-        assert status(9000) == 400
+@pytest.mark.parametrize(
+    "request_of",
+    [
+        lambda length: f"GET /health HTTP/1.1\r\n{HEAD}X-Long: {'k' * length}",
+        lambda length: f"GET /health HTTP/1.1\r\n{HEAD}X-Long: {'k' * length}\r\n\r\n",
+        lambda length: f"GET /health HTTP/1.1\r\n{HEAD}" + "X-Long: k\r\n" * (length // 10) + "\r\n",
+        lambda length: f"GET /health?{'k' * length} HTTP/1.1\r\n{HEAD}\r\n",
+    ],
+    ids=["without an end", "at once", "many", "query"],
+)
+def test_the_length_of_headers_is_a_setting(server: Server, request_of: Callable[[int], str]) -> None:
+    with reaching(server, "header_size"), connect(server) as connection:
+        connection.sendall(request_of(9000).encode())
+        assert read_answer(connection)[0] == 400
     assert httpx.get(f"{server.url}/health", headers={"X-Long": "k" * 7000}).status_code == 200
+
+
+def test_the_headers_of_a_request_that_follows_at_once_are_as_long_at_most(server: Server) -> None:
+    request = f"GET /health HTTP/1.1\r\n{HEAD}\r\n"
+    with reaching(server, "header_size"), connect(server) as connection:
+        connection.sendall(f"{request}GET /health HTTP/1.1\r\n{HEAD}X-Long: {'k' * 9000}\r\n\r\n".encode())
+        seconds_until_closed(connection, b"")
 
 
 def opened(server: Server, count: int, begun: str, stack: ExitStack) -> Sequence[socket.socket]:

@@ -4,6 +4,8 @@ import os
 import shutil
 from pathlib import Path
 
+import pytest
+
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, campaign, running
@@ -88,7 +90,46 @@ def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp
     _, found = doctor(place, UNDERSKIN_HOSTS="skin.example.org", **NO_WORKERS)
     assert (found["keys"]["level"], place.command("serve", UNDERSKIN_HOSTS="skin.example.org").returncode) == (
         "critical",
-        1,
+        2,
     )
     wrong = place.command("doctor", UNDERSKIN_BACKUP_EVERY="often")
     assert (wrong.returncode, "UNDERSKIN_BACKUP_EVERY" in wrong.stderr) == (2, True)
+
+
+def test_the_doctor_tells_a_store_that_is_gone_from_one_that_never_was(tmp_path: Path) -> None:
+    place, backups = Place(tmp_path / "data"), tmp_path / "backups"
+    place.folder.mkdir(0o700)
+    settings = scheduled(backups)
+    _, new = doctor(place, **NO_WORKERS)
+    assert new["store"]["level"] == "warning"
+    with running(place, **settings) as server:
+        sent(server, campaign("kept"))
+        wait_for(backups, 1)
+        (place.folder / "underskin.sqlite3").rename(tmp_path / "away")
+        _, without_backups = doctor(place, **NO_WORKERS)
+    shutil.rmtree(place.folder)
+    place.folder.mkdir(0o700)  # as where its disk is not mounted
+    _, empty = doctor(place, **settings)
+    for found in (without_backups, empty):
+        assert (found["store"]["level"], "put underskin.sqlite3 back" in found["store"]["advice"]) == ("critical", True)
+
+
+def test_the_doctor_names_settings_that_nothing_reads(tmp_path: Path) -> None:
+    place = Place(tmp_path / "data")
+    place.folder.mkdir(0o700)
+    _, found = doctor(place, UNDERSKIN_MAX_HAEDER_KB="16", **NO_WORKERS)
+    assert (found["settings"]["level"], found["settings"]["found"]) == (
+        "warning",
+        "nothing reads UNDERSKIN_MAX_HAEDER_KB",
+    )
+
+
+@pytest.mark.parametrize("command", [["backup", "b.pgdump"], ["restore", "b.pgdump"], ["key", "sessions"]])
+def test_a_database_that_is_not_there_is_one_line(tmp_path: Path, command: list[str]) -> None:
+    (tmp_path / "data").mkdir(0o700)
+    (tmp_path / "b.pgdump").write_bytes(b"PGDMP")
+    place = Place(tmp_path / "data", "postgresql://nobody@127.0.0.1:1/nowhere")
+    ended = place.command(command[0], *(str(tmp_path / word) if "." in word else word for word in command[1:]))
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (2, "", 1), ended.stderr
+    _, found = doctor(place, **NO_WORKERS)
+    assert found["store"]["level"] == "critical"

@@ -66,6 +66,26 @@ def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path
     assert not list(folder.glob("*.part*"))
 
 
+def test_a_folder_whose_disk_is_not_mounted_any_more_gets_no_other_in_its_place(place: Place, tmp_path: Path) -> None:
+    folder, away = tmp_path / "backups", tmp_path / "away"
+    log = place.folder.parent / f"{place.folder.name}.log"
+    with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
+        wait_for(folder, 1)
+        folder.rename(away)
+        deadline = time.monotonic() + 60
+        while "is its disk mounted?" not in log.read_text():
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert metric(server, "underskin_backup_failures_total") >= 1
+        folder.mkdir()  # the empty folder below the mount
+        time.sleep(1.0)
+        assert not list(folder.iterdir())
+        folder.rmdir()
+        before = len(kept(away))
+        away.rename(folder)
+        wait_for(folder, before + 1)
+
+
 def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "not-a-folder"
     folder.write_text("a file")
