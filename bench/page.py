@@ -81,7 +81,14 @@ diagnosis' fits from many starts and Laplace's method, against dynesty with its 
 for a likelihood, with the same priors and noise. Differences are of all hypotheses within 10 nats of the winner.""",
     SOAK: """By `make soak`, as far as it has come: the tests at full counts, each on the commit that is named, since
 all of them take hours. A part that failed has no figure. In a power cut the disk forgets what was not synced, or keeps
-some sectors of it (`tests/support/power/`).""",
+some sectors of it (`tests/support/power/`). Damaged files are read by one process that goes on from file to file;
+those read *apart* each by the process of its own in which the service and commands read files. One test alone is
+`UNDERSKIN_SOAK=1 .venv/bin/python -m pytest FILE`, and the command above then writes what it measured: load is
+`tests/service/test_load.py`, uploads `tests/service/ingest/test_concurrent_uploads.py`, diagnoses
+`tests/service/jobs/test_many_diagnoses.py`, kills `tests/service/store/test_store_durability.py`, power cuts
+`tests/service/store/test_power_loss.py`, migrations `tests/service/store/test_migration_killed.py` and
+`test_old_stores.py`, routes `tests/service/routes/test_openapi.py`, damaged files
+`tests/recordings/fuzz/test_fuzz_readers.py`.""",
     "mechanisms": """One prediction of all lines with its derivatives with respect to all parameters and to the
 contacts' positions, under three mechanisms; processor time on one core.""",
 }
