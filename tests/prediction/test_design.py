@@ -131,3 +131,8 @@ def test_what_cannot_be_is_refused_by_name(http: httpx.Client, changed: dict[str
     answer = http.post("/v1/design", json=PROTOTYPE | changed)
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["field"] == field
+
+
+def test_what_overflows_is_null_and_outside_the_table(http: httpx.Client) -> None:
+    answer = answered(http, youngs_modulus_mpa=1e30, indenter_radius_mm=1e-307, units_checked=True)
+    assert (answer["status"], answer["load_parameter"], answer["sigma"]) == ("out_of_domain", None, None)
