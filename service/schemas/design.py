@@ -1,10 +1,11 @@
 """A skin before it is built: what is asked, and what is answered."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Axis = Literal["a_over_h", "rt_over_h", "load_parameter"]
+Representable = Annotated[float, Field(ge=1e-12, le=1e12)]  # whatever is computed of these does not overflow
 
 
 class DesignRequest(BaseModel):
@@ -12,13 +13,13 @@ class DesignRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
-    thickness_mm: float = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
-    youngs_modulus_mpa: float = Field(
+    thickness_mm: Representable = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
+    youngs_modulus_mpa: Representable = Field(
         description="Young's modulus E of the layer, incompressible [MPa].", examples=[16.0]
     )
-    sensor_radius_mm: float = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
-    indenter_radius_mm: float = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: float = Field(description="Force F of the sphere [N].", examples=[1.0])
+    sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
+    indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
+    preload_n: float = Field(le=1e12, description="Force F of the sphere [N].", examples=[1.0])
     pitch_mm: float = Field(
         gt=0, le=1e4, description="Distance of neighbouring sensors of a square array [mm].", examples=[4.0]
     )
@@ -76,10 +77,10 @@ class DesignAnswer(BaseModel):
         description="`out_of_domain`: outside the table, and null what depends on it; never extrapolated."
     )
     limit: str | None = Field(description="Which limit it exceeds, with the highest force; null where it is `ok`.")
-    contact_radius_mm: float | None = Field(description="Radius a of the contact, Hertz [mm]; null if it overflows.")
-    a_over_h: float | None = Field(description="a/h; null if it overflows.")
-    rt_over_h: float | None = Field(description="rT/h; null if it overflows.")
-    load_parameter: float | None = Field(description="L = F/(R²E); null if it overflows.")
+    contact_radius_mm: float = Field(description="Radius a of the contact, Hertz [mm].")
+    a_over_h: float = Field(description="a/h.")
+    rt_over_h: float = Field(description="rT/h.")
+    load_parameter: float = Field(description="L = F/(R²E).")
     sigma: float | None = Field(description="σ above the sensor's centre.")
     rel_error: float | None = Field(description="Bound on its relative error.")
     gamma: float | None = Field(description="γ of a point load above the sensor's centre.")
