@@ -1,11 +1,12 @@
 """A skin before it is built: what is asked, and what is answered."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from service.schemas.magnitudes import Representable
+
 Axis = Literal["a_over_h", "rt_over_h", "load_parameter"]
-Representable = Annotated[float, Field(ge=1e-12, le=1e12)]  # whatever is computed of these does not overflow
 
 
 class DesignRequest(BaseModel):

@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.columns import Status
+from service.schemas.magnitudes import Representable
 
 MOST_RADII, MOST_DEPTHS = 301, 101
 
@@ -14,11 +15,11 @@ class FieldQuery(BaseModel):
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
-    thickness_mm: float = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
-    youngs_modulus_mpa: float = Field(description="Young's modulus E of the layer [MPa].", examples=[16.0])
-    sensor_radius_mm: float = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
-    indenter_radius_mm: float = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: float = Field(description="Force F of the sphere [N].", examples=[1.0])
+    thickness_mm: Representable = Field(description="Thickness h of the layer over the sensors [mm].", examples=[2.5])
+    youngs_modulus_mpa: Representable = Field(description="Young's modulus E of the layer [MPa].", examples=[16.0])
+    sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
+    indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
+    preload_n: float = Field(le=1e12, description="Force F of the sphere [N].", examples=[1.0])
     poisson_ratio: float = Field(
         default=0.5,
         description="Poisson's ratio ν of the layer, 0 to 0.5. Below 0.5 the stress is that of the linear layer.",
@@ -43,10 +44,10 @@ class FieldAnswer(BaseModel):
         description="`out_of_domain`: outside the table, and null what depends on it; never extrapolated."
     )
     limit: str | None = Field(description="Which limit it exceeds, with the highest force; null where it is `ok`.")
-    contact_radius_mm: float | None = Field(description="Radius a of the contact, Hertz [mm]; null if it overflows.")
-    a_over_h: float | None = Field(description="a/h; null if it overflows.")
-    rt_over_h: float | None = Field(description="rT/h; null if it overflows.")
-    load_parameter: float | None = Field(description="L = F/(R²E); null if it overflows.")
+    contact_radius_mm: float = Field(description="Radius a of the contact, Hertz [mm].")
+    a_over_h: float = Field(description="a/h.")
+    rt_over_h: float = Field(description="rT/h.")
+    load_parameter: float = Field(description="L = F/(R²E).")
     sigma: float | None = Field(description="σ of the sensor, as GET /v1/sigma has it.")
     rel_error: float | None = Field(description="Bound on its relative error; null where no table was read.")
     mean_stress_mpa: float | None = Field(

@@ -65,7 +65,7 @@ def test_outside_the_table_it_says_which_limit_and_has_no_stress(http: httpx.Cli
         assert found["limit"] == "L = 0.391 exceeds 0.1: at most 25.6 N"
         for name in ("sigma", "mean_stress_mpa", "section_error", "r_mm", "depth_mm", "sigma_zz_mpa"):
             assert found[name] is None, name
-    huge = asked(http, thickness_mm=1e-300, units_checked=True)
+    huge = asked(http, thickness_mm=1e-12, units_checked=True)
     assert huge["status"] == "out_of_domain"
 
 
@@ -75,6 +75,8 @@ def test_outside_the_table_it_says_which_limit_and_has_no_stress(http: httpx.Cli
         ({"preload_n": 0}, "preload_n", "out_of_range"),
         ({"preload_n": "much"}, "preload_n", "wrong_type"),
         ({"thickness_mm": 0.0025}, "thickness_mm", "unlikely_magnitude"),
+        ({"thickness_mm": 1e229, "units_checked": True}, "thickness_mm", "out_of_range"),
+        ({"indenter_radius_mm": 1e-300, "units_checked": True}, "indenter_radius_mm", "out_of_range"),
         ({"poisson_ratio": 0.6}, "poisson_ratio", "out_of_range"),
         ({"r_points": 302}, "r_points", "out_of_range"),
         ({"depth_points": 1}, "depth_points", "out_of_range"),

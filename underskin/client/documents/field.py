@@ -22,17 +22,17 @@ class FieldAnswer(Document):
     limit: str | None
     """Which limit it exceeds, with the highest force; null where it is `ok`."""
 
-    contact_radius_mm: float | None
-    """Radius a of the contact, Hertz [mm]; null if it overflows."""
+    contact_radius_mm: float
+    """Radius a of the contact, Hertz [mm]."""
 
-    a_over_h: float | None
-    """a/h; null if it overflows."""
+    a_over_h: float
+    """a/h."""
 
-    rt_over_h: float | None
-    """rT/h; null if it overflows."""
+    rt_over_h: float
+    """rT/h."""
 
-    load_parameter: float | None
-    """L = F/(R²E); null if it overflows."""
+    load_parameter: float
+    """L = F/(R²E)."""
 
     sigma: float | None
     """σ of the sensor, as GET /v1/sigma has it."""
