@@ -20,7 +20,7 @@ class DesignRequest(BaseModel):
     )
     sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
     indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: float = Field(le=1e12, description="Force F of the sphere [N].", examples=[1.0])
+    preload_n: Representable = Field(description="Force F of the sphere [N].", examples=[1.0])
     pitch_mm: float = Field(
         gt=0, le=1e4, description="Distance of neighbouring sensors of a square array [mm].", examples=[4.0]
     )

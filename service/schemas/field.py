@@ -19,7 +19,7 @@ class FieldQuery(BaseModel):
     youngs_modulus_mpa: Representable = Field(description="Young's modulus E of the layer [MPa].", examples=[16.0])
     sensor_radius_mm: Representable = Field(description="Radius rT of a sensor [mm].", examples=[1.5])
     indenter_radius_mm: Representable = Field(description="Radius R of the sphere [mm].", examples=[4.0])
-    preload_n: float = Field(le=1e12, description="Force F of the sphere [N].", examples=[1.0])
+    preload_n: Representable = Field(description="Force F of the sphere [N].", examples=[1.0])
     poisson_ratio: float = Field(
         default=0.5,
         description="Poisson's ratio ν of the layer, 0 to 0.5. Below 0.5 the stress is that of the linear layer.",

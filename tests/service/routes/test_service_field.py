@@ -77,6 +77,7 @@ def test_outside_the_table_it_says_which_limit_and_has_no_stress(http: httpx.Cli
         ({"thickness_mm": 0.0025}, "thickness_mm", "unlikely_magnitude"),
         ({"thickness_mm": 1e229, "units_checked": True}, "thickness_mm", "out_of_range"),
         ({"indenter_radius_mm": 1e-300, "units_checked": True}, "indenter_radius_mm", "out_of_range"),
+        ({"preload_n": 1e-300, "units_checked": True}, "preload_n", "out_of_range"),
         ({"poisson_ratio": 0.6}, "poisson_ratio", "out_of_range"),
         ({"r_points": 302}, "r_points", "out_of_range"),
         ({"depth_points": 1}, "depth_points", "out_of_range"),
