@@ -17,6 +17,11 @@ def without_keys(text: str) -> str:
     return KEY.sub("us_…", text)
 
 
+def first_line(reason: object) -> str:
+    """Of an error in words, which may have more lines, as what a database's driver says has; else its kind."""
+    return next(iter(str(reason).splitlines()), type(reason).__name__)
+
+
 class JsonFormatter(logging.Formatter):
     """A log record as one line of JSON; values given in `extra={"fields": {...}}` are put beside the message."""
 

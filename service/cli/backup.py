@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from service.auth.keys import KeyStore, keys_missing
-from service.cli.shared import STORE_ERRORS, first_line, read_settings, use_folder_of_lab
+from service.cli.shared import STORE_ERRORS, read_settings, use_folder_of_lab
+from service.log import first_line
 from service.settings import make_data_folder
 from service.store import Database, StorageFull, database, key_requirement, migrate
 from service.store import backup as backups

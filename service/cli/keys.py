@@ -8,7 +8,8 @@ import typer
 from sqlalchemy import Connection
 
 from service.auth.keys import KeyStore, Scope, keys_missing
-from service.cli.shared import STORE_ERRORS, fail, first_line, read_settings
+from service.cli.shared import STORE_ERRORS, fail, read_settings
+from service.log import first_line
 from service.settings import Settings
 from service.store import Missing, StoreError, database, key_requirement, sessions
 from underskin import UnderskinError

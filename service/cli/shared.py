@@ -7,6 +7,7 @@ import typer
 from pydantic import ValidationError
 from sqlalchemy.exc import DBAPIError
 
+from service.log import first_line
 from service.settings import Settings
 from service.store import StorageFull, StoreError, StoreMoved
 from underskin import InvalidInput
@@ -20,11 +21,6 @@ def fail(reason: object) -> NoReturn:
     """Say why, in one line on standard error, and end with status 2."""
     typer.echo(f"underskin: {first_line(reason)}", err=True)
     raise typer.Exit(2)
-
-
-def first_line(reason: object) -> str:
-    """Of what may have more, as what a database's driver says has."""
-    return next(iter(str(reason).splitlines()), type(reason).__name__)
 
 
 def read_settings() -> Settings:

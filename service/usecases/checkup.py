@@ -20,8 +20,10 @@ from sqlalchemy.exc import DBAPIError
 
 from service.auth.access_control import LOOPBACK_NAMES
 from service.auth.keys import KeyStore, KeysUnreadable
+from service.log import first_line
 from service.settings import Settings, unknown_settings
 from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
+from service.store.engine import SQLITE_FILE
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
 from service.usecases.scheduled_backups import OWNER, foreign, kept, newest
@@ -156,19 +158,19 @@ def _of_store(store: Database, settings: Settings) -> Observation:
 def _of_none(settings: Settings) -> Observation:
     """Where there is no SQLite store, and perhaps was one."""
     folder = settings.data
-    left = [path for path in (folder / f"underskin.sqlite3{suffix}" for suffix in ("-wal", ".lock")) if path.exists()]
+    left = [path for path in (folder / f"{SQLITE_FILE}{suffix}" for suffix in ("-wal", ".lock")) if path.exists()]
     last = None if settings.backup_to is None else newest(settings.backup_to)
     if left or last is not None:
         sign = left[0] if last is None else last.path
         return Observation("store", Level.CRITICAL, f"there is none in {folder}, and there was: {sign} is left of it",
-                       "mount its disk, or put underskin.sqlite3 back, or restore a backup, before the server is "
+                       f"mount its disk, or put {SQLITE_FILE} back, or restore a backup, before the server is "
                        "started, which would begin an empty one")  # fmt: skip
     return Observation("store", Level.WARNING, f"there is none in {folder} yet",
                    "start the server once, or set UNDERSKIN_DATA to its folder, or mount its disk")  # fmt: skip
 
 
 def _unanswered(error: Exception) -> Observation:
-    return Observation("store", Level.CRITICAL, f"it does not answer: {str(error).splitlines()[0]}", _DATABASE)
+    return Observation("store", Level.CRITICAL, f"it does not answer: {first_line(error)}", _DATABASE)
 
 
 def _count_campaigns(connection: Connection) -> int:

@@ -21,6 +21,7 @@ from pathlib import Path
 from prometheus_client import Counter, Gauge
 
 from service import durable
+from service.log import first_line
 from service.store import Database, StorageFull, StoreError, backup, identity
 from service.usecases import mechanism_files
 
@@ -135,8 +136,7 @@ class ScheduledBackups:
                 wait = min(_LOOK_S, self._every_s / 10)
             except Exception as error:  # the thread has no caller to raise to, and must go on
                 _failed.inc()
-                reason = next(iter(str(error).splitlines()), type(error).__name__)
-                logger.warning("no scheduled backup could be made in %s: %s", self._folder, reason)
+                logger.warning("no scheduled backup could be made in %s: %s", self._folder, first_line(error))
                 wait = min(_RETRY_S, self._every_s / 10)
 
     def _see(self) -> None:

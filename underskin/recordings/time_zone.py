@@ -11,7 +11,7 @@ TIME_ZONE = "UNDERSKIN_TIME_ZONE"  # the setting; UTC where it is not set
 
 def time_zone() -> tzinfo:
     """The zone that the setting names; raises InvalidInput where there is none of that name."""
-    name = os.environ.get(TIME_ZONE, "UTC")
+    name = os.environ.get(TIME_ZONE) or "UTC"
     if name == "UTC":
         return UTC
     try:

@@ -58,10 +58,20 @@ def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_a
 def test_a_data_folder_lost_later_makes_the_server_not_ready(tmp_path: Path) -> None:
     with running(tmp_path) as started:
         (tmp_path / "data").rename(tmp_path / "moved")
-        assert str(tmp_path / "data") in problem_of(httpx.get(f"{started.url}/ready"), 503)["detail"]
+        refused = httpx.get(f"{started.url}/ready")
+        assert str(tmp_path / "data") in problem_of(refused, 503)["detail"]
         assert httpx.get(f"{started.url}/health").status_code == 200
+        assert "underskin_disk_free_bytes NaN" in httpx.get(f"{started.url}/metrics").text
         (tmp_path / "moved").rename(tmp_path / "data")
         assert httpx.get(f"{started.url}/ready").status_code == 200
+    (line,) = [line for line in started.log.read_text().splitlines() if refused.headers["x-request-id"] in line]
+    assert json.loads(line)["level"] == "warning"
+
+
+def test_a_misspelt_setting_is_named_in_the_log(tmp_path: Path) -> None:
+    with running(tmp_path, {"UNDERSKIN_MAX_HAEDER_KB": "4", "UNDERSKIN_TIME_ZONE": ""}) as started:
+        pass
+    assert "nothing reads UNDERSKIN_MAX_HAEDER_KB" in started.log.read_text()
 
 
 def test_keys_that_cannot_be_read_end_the_start(tmp_path: Path) -> None:

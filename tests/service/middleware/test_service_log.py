@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import time
 from collections.abc import Iterator
 from datetime import datetime
@@ -155,6 +156,9 @@ def test_metrics_are_prometheus_text(own: Server) -> None:
     answer = httpx.get(f"{own.url}/metrics")
     assert answer.headers["content-type"].startswith("text/plain; version=")
     assert series(own.url)["process_resident_memory_bytes"] > 1e7
+    assert series(own.url)["underskin_disk_free_bytes"] == pytest.approx(
+        shutil.disk_usage(own.log.parent).free, rel=0.2
+    )
 
 
 KEY = "us_0123456789abcdefABCDEF"  # of a key's shape
