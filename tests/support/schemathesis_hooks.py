@@ -1,5 +1,5 @@
 """Has Schemathesis draw its inputs without leaning towards those that are accepted, on which Hypothesis would spend
-nine tenths of a soak. Named by SCHEMATHESIS_HOOKS.
+most of a soak. Named by SCHEMATHESIS_HOOKS.
 """
 
 import hypothesis
