@@ -10,6 +10,7 @@ from service.settings import Settings
 from tests.support.repository import ROOT
 
 TEXT = (ROOT / "docs" / "settings.md").read_text()
+MISSPELT = {"UNDERSKIN_MAX_HAEDER_KB"}  # set by tests of what is said of names that nothing reads
 SECTIONS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", TEXT, flags=re.MULTILINE | re.DOTALL))
 
 
@@ -37,7 +38,7 @@ def test_every_variable_that_is_read_is_documented() -> None:
         if source.suffix in (".py", ".sh", ".m"):
             used |= set(re.findall(r"[\"'{](UNDERSKIN_[A-Z_]*[A-Z])[\"':}]", source.read_text()))
     settings = {f"UNDERSKIN_{name.upper()}" for name in Settings.model_fields}
-    assert used - settings == set(rows("Variables that the service does not read"))
+    assert used - settings - MISSPELT == set(rows("Variables that the service does not read"))
     assert "UNDERSKIN_TABLES" in used
 
 
