@@ -95,7 +95,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.backups = (
         None
         if settings.backup_to is None
-        else ScheduledBackups(store, settings.backup_to, settings.backup_every, settings.backup_keep)
+        else ScheduledBackups(store, settings.backup_to, settings.backup_every, settings.backup_keep, settings.data)
     )
     api.state.planner = Planner(store, processes, settings.diagnosis_workers)
     install_handlers(api, problem_page, _methods)

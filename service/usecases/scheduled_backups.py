@@ -3,7 +3,8 @@
 When the next one is due is read from the folder itself, so that a restart neither skips one nor makes one too many. Of
 several servers that share a database and a folder one makes it: it holds a lock on the folder meanwhile. A folder is
 for one store: a file in it says for which, and servers of others make none there. None is deleted while the newest is
-far smaller than the largest, as where a server was started on an empty data folder.
+far smaller than the largest, as where a server was started on an empty data folder. Where a folder that held backups is
+empty or gone, its disk is away: none is made in its place, also after a restart, since the data folder notes it.
 """
 
 import fcntl
@@ -33,6 +34,7 @@ _SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
 _SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
+_NOTE = "scheduled-backups-in"  # of the data folder: holds the address of the folder that they were last made in
 _LOOK_S = 60.0  # how often the folder is looked into
 _RETRY_S = 600.0  # after a failure
 _JOIN_S = 30.0
@@ -94,8 +96,10 @@ class ScheduledBackups:
     """Makes a backup of a store into `folder` every so many hours and keeps the newest `keep`, between `start` and
     `stop`."""
 
-    def __init__(self, store: Database, folder: Path, every_hours: float, keep: int) -> None:
-        self._store, self._folder = store, folder
+    def __init__(self, store: Database, folder: Path, every_hours: float, keep: int, data: Path) -> None:
+        """`data`: the server's data folder."""
+        self._store, self._folder, self._note = store, folder, data / _NOTE
+        self._address = folder.absolute().as_uri()
         self._every_s, self._keep = every_hours * _HOUR_S, keep
         self._owned = False  # whether the folder has been seen to be this store's
         self._ending = threading.Event()
@@ -146,10 +150,13 @@ class ScheduledBackups:
         self._seen = last
 
     def _make_if_due(self) -> None:
-        if not self._owned:
+        if not self._owned and not self._is_noted():
             durable.make_folder(self._folder, 0o700)
         elif not (self._folder / OWNER).exists():
-            raise StoreError(f"the folder is empty or gone, and held backups before ({OWNER}): is its disk mounted?")
+            raise StoreError(
+                f"the folder is empty or gone, and held backups before ({OWNER}): is its disk mounted? "
+                f"To begin anew there, delete {self._note} and restart the server"
+            )
         with _locked(self._folder) as ours:
             last = newest(self._folder)
             if not ours:
@@ -181,6 +188,15 @@ class ScheduledBackups:
         if not owner.exists() or not owner.read_text().strip():  # one that ran into a full disk is empty
             durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
         self._owned = True
+        if not self._is_noted():
+            with suppress(OSError):  # a full disk here keeps nobody from a backup elsewhere
+                durable.write_text(self._note, self._address)
+
+    def _is_noted(self) -> bool:
+        """Whether this server, or one before it, has made backups in the folder."""
+        with suppress(OSError, UnicodeDecodeError):
+            return self._note.read_text() == self._address
+        return False
 
     def _newest(self) -> Kept | None:
         """The newest one of this store."""

@@ -1,6 +1,7 @@
 """Backups on a schedule by a real server: made, read back, rotated, restored."""
 
 import re
+import shutil
 import sqlite3
 import time
 from contextlib import closing
@@ -80,10 +81,32 @@ def test_a_folder_whose_disk_is_not_mounted_any_more_gets_no_other_in_its_place(
         folder.mkdir()  # the empty folder below the mount
         time.sleep(1.0)
         assert not list(folder.iterdir())
+    with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:  # nor after a restart
+        deadline = time.monotonic() + 60
+        while metric(server, "underskin_backup_failures_total") < 1:
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        assert not list(folder.iterdir())
         folder.rmdir()
         before = len(kept(away))
         away.rename(folder)
         wait_for(folder, before + 1)
+
+
+def test_backups_begin_anew_in_an_emptied_folder_once_its_note_is_deleted(place: Place, tmp_path: Path) -> None:
+    folder = tmp_path / "backups"
+    log = place.folder.parent / f"{place.folder.name}.log"
+    with running(place, **scheduled(folder)):
+        wait_for(folder, 1)
+    shutil.rmtree(folder)
+    with running(place, **scheduled(folder)):
+        deadline = time.monotonic() + 60
+        while not (advice := re.search(r"To begin anew there, delete (\S+) and restart", log.read_text())):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+    Path(advice[1]).unlink()
+    with running(place, **scheduled(folder)):
+        wait_for(folder, 1)
 
 
 def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_path: Path) -> None:
