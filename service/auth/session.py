@@ -7,6 +7,7 @@ the cookie is a random text that binds the forms alone.
 
 import base64
 import hmac
+import re
 import secrets
 import time
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ from service.auth.keys import Key, KeyStore
 COOKIE = "underskin_session"
 LASTS_S = 7 * 86400
 _ID_DIGITS = 16
+_TIME = re.compile("[0-9]{1,12}")  # in seconds since 1970
 
 
 def anonymous() -> str:
@@ -44,10 +46,10 @@ def key_of(cookie: str, keys: KeyStore) -> Key | None:
     """The key that was logged in with; None where the cookie is anonymous, too old, or not of a key that is known."""
     body, dot, signature = cookie.rpartition(".")
     parts = body.split(".")
-    if not dot or len(parts) != 3 or not parts[2].isdigit() or int(parts[2]) < time.time():
+    if not dot or len(parts) != 3 or not _TIME.fullmatch(parts[2]) or int(parts[2]) < time.time():
         return None
     for key in keys.entries():
-        if key.sha256.startswith(parts[1]) and hmac.compare_digest(signature, _signature(key, body)):
+        if key.sha256.startswith(parts[1]) and hmac.compare_digest(signature.encode(), _signature(key, body).encode()):
             return key
     return None
 

@@ -1,21 +1,23 @@
 """All that is kept of a skin as one file, and back."""
 
+import asyncio
 from functools import partial
 from typing import Any
 
 from fastapi import APIRouter, Request
-from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.form_fields import split
 from service.ingest.skin_imports import Imported
-from service.ingest.uploads import received
+from service.ingest.uploads import UploadFolder, received
 from service.problems import Refusal
-from service.routes.temporary_files import made_file
-from service.store import skins
+from service.routes.temporary_files import MadeFile, made_file
+from service.store import Database, skins
 from service.store.export import export
+
+_AT_ONCE = asyncio.Semaphore(2)  # each holds a connection as long as it takes, and readers need some, too
 
 router = APIRouter(prefix="/v1", tags=["skins"])
 
@@ -27,16 +29,21 @@ _FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", 
     "/skins/{skin_id}/export",
     operation_id="export_skin",
     summary="All that is kept of a skin",
-    response_class=FileResponse,
+    response_class=MadeFile,
     responses={200: _FILE},
 )
-def export_skin(skin_id: SkinId, request: Request, store: Store) -> FileResponse:
+async def export_skin(skin_id: SkinId, request: Request, store: Store) -> MadeFile:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
     diagnoses that have ended and models.
     """
+    async with _AT_ONCE:
+        return await run_in_threadpool(_exported, store, request.app.state.uploads, skin_id)
+
+
+def _exported(store: Database, folder: UploadFolder, skin_id: str) -> MadeFile:
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        return made_file(request.app.state.uploads, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
+        return made_file(folder, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
 
 
 @router.post(

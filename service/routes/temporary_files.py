@@ -4,14 +4,32 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+import anyio
 from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
+from starlette.types import Receive, Scope, Send
 
 from service.ingest.uploads import UploadFolder, disk_errors_said
 
 
-def made_file(folder: UploadFolder, name: str, media_type: str, write: Callable[[Path], object]) -> FileResponse:
-    """The answer that sends what `write` wrote, removed afterwards.
+class MadeFile(FileResponse):
+    """Sends a file and removes it, however that ends.
+
+    It is sent whole, whatever `Range` asks for: that of the next request is made anew, and parts of two are no file.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """The answer."""
+        whole = [(name, value) for name, value in scope["headers"] if name != b"range"]
+        self.headers["Accept-Ranges"] = "none"
+        try:
+            await super().__call__({**scope, "headers": whole}, receive, send)
+        finally:
+            with anyio.CancelScope(shield=True):
+                await anyio.to_thread.run_sync(Path(self.path).unlink)
+
+
+def made_file(folder: UploadFolder, name: str, media_type: str, write: Callable[[Path], object]) -> MadeFile:
+    """The answer that sends what `write` wrote.
 
     Raises StorageFull where the disk is full, StoreMoved where the folder is gone.
     """
@@ -23,6 +41,4 @@ def made_file(folder: UploadFolder, name: str, media_type: str, write: Callable[
         except BaseException:
             path.unlink()
             raise
-    return FileResponse(
-        path, media_type=media_type, filename=name, background=BackgroundTask(path.unlink, missing_ok=True)
-    )
+    return MadeFile(path, media_type=media_type, filename=name)

@@ -40,8 +40,7 @@ class Database:
         self.url = url
         self._files = SqliteFiles(Path(url.database or "")) if url.get_backend_name() == "sqlite" else None
         self.engine = _engine(url, self._files)
-        # PostgreSQL's writers wait on their connections: readers have others
-        self._writers = self.engine if self.is_sqlite else _engine(url, None)
+        self._writers = _engine(url, self._files)  # readers that take long leave writers theirs, and the other way
         self._turns = WriteTurns()
 
     @property
@@ -202,6 +201,7 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
         "pool_timeout": CONNECTION_WAIT_S,
         "json_serializer": lambda value: orjson.dumps(value).decode(),
         "json_deserializer": orjson.loads,
+        "hide_parameters": True,  # what is kept, keys' digests included, stays out of errors, and so of the log
     }
     if files is not None:
         engine = create_engine(url, creator=files.connect, **options)

@@ -1,9 +1,11 @@
 """Sessions of browsers: listed for their key, ended one by one, on the page, by a logout and by the command line."""
 
+import sqlite3
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
+from hashlib import sha256
 from pathlib import Path
 
 import httpx
@@ -15,6 +17,7 @@ from service.auth.sessions import Sessions
 from service.pages.start.sessions import browser_name
 from service.store import open_store
 from service.store import sessions as noted
+from service.store.engine import SQLITE_FILE
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Place, Server, running
 
@@ -173,6 +176,32 @@ def test_the_command_line_ends_a_session_on_every_server_also_after_a_restart(
     assert found == {"lost": LOGIN_FIRST, "kept": 200}
     again = place.command("key", "end-session", session_id)
     assert (again.returncode, again.stderr) == (2, f"underskin: There is no open session '{session_id}'.\n")
+
+
+def test_a_made_up_cookie_logs_nobody_in(keyed: tuple[Server, dict[str, str]]) -> None:
+    """Times that are no numbers or have thousands of digits, signatures beyond ASCII, and what is no cookie of ours."""
+    address = str(keyed[0].http.base_url).rstrip("/")
+    for made_up in (f"a.b.{'9' * 5000}.c", "a.b.²³.c", "a..9999999999.é", "a.b.9999999999.", "...", "é", ""):
+        cookie = {"Cookie": f"{COOKIE}={made_up}".encode("latin-1")}
+        for path, status in (("/v1/skins", 401), ("/login", 200)):
+            assert httpx.get(f"{address}{path}", headers=cookie).status_code == status, made_up[:20]
+
+
+def test_the_log_tells_nothing_of_a_key_where_the_store_fails(
+    keyed: tuple[Server, dict[str, str]], log_in: Browser
+) -> None:
+    """Whoever has a key's digest can sign cookies."""
+    server, keys = keyed
+    browser = log_in("mara", "at home")
+    token = token_of(browser.get("/sessions").text)
+    with closing(sqlite3.connect(server.place.folder / SQLITE_FILE)) as store, store:
+        store.execute("DROP TABLE sessions")
+    assert browser.get("/sessions").status_code == 503
+    assert browser.post("/logout", data={"form_token": token}).status_code == 303
+    time.sleep(0.5)  # the log is written a moment later
+    log = (server.place.folder.parent / f"{server.place.folder.name}.log").read_text()
+    assert "no such table" in log
+    assert sha256(keys["mara"].encode()).hexdigest() not in log
 
 
 def test_the_cookie_is_kept_nowhere(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:

@@ -9,17 +9,8 @@ from typing import Any
 import httpx
 import pytest
 
-from service.app import create_api
-from service.auth.access_control import AccessControl
-from service.auth.key_requirement import KeyRequirement
-from service.auth.keys import KeyStore
-from service.auth.sessions import Sessions
-from service.middleware.asgi_middleware import AsgiMiddleware
-from service.pages.shared.html import problem_page
-from service.settings import Settings
-from service.store import open_store
+from tests.service.in_process import in_process
 from tests.service.requests import D33, FRF, SIGMA, all_routes, problem_of
-from underskin import load_table
 
 LINES: dict[str, Any] = {
     **{name: D33[name] for name in D33 if name != "frf_pc_per_n"},
@@ -205,30 +196,17 @@ def test_values_too_large_for_a_double_are_outside_not_a_failure(http: httpx.Cli
 def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    store = open_store("", tmp_path)
-    keys = KeyStore(tmp_path)
-    gate = AccessControl(
-        host_names=frozenset(),
-        keys=keys,
-        requirement=KeyRequirement(keys, store),
-        sessions=Sessions(store),
-        keys_always=False,
-        max_body_bytes=1000,
-        max_upload_bytes=1000,
-    )
-    api = create_api(Settings(data=tmp_path), load_table(), gate, store)
+    with in_process(tmp_path) as service:
 
-    @api.get("/fails")
-    async def fails() -> None:
-        raise ZeroDivisionError("a bug")
+        @service.api.get("/fails")
+        async def fails() -> None:
+            raise ZeroDivisionError("a bug")
 
-    async def ask() -> httpx.Response:
-        transport = httpx.ASGITransport(AsgiMiddleware(api, gate, {}, problem_page))
-        async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
-            return await client.get("/fails")
+        async def ask() -> httpx.Response:
+            async with service.client() as client:
+                return await client.get("/fails")
 
-    document = problem_of(asyncio.run(ask()), 500)
-    store.close()
+        document = problem_of(asyncio.run(ask()), 500)
     assert "a bug" not in document["detail"]
     (record,) = [record for record in caplog.records if record.exc_info]
     assert getattr(record, "fields", {}) == {"request_id": document["request_id"]}

@@ -15,16 +15,10 @@ import pytest
 
 from bench.figures import Figure
 from bench.soak import SOAK, record
-from service.app import create_api
-from service.auth.access_control import AccessControl
-from service.auth.key_requirement import KeyRequirement
 from service.auth.keys import KeyStore
-from service.auth.sessions import Sessions
-from service.settings import Settings
-from service.store import open_store
+from tests.service.in_process import in_process
 from tests.support.repository import ROOT
 from tests.support.server import Server, running
-from underskin import load_table
 
 UNITS = {"_mm": "mm", "_mpa": "MPa", "_n": "N", "_pc_per_n": "pC/N", "_hz": "Hz"}
 # Generated clients name their functions after these: to change one breaks them.
@@ -114,19 +108,8 @@ def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
 
 
 def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any], tmp_path: Path) -> None:
-    store = open_store("", tmp_path)
-    keys = KeyStore(tmp_path)
-    gate = AccessControl(
-        host_names=frozenset(),
-        keys=keys,
-        requirement=KeyRequirement(keys, store),
-        sessions=Sessions(store),
-        keys_always=False,
-        max_body_bytes=1,
-        max_upload_bytes=1,
-    )
-    api = create_api(Settings(data=tmp_path), load_table(), gate, store)
-    store.close()
+    with in_process(tmp_path) as service:
+        api = service.api
     assert set(api.openapi()["paths"]) == set(document["paths"])
     assert not [route for route in api.routes if not getattr(route, "include_in_schema", True)]
 

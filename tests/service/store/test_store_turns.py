@@ -145,6 +145,15 @@ def test_a_reader_without_a_connection_is_told_so(place: Place, monkeypatch: pyt
             stack.enter_context(store.reading())
 
 
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
+def test_readers_that_hold_all_connections_keep_no_writer_waiting(place: Place) -> None:
+    with closing(store_of(place)) as store, ExitStack() as stack:
+        for _ in range(15):
+            stack.enter_context(store.reading())
+        with store.writing() as connection:
+            assert connection.execute(text("SELECT 1")).scalar() == 1
+
+
 def test_no_more_wait_than_there_are_places(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(write_turns, "FOR_A_PLACE_S", 0.1)
     turns = write_turns.WriteTurns()
