@@ -85,6 +85,7 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.table = table
     api.state.access = access
     api.state.login_throttle = LoginThrottle()
+    api.state.proxies = settings.proxy_networks
     api.state.store = store
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
     processes = WorkerProcesses(

@@ -1,5 +1,6 @@
 """Settings, from the environment (docs/settings.md)."""
 
+import ipaddress
 import os
 import re
 from pathlib import Path
@@ -93,6 +94,12 @@ class Settings(BaseSettings):
         "127.0.0.1, [::1] and the address it is bound to. A request with another Host is refused.",
     )
 
+    proxies: str = Field(
+        default="",
+        description="Addresses or networks of proxies, separated by commas, beside those on this machine: the client "
+        "of a request through one is the last address in X-Forwarded-For.",
+    )
+
     backup_to: Path | None = Field(
         default=None,
         description="Folder into which the server writes backups of its store on a schedule; left out: it makes none.",
@@ -113,10 +120,20 @@ class Settings(BaseSettings):
     @field_validator("hosts")
     @classmethod
     def _names(cls, hosts: str) -> str:
-        for name in filter(None, map(str.strip, hosts.split(","))):
+        for name in _listed(hosts):
             if not _HOST_NAME.fullmatch(name):
                 raise ValueError(f"{name!r} must be a name or an address, without scheme, port and path")
         return hosts
+
+    @field_validator("proxies")
+    @classmethod
+    def _networks(cls, proxies: str) -> str:
+        for name in _listed(proxies):
+            try:
+                ipaddress.ip_network(name)
+            except ValueError as error:
+                raise ValueError(f"{error}; allowed: 192.0.2.7 or 192.0.2.0/24") from error
+        return proxies
 
     @property
     def max_body_bytes(self) -> int:
@@ -131,7 +148,17 @@ class Settings(BaseSettings):
     @property
     def host_names(self) -> frozenset[str]:
         """`hosts`, in lower case."""
-        return frozenset(name.strip().lower() for name in self.hosts.split(",") if name.strip())
+        return frozenset(map(str.lower, _listed(self.hosts)))
+
+    @property
+    def proxy_networks(self) -> tuple[ipaddress.IPv4Network | ipaddress.IPv6Network, ...]:
+        """`proxies`, as networks."""
+        return tuple(map(ipaddress.ip_network, _listed(self.proxies)))
+
+
+def _listed(text: str) -> list[str]:
+    """What commas separate."""
+    return [part.strip() for part in text.split(",") if part.strip()]
 
 
 def unknown_settings() -> list[str]:

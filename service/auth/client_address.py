@@ -1,19 +1,22 @@
-"""Whose request it is: the address of the client, also where it comes through a proxy on this machine."""
+"""Whose request it is: the address of the client, also where it comes through a proxy."""
 
 import ipaddress
+from collections.abc import Sequence
 from typing import TypeAlias
 
 from starlette.requests import Request
 
 _Address: TypeAlias = ipaddress.IPv4Address | ipaddress.IPv6Address
+_Network: TypeAlias = ipaddress.IPv4Network | ipaddress.IPv6Network
 _IPV6_PREFIX = 64  # one subscriber has all the addresses of such a network
 
 
-def client_address(request: Request) -> str:
-    """The peer's address; of a peer on this machine the last in `X-Forwarded-For`, which the proxy there has set."""
+def client_address(request: Request, proxies: Sequence[_Network] = ()) -> str:
+    """The peer's address; of a peer on this machine, or in one of `proxies`, the last in `X-Forwarded-For`, which the
+    proxy there has set."""
     peer = request.client.host if request.client else ""
     own = _parsed(peer)
-    if own is not None and own.is_loopback:
+    if own is not None and (own.is_loopback or any(own in network for network in proxies)):
         forwarded = _parsed(request.headers.get("x-forwarded-for", "").rpartition(",")[2].strip())
         own = own if forwarded is None else forwarded
     return peer if own is None else str(own)

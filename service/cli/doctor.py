@@ -9,7 +9,8 @@ from service.cli.shared import read_settings, use_folder_of_lab
 from service.jobs import WorkerProcesses
 from service.jobs.process import Given
 from service.settings import Settings
-from service.usecases.checkup import Level, Observation, examine
+from service.usecases.checkup import examine
+from service.usecases.observation import Level, Observation
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
 _LIMIT_S = 120.0

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, Gauge, generate_latest
+from starlette.concurrency import run_in_threadpool
 
 from service.middleware import request_log
 
@@ -35,4 +36,4 @@ def watch_disk(folder: Path) -> None:
 async def metrics() -> Response:
     """In Prometheus' text format."""
     request_log.flush()
-    return Response(generate_latest(), media_type=CONTENT_TYPE_LATEST)
+    return Response(await run_in_threadpool(generate_latest), media_type=CONTENT_TYPE_LATEST)

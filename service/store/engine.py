@@ -21,6 +21,9 @@ from service.store.write_turns import WAIT_S, WriteTurns, busy
 SQLITE_FILE = "underskin.sqlite3"
 CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
 _PG_DISK_FULL = "53100"
+# A server that is gone without a word, as when its power fails, is noticed within half a minute: by the system's own
+# limits it would be a quarter of an hour for what was sent, and two hours for an answer.
+_NOTICED = {"keepalives_idle": 10, "keepalives_interval": 5, "keepalives_count": 3, "tcp_user_timeout": 20_000}  # s, ms
 _PG_WRITING = 7236412  # any number, the same for all servers of a database; a migration has another
 _SCHEMES = ("postgresql", "postgres", "postgresql+psycopg")
 _Given = ParamSpec("_Given")
@@ -209,7 +212,7 @@ def _engine(url: URL, files: SqliteFiles | None) -> Engine:
         return engine
     # A commit waits for the disk whatever the server's default. No statement is prepared: a restore replaces tables.
     durable = {"options": "-c synchronous_commit=on -c timezone=UTC", "prepare_threshold": None, "connect_timeout": 10}
-    return create_engine(url, connect_args=durable, pool_pre_ping=True, **options)
+    return create_engine(url, connect_args=durable | _NOTICED, pool_pre_ping=True, **options)
 
 
 def _connected(engine: Engine) -> Connection:

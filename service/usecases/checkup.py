@@ -8,11 +8,9 @@ import shutil
 import sqlite3
 import stat
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from enum import IntEnum
 from pathlib import Path
 
 from sqlalchemy import ColumnElement, Connection, func, select
@@ -22,11 +20,13 @@ from service.auth.access_control import LOOPBACK_NAMES
 from service.auth.keys import KeyStore, KeysUnreadable
 from service.log import first_line
 from service.settings import Settings, unknown_settings
-from service.store import Database, StoreError, StoreMoved, backup, database, diagnoses, key_requirement, migrate
+from service.store import Database, StoreError, StoreMoved, database, diagnoses, key_requirement, migrate
 from service.store.engine import SQLITE_FILE
 from service.store.tables import campaigns
 from service.store.tables import diagnoses as queue
-from service.usecases.scheduled_backups import OWNER, foreign, kept, newest
+from service.usecases.checkup_backups import of_backups
+from service.usecases.observation import FILES_OPEN, Level, Observation, carried_out, open_to_others
+from service.usecases.scheduled_backups import newest
 from underskin import TableError
 from underskin.surrogate.sigma_table import SIGMA_TABLE, load_table
 
@@ -36,29 +36,11 @@ _DATABASE = "see whether the database runs, and its address in UNDERSKIN_DATABAS
 _WAITS_S = 300.0  # a diagnosis in the queue
 
 
-class Level(IntEnum):
-    """As monitoring systems count: the exit status of the worst finding."""
-
-    OK = 0
-    WARNING = 1
-    CRITICAL = 2
-
-
-@dataclass(frozen=True)
-class Observation:
-    """What a check found, in words, and what to do where that is anything."""
-
-    check: str
-    level: Level
-    found: str
-    advice: str = ""
-
-
 def examine(settings: Settings) -> Iterator[Observation]:
     """One finding or more of every check; a check that cannot be carried out says so."""
     yield from _of_settings()
-    yield from _of_folder(settings.data)
-    yield from _of_disk(settings)
+    yield from carried_out("data folder", _of_folder(settings.data))
+    yield from carried_out("disk", _of_disk(settings))
     yield _of_tables(settings.tables)
     try:
         store = database(settings.database_url, settings.data)
@@ -68,10 +50,12 @@ def examine(settings: Settings) -> Iterator[Observation]:
     with closing(store):
         answers = _of_store(store, settings)
         yield answers
-        yield from _of_backups(settings, store)
+        yield from carried_out("backups", of_backups(settings, store))
         needed: bool | None = None
+        made = True
         try:
-            if store.is_made() and migrate.version(store) is not None:
+            made = store.is_made()
+            if made and migrate.version(store) is not None:
                 needed = store.read(key_requirement.is_needed)
             if answers.level is Level.OK:
                 for look in (_of_clock, _of_queue):
@@ -79,7 +63,7 @@ def examine(settings: Settings) -> Iterator[Observation]:
         except (DBAPIError, StoreMoved, OSError) as error:
             if answers.level is not Level.CRITICAL:  # else it is said already
                 yield _unanswered(error)
-        yield from _of_keys(settings, needed=needed, made=store.is_made())
+        yield from carried_out("keys", _of_keys(settings, needed=needed, made=made))
 
 
 def _of_settings() -> Iterator[Observation]:
@@ -102,17 +86,7 @@ def _of_folder(folder: Path) -> Iterator[Observation]:
         yield Observation("data folder", Level.WARNING, f"everybody may enter {folder} (mode {mode:o})", "chmod 700 it")
     else:
         yield Observation("data folder", Level.OK, f"{folder}, mode {mode:o}")
-    yield from _open_to_others("data folder", [folder, folder / "backups", folder / "mechanisms"])
-
-
-def _open_to_others(check: str, folders: Sequence[Path]) -> Iterator[Observation]:
-    """Files in these folders that others than their owner may read or write."""
-    files = [path for folder in folders for path in sorted(folder.glob("*")) if path.is_file()]
-    others = [str(path) for path in files if stat.S_IMODE(path.stat().st_mode) & 0o077]
-    if others:
-        more = f" and {len(others) - 3} more" if len(others) > 3 else ""
-        said = f"others than their owner may open {', '.join(others[:3])}{more}"
-        yield Observation(check, Level.WARNING, said, "chmod 600 these files")
+    yield from open_to_others("data folder", [folder, folder / "backups", folder / "mechanisms"])
 
 
 def _of_disk(settings: Settings) -> Iterator[Observation]:
@@ -134,9 +108,9 @@ def _of_tables(folder: Path) -> Observation:
 
 
 def _of_store(store: Database, settings: Settings) -> Observation:
-    if not store.is_made():
-        return _of_none(settings)
     try:
+        if not store.is_made():
+            return _of_none(settings)
         version = migrate.version(store)
         if version is None:
             return Observation("store", Level.WARNING, "it is empty", "start the server once")
@@ -170,7 +144,8 @@ def _of_none(settings: Settings) -> Observation:
 
 
 def _unanswered(error: Exception) -> Observation:
-    return Observation("store", Level.CRITICAL, f"it does not answer: {first_line(error)}", _DATABASE)
+    advice = FILES_OPEN if isinstance(error, OSError) else _DATABASE
+    return Observation("store", Level.CRITICAL, f"it does not answer: {first_line(error)}", advice)
 
 
 def _count_campaigns(connection: Connection) -> int:
@@ -210,55 +185,6 @@ def _of_keys(settings: Settings, *, needed: bool | None, made: bool) -> Iterator
         return
     level, advice = (Level.OK, "") if known else (Level.WARNING, "make one with `underskin key create NAME`")
     yield Observation("keys", level, f"{len(known)} in {keys.path}", advice)
-
-
-def _of_backups(settings: Settings, store: Database) -> Iterator[Observation]:
-    if settings.backup_to is None:
-        yield Observation("backups", Level.WARNING, "the server makes none by itself",
-                      "set UNDERSKIN_BACKUP_TO, or see that `underskin backup FILE` runs every day")  # fmt: skip
-        return
-    try:
-        words = foreign(store, settings.backup_to)
-    except (DBAPIError, StoreError, StoreMoved, OSError):
-        words = ""
-        yield Observation("backups", Level.WARNING, f"of which store those in {settings.backup_to} are cannot be told",
-                          "see to the store first")  # fmt: skip
-    if words:
-        yield Observation("backups", Level.CRITICAL, f"{words}, and the server makes none there",
-                          "set UNDERSKIN_BACKUP_TO to a folder of its own; if it is this store after all, "
-                          f"delete {settings.backup_to / OWNER}")  # fmt: skip
-        return
-    yield from _open_to_others("backups", [settings.backup_to])
-    ahead = [entry for entry in kept(settings.backup_to) if entry.age_s < -_SKEW_S]
-    if ahead:
-        yield Observation("backups", Level.WARNING, f"{ahead[0].path.name} is dated ahead of this machine's clock",
-                      "set the clock, and rename or delete what a wrong one dated")  # fmt: skip
-    last = newest(settings.backup_to)
-    if last is None:
-        yield Observation("backups", Level.CRITICAL, f"there is none in {settings.backup_to}",
-                      "see that its disk is mounted and a server runs; its log says why it makes none")  # fmt: skip
-        return
-    hours = last.age_s / 3600
-    if hours > 2 * settings.backup_every:
-        yield Observation("backups", Level.CRITICAL, f"the newest, {last.path.name}, is {hours:.0f} hours old",
-                      "see that the server runs; its log says why none can be made")  # fmt: skip
-        return
-    try:
-        backup.verify(store, last.path)
-    except (StoreError, OSError) as error:
-        yield Observation("backups", Level.CRITICAL, str(error),
-                      "see that it is of this store and its disk is sound; then `underskin backup FILE`")  # fmt: skip
-        return
-    if (count := len(kept(settings.backup_to))) > settings.backup_keep + 1:
-        yield Observation("backups", Level.WARNING, f"{count} are kept, more than UNDERSKIN_BACKUP_KEEP = "
-                          f"{settings.backup_keep}: none is deleted while the newest is far smaller than the largest",
-                          "see whether the store lacks anything; if not, delete the larger ones")  # fmt: skip
-    beside = ", on the disk of the store itself" if _on_one_disk(settings.data, settings.backup_to) else ""
-    yield Observation("backups", Level.OK, f"{last.path.name}, {hours:.1f} hours old, read whole{beside}")
-
-
-def _on_one_disk(*folders: Path) -> bool:
-    return len({folder.stat().st_dev for folder in folders if folder.is_dir()}) == 1
 
 
 def _of_clock(connection: Connection) -> Observation:

@@ -9,6 +9,7 @@ empty or gone, its disk is away: none is made in its place, also after a restart
 
 import fcntl
 import logging
+import math
 import os
 import re
 import threading
@@ -30,7 +31,7 @@ logger = logging.getLogger("underskin")
 
 _PREFIX, _STAMP = "underskin-", "%Y%m%dT%H%M%SZ"
 _NAME = re.compile(rf"{_PREFIX}(\d{{8}}T\d{{6}}Z)\.(?:sqlite3|pgdump)")
-_SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
+SKEW_S = 60.0  # by which clocks of machines that share a folder may differ
 _SMALLER = 0.5  # of the largest one's bytes: it is not the same store, or most of it is gone
 _LOCK = ".underskin-backup-lock"
 OWNER = ".underskin-backups-of"  # holds the identity of the store whose folder it is
@@ -40,7 +41,10 @@ _RETRY_S = 600.0  # after a failure
 _JOIN_S = 30.0
 _HOUR_S = 3600.0
 
-_AGE = Gauge("underskin_backup_age_seconds", "Age of the newest scheduled backup; NaN where there is none.")
+_AGE = Gauge(
+    "underskin_backup_age_seconds",
+    "Age of the newest scheduled backup; +Inf where there is none, NaN where the server makes none.",
+)
 _AGE.set(float("nan"))
 _BYTES = Gauge("underskin_backup_bytes", "Size of the newest scheduled backup.")
 _made = Counter("underskin_backups", "Scheduled backups that were written and read back.")
@@ -73,7 +77,7 @@ def kept(folder: Path) -> list[Kept]:
 
 def newest(folder: Path) -> Kept | None:
     """The newest one that is not of the future: what a wrong clock dated ahead makes none superfluous."""
-    return next((entry for entry in kept(folder) if entry.age_s > -_SKEW_S), None)
+    return next((entry for entry in kept(folder) if entry.age_s > -SKEW_S), None)
 
 
 def foreign(store: Database, folder: Path) -> str:
@@ -108,15 +112,14 @@ class ScheduledBackups:
         self._seen_bytes = 0
 
     @property
-    def folder(self) -> Path:
-        """Where they are."""
-        return self._folder
+    def last(self) -> Kept | None:
+        """The newest of this store, as of the last look: this waits for no disk."""
+        return self._seen
 
     @property
     def overdue(self) -> bool:
         """Whether the newest is older than twice the time between two, or there is none of this store."""
-        last = self._newest()
-        return last is None or last.age_s > 2 * self._every_s
+        return self._age_s() > 2 * self._every_s
 
     def start(self) -> None:
         """Make the first one now if one is due."""
@@ -204,7 +207,7 @@ class ScheduledBackups:
 
     def _rotate(self, size: int) -> None:
         """Delete the oldest, but none while the one just made, of so many bytes, is far smaller than the largest."""
-        entries = [entry for entry in kept(self._folder) if entry.age_s > -_SKEW_S]
+        entries = [entry for entry in kept(self._folder) if entry.age_s > -SKEW_S]
         largest = max(entry.path.stat().st_size for entry in entries)
         if size < _SMALLER * largest:
             logger.warning(
@@ -216,7 +219,7 @@ class ScheduledBackups:
             old.path.unlink()
 
     def _age_s(self) -> float:
-        return float("nan") if self._seen is None else self._seen.age_s
+        return math.inf if self._seen is None else self._seen.age_s
 
     def _size(self) -> float:
         return self._seen_bytes

@@ -32,7 +32,7 @@ def login(request: Request, sent: Form) -> Response:
     """Starts a session."""
     access: AccessControl = request.app.state.access
     throttle: LoginThrottle = request.app.state.login_throttle
-    address = client_address(request)
+    address = client_address(request, request.app.state.proxies)
     wait_s = throttle.begin(network_of(address))
     if wait_s:
         seconds = math.ceil(wait_s)

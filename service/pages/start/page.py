@@ -16,7 +16,7 @@ from service.pages.start.sparkline import sparkline
 from service.problems import Refusal
 from service.store import Database, overview
 from service.usecases import mechanism_catalogue
-from service.usecases.scheduled_backups import ScheduledBackups, newest
+from service.usecases.scheduled_backups import ScheduledBackups
 from underskin.surrogate.sigma_table import SigmaTable
 
 router = APIRouter()
@@ -80,5 +80,5 @@ def _backups(request: Request) -> dict[str, Any] | None:
     backups: ScheduledBackups | None = request.app.state.backups
     if backups is None:
         return None
-    last = newest(backups.folder)
-    return {"last": None if last is None else last.made_at.isoformat(), "overdue": backups.overdue}
+    made_at = None if backups.last is None else backups.last.made_at.isoformat()
+    return {"last": made_at, "overdue": backups.overdue}

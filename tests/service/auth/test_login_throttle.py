@@ -7,10 +7,12 @@ from pathlib import Path
 
 import httpx
 import pytest
+from starlette.requests import Request
 
-from service.auth.client_address import network_of
+from service.auth.client_address import client_address, network_of
 from service.auth.keys import KeyStore
 from service.auth.login_throttle import AT_ONCE, SECONDS, LoginThrottle
+from service.settings import Settings
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.server import running
 
@@ -79,6 +81,21 @@ def test_addresses_behind_a_proxy_on_this_machine_are_told_apart(guarded: tuple[
     assert tried(url, key, "2001:db8:0:1::1").status_code == 303
     assert tried(url, key, "198.51.100.7").status_code == 303
     assert tried(url, key, "nonsense").status_code == 303  # counts as the proxy itself
+
+
+def test_of_proxies_elsewhere_those_that_are_named_are_believed() -> None:
+    networks = Settings(proxies="172.16.0.0/12, 2001:db8:7::1").proxy_networks
+
+    def seen(peer: str, forwarded: str) -> str:
+        headers = [(b"x-forwarded-for", forwarded.encode())]
+        return client_address(Request({"type": "http", "client": (peer, 1), "headers": headers}), networks)
+
+    assert seen("172.18.0.1", "198.51.100.7") == "198.51.100.7"
+    assert seen("::ffff:172.18.0.1", "203.0.113.9, 198.51.100.7") == "198.51.100.7"
+    assert seen("2001:db8:7::1", "198.51.100.7") == "198.51.100.7"
+    assert seen("127.0.0.1", "198.51.100.7") == "198.51.100.7"
+    assert seen("172.32.0.1", "198.51.100.7") == "172.32.0.1"
+    assert seen("2001:db8:7::2", "198.51.100.7") == "2001:db8:7::2"
 
 
 def test_addresses_of_ipv4_are_told_apart_on_a_socket_of_ipv6() -> None:

@@ -182,7 +182,7 @@ def test_a_made_up_cookie_logs_nobody_in(keyed: tuple[Server, dict[str, str]]) -
     """Times that are no numbers or have thousands of digits, signatures beyond ASCII, and what is no cookie of ours."""
     address = str(keyed[0].http.base_url).rstrip("/")
     for made_up in (f"a.b.{'9' * 5000}.c", "a.b.²³.c", "a..9999999999.é", "a.b.9999999999.", "...", "é", ""):
-        cookie = {"Cookie": f"{COOKIE}={made_up}".encode("latin-1")}
+        cookie = {b"Cookie": f"{COOKIE}={made_up}".encode("latin-1")}
         for path, status in (("/v1/skins", 401), ("/login", 200)):
             assert httpx.get(f"{address}{path}", headers=cookie).status_code == status, made_up[:20]
 

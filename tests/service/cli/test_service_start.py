@@ -89,6 +89,8 @@ def test_keys_that_cannot_be_read_end_the_start(tmp_path: Path) -> None:
         ("UNDERSKIN_DATA", "~nobody-of-this-name/data", "home directory"),
         ("UNDERSKIN_HOSTS", "skin.example.org:8743", "without scheme, port and path"),
         ("UNDERSKIN_HOSTS", "localhost, https://skin.example.org", "without scheme, port and path"),
+        ("UNDERSKIN_PROXIES", "172.16.0.0/12, 10.0.0.1/8", "10.0.0.1/8 has host bits set"),
+        ("UNDERSKIN_PROXIES", "gateway", "allowed: 192.0.2.7 or 192.0.2.0/24"),
         ("UNDERSKIN_TIME_ZONE", "Mars/Base", "such as Europe/Rome"),
     ],
 )

@@ -2,10 +2,15 @@
 
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from service.settings import Settings
+from service.usecases.checkup import examine
+from service.usecases.observation import Level
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
 from tests.support.diagnosed import sent
 from tests.support.store_server import Place, campaign, running
@@ -112,6 +117,38 @@ def test_the_doctor_tells_a_store_that_is_gone_from_one_that_never_was(tmp_path:
     _, empty = doctor(place, **settings)
     for found in (without_backups, empty):
         assert (found["store"]["level"], "put underskin.sqlite3 back" in found["store"]["advice"]) == ("critical", True)
+
+
+def test_what_cannot_be_entered_is_a_finding_of_each_check(tmp_path: Path) -> None:
+    """As a data folder of another user, or a disk that does not answer."""
+    data, backups = tmp_path / "data", tmp_path / "backups"
+    with running(Place(data), **scheduled(backups)):
+        wait_for(backups, 1)
+    settings = Settings(data=data, backup_to=backups, diagnosis_workers=0)
+    assert Level.CRITICAL not in {one.level for one in examine(settings)}
+    with nobody(data, backups):
+        found = {one.check: one for one in examine(settings)}
+    for check in ("data folder", "store", "backups", "keys"):
+        assert found[check].level is Level.CRITICAL, check
+        assert "ermission denied" in found[check].found or "cannot be written to" in found[check].found
+        assert found[check].advice
+
+
+@contextmanager
+def nobody(*folders: Path) -> Iterator[None]:
+    """Folders that nobody may enter; root, who may enter all, is another user meanwhile."""
+    root = os.geteuid() == 0
+    for folder in folders:
+        folder.chmod(0)
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+        for folder in folders:
+            folder.chmod(0o700)
 
 
 def test_the_doctor_names_settings_that_nothing_reads(tmp_path: Path) -> None:

@@ -1,0 +1,37 @@
+"""A PostgreSQL server that is gone without a word: nobody waits for the system's limits, and all goes on afterwards."""
+
+import time
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.service.store.scheduled import NO_WORKERS
+from tests.support.own_network import own_network
+from tests.support.postgres import Cluster
+from tests.support.store_server import Place, campaign, running
+
+NOTICED_S = 90  # by the system's own limits it would be a quarter of an hour
+
+
+@pytest.mark.slow
+def test_it_is_noticed_and_taken_up_again(cluster: Cluster, tmp_path: Path) -> None:
+    with own_network(next(cluster.folder.glob(".s.PGSQL.*[0-9]"))) as network:
+        if network is None:
+            pytest.skip("no network of the test's own can be made here (it takes `ip netns` and the rights of root)")
+        with running(Place(tmp_path, network.url(cluster.new_database())), **NO_WORKERS) as server:
+            sent = server.http.post("/v1/campaigns", json=campaign("before"))
+            assert sent.status_code == 201
+            network.cut()
+            url = str(server.http.base_url)
+            for path in ("/ready", "/v1/campaigns"):
+                assert httpx.get(f"{url}{path}", timeout=NOTICED_S).status_code == 503, path
+            assert httpx.post(f"{url}/v1/campaigns", json=campaign("lost"), timeout=NOTICED_S).status_code == 503
+            network.mend()
+            deadline = time.monotonic() + 60
+            while httpx.get(f"{url}/ready", timeout=60).status_code != 200:
+                assert time.monotonic() < deadline
+                time.sleep(0.5)
+            assert server.http.post("/v1/campaigns", json=campaign("after")).status_code == 201
+            names = [entry["name"] for entry in server.http.get("/v1/campaigns").json()["campaigns"]]
+    assert sorted(names) == ["after", "before"]
