@@ -164,10 +164,14 @@ def _read(path: Path) -> tuple[Key, ...]:
 def _write(path: Path, keys: list[Key]) -> None:
     text = json.dumps({"keys": [asdict(key) for key in keys]}, indent=1)
     descriptor, partial = tempfile.mkstemp(dir=path.parent, prefix="keys-")  # mode 600
-    with os.fdopen(descriptor, "w") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
+    try:
+        with os.fdopen(descriptor, "w") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:  # a full disk
+        Path(partial).unlink()
+        raise
     durable.replace(Path(partial), path)
 
 

@@ -103,3 +103,12 @@ def require_kept(server: Server, acknowledged: dict[str, str]) -> None:
         sent = campaign(name, sensors=20, lines=100)
         sent["skin"]["d33_pc_per_n"] = None
         assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json() == sent
+
+
+def test_a_key_that_finds_no_room_leaves_no_digest_behind(small_disk: Path) -> None:
+    with suppress(OSError), (small_disk / "filling").open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+    with pytest.raises(OSError, match="No space"):
+        KeyStore(small_disk).create("lab", "read")
+    assert {path.name for path in small_disk.iterdir()} <= {"filling", "keys.lock"}
