@@ -4,21 +4,21 @@ A file's own name is kept as a label. It never becomes a path, and says nothing 
 """
 
 import fcntl
-import hashlib
 import math
 import shutil
 import tempfile
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 from fastapi import Request
 from python_multipart import MultipartParser
 from python_multipart.exceptions import FormParserError
 from python_multipart.multipart import parse_options_header
 
+from service.ingest.arriving_files import ArrivingFile, ArrivingFiles, DiskThreads
 from service.problems import Refusal
 from service.store import StorageFull, StoreMoved
 from service.store.engine import is_full
@@ -54,6 +54,11 @@ class Upload:
         return self.start(most).decode("utf-8", "replace").strip()
 
 
+def texts(fields: Iterable[Upload], most: int) -> dict[str, str]:
+    """What fields of a form say, by name, each up to so many bytes."""
+    return {one.field or "": one.text(most) for one in fields}
+
+
 class UploadFolder:
     """This server's folder of uploads under way; what servers that were killed left behind is removed."""
 
@@ -68,6 +73,7 @@ class UploadFolder:
             self.path = Path(tempfile.mkdtemp(dir=parent))
             self._in_use = (self.path / ".lock").open("w")  # held as long as the process lives
             fcntl.flock(self._in_use, fcntl.LOCK_EX)
+        self.threads = DiskThreads()
 
     def close(self) -> None:
         """Remove the folder."""
@@ -91,14 +97,16 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
     Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
     besides the limit of all uploads (413), StorageFull where the disk is full.
     """
-    with disk_errors_said(parent), tempfile.TemporaryDirectory(dir=parent.path) as folder:
-        content_type, options = parse_options_header(request.headers.get("content-type", ""))
-        if content_type == b"application/x-www-form-urlencoded":
-            raise Refusal(415, "Files come as they are (application/octet-stream) or as a form of multipart/form-data.")
-        if content_type == b"multipart/form-data":
-            yield await _parts(_body(request, most_bytes), Path(folder), options.get(b"boundary", b""))
-        else:
-            yield [await _whole(_body(request, most_bytes), Path(folder))]
+    with disk_errors_said(parent):
+        async with ArrivingFiles.below(parent.path, parent.threads) as files:
+            content_type, options = parse_options_header(request.headers.get("content-type", ""))
+            if content_type == b"application/x-www-form-urlencoded":
+                must = "Files come as they are (application/octet-stream) or as a form of multipart/form-data."
+                raise Refusal(415, must)
+            if content_type == b"multipart/form-data":
+                yield await _take_parts(_body(request, most_bytes), files, options.get(b"boundary", b""))
+            else:
+                yield [await _take_whole(_body(request, most_bytes), files)]
 
 
 @contextmanager
@@ -126,61 +134,50 @@ async def _body(request: Request, most_bytes: float) -> AsyncIterator[bytes]:
         yield chunk
 
 
-async def _whole(body: AsyncIterator[bytes], folder: Path) -> Upload:
-    part = _FormPart(folder / "0")
-    try:
-        async for chunk in body:
-            part.write(chunk)
-    finally:
-        part.close()
-    return part.upload(in_form=False)
+async def _take_whole(body: AsyncIterator[bytes], files: ArrivingFiles) -> Upload:
+    file = files.begin()
+    async for chunk in body:
+        files.take(chunk)
+        await files.write_much()
+    files.end()
+    await files.write()
+    return Upload(file.path, None, None, file.sha256, in_form=False)
 
 
-async def _parts(body: AsyncIterator[bytes], folder: Path, boundary: bytes) -> list[Upload]:
-    form = _Form(folder)
+async def _take_parts(body: AsyncIterator[bytes], files: ArrivingFiles, boundary: bytes) -> list[Upload]:
+    form = _Form(files)
     try:
         parser = MultipartParser(boundary, form.callbacks())
         async for chunk in body:
             parser.write(chunk)
+            await files.write_much()
         parser.finalize()
     except FormParserError as error:  # of the boundary, too
         raise Refusal(400, f"The multipart form cannot be read: {error}.") from None
-    finally:
-        form.close()
     if not form.ended:
         raise Refusal(400, "The multipart form ends in the middle of a part.")
-    return [part.upload(in_form=True) for part in form.parts]
+    await files.write()
+    return [part.upload() for part in form.parts]
 
 
 @dataclass
 class _FormPart:
-    """A file under way."""
+    """A part under way."""
 
-    path: Path
+    file: ArrivingFile
     headers: dict[bytes, bytes] = field(default_factory=dict)
 
-    def __post_init__(self) -> None:
-        self._file: BinaryIO = self.path.open("xb")
-        self._digest = hashlib.sha256()
-
-    def write(self, data: bytes) -> None:
-        self._file.write(data)
-        self._digest.update(data)
-
-    def close(self) -> None:
-        self._file.close()
-
-    def upload(self, *, in_form: bool) -> Upload:
+    def upload(self) -> Upload:
         _, options = parse_options_header(self.headers.get(b"content-disposition", b""))
         label, name = options.get(b"filename"), options.get(b"name")
-        return Upload(self.path, _text(label), _text(name), self._digest.hexdigest(), in_form)
+        return Upload(self.file.path, _text(label), _text(name), self.file.sha256, in_form=True)
 
 
 class _Form:
     """Takes the parser's callbacks: a part's headers, then its data."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, files: ArrivingFiles) -> None:
+        self._files = files
         self._name = b""
         self._value = b""
         self.parts: list[_FormPart] = []
@@ -194,18 +191,14 @@ class _Form:
             "on_header_value": self._header_value,
             "on_header_end": self._header_end,
             "on_part_data": self._data,
-            "on_part_end": self._end,
+            "on_part_end": self._files.end,
             "on_end": self._finish,
         }
-
-    def close(self) -> None:
-        for part in self.parts:
-            part.close()
 
     def _begin(self) -> None:
         if len(self.parts) == _MOST_PARTS:
             raise Refusal(413, f"The form has more than {_MOST_PARTS} parts; send fewer files a request.")
-        self.parts.append(_FormPart(self._folder / str(len(self.parts))))
+        self.parts.append(_FormPart(self._files.begin()))
 
     def _header_field(self, data: bytes, start: int, end: int) -> None:
         self._name = _short(self._name + data[start:end])
@@ -218,10 +211,7 @@ class _Form:
         self._name = self._value = b""
 
     def _data(self, data: bytes, start: int, end: int) -> None:
-        self.parts[-1].write(data[start:end])
-
-    def _end(self) -> None:
-        self.parts[-1].close()
+        self._files.take(memoryview(data)[start:end])
 
     def _finish(self) -> None:
         self.ended = True

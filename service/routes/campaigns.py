@@ -120,9 +120,9 @@ async def post(
     One campaign is answered with its own entry, a form or a list with one entry a campaign: one in all where they go
     `together`.
     """
-    settings = request.app.state.settings
-    async with received(request, request.app.state.uploads) as parts, keeping(store):
-        fields, uploads = split(parts, list(models.SendOptions.model_fields), [RIG])
+    settings, folder = request.app.state.settings, request.app.state.uploads
+    async with received(request, folder) as parts, keeping(store):
+        fields, uploads = await folder.threads.run(partial(split, parts, list(models.SendOptions.model_fields), [RIG]))
         options = IngestOptions(
             **query.with_form(fields).model_dump(),
             idempotency_key=idempotency_key,

@@ -57,8 +57,9 @@ def _exported(store: Database, folder: UploadFolder, skin_id: str) -> MadeFile:
 )
 async def import_skin(request: Request, store: Store) -> Imported:
     """To the same state; what is here already must be the same, and is left. After a failure, send the file again."""
-    async with received(request, request.app.state.uploads) as parts:
-        _, uploads = split(parts)
+    folder: UploadFolder = request.app.state.uploads
+    async with received(request, folder) as parts:
+        _, uploads = await folder.threads.run(partial(split, parts))
         if len(uploads) != 1:
             raise Refusal(422, f"One file is imported at a time, not {len(uploads)}.")
         async with skin_imports.one:

@@ -5,6 +5,7 @@ Nothing of it is kept: the map stays in the page's form, and what the page saves
 
 import base64
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import Store
 from service.ingest.reading import READING_SLOTS
-from service.ingest.uploads import received
+from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.array import description
 from service.pages.shared import same_request
 from service.pages.shared.figures import Drawn, drawn
@@ -48,13 +49,15 @@ def view(request: Request, store: Store, skin: str | None = None) -> Response:
 @router.post("")
 async def send(request: Request, store: Store) -> Response:
     """With the map that was sent as a file, or else as text."""
-    async with received(request, request.app.state.uploads, _LARGEST_BODY_BYTES) as sent:
-        given = {one.field or "": one.text(_LONGEST_FIELD) for one in sent if one.field not in (_MAP, _FILE)}
+    folder: UploadFolder = request.app.state.uploads
+    async with received(request, folder, _LARGEST_BODY_BYTES) as sent:
+        fields = [one for one in sent if one.field not in (_MAP, _FILE)]
+        given = await folder.threads.run(partial(texts, fields, _LONGEST_FIELD))
         require_own(request, given.get(TOKEN, ""))
         file = next((one for one in sent if one.field == _FILE and one.label), None)
         typed = next((one for one in sent if one.field == _MAP), None)
         chosen = file or typed
-        content = b"" if chosen is None else chosen.start(_LARGEST_BYTES + 1)
+        content = b"" if chosen is None else await folder.threads.run(partial(chosen.start, _LARGEST_BYTES + 1))
     name = "the map" if file is None or not file.label else file.label
     async with READING_SLOTS:
         return await run_in_threadpool(_shown, request, store, given, content, name)

@@ -12,7 +12,7 @@ from service.dependencies import WRITE, Store, Table
 from service.ingest import field_words, rig_words, skin_imports
 from service.ingest.accept import RIG
 from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
-from service.ingest.uploads import received
+from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.shared import same_request
 from service.pages.shared.conditions import condition_columns
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
@@ -86,8 +86,10 @@ async def send(request: Request, store: Store) -> Response:
     """Takes files to be looked at; none is kept."""
     pending_uploads: PendingUploads = request.app.state.pending_uploads
     cookie = session.cookie_in(dict(request.scope["headers"]))
-    async with received(request, request.app.state.uploads) as sent:
-        fields = {one.field: one.text(_LONGEST_FIELD) for one in sent if one.label is None}
+    folder: UploadFolder = request.app.state.uploads
+    async with received(request, folder) as sent:
+        unlabelled = [one for one in sent if one.label is None]
+        fields = await folder.threads.run(partial(texts, unlabelled, _LONGEST_FIELD))
         require_own(request, fields.get(TOKEN, ""))
         given = [one for one in sent if one.label and one.field != RIG]
         rig = next((one for one in sent if one.field == RIG and one.label), None)
@@ -99,7 +101,7 @@ async def send(request: Request, store: Store) -> Response:
         said = fields.get(_ESTIMATOR)
         estimator = checked_estimator(_ESTIMATOR, said) if said else None
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
-        pending = pending_uploads.put(cookie, given)
+        pending = await folder.threads.run(partial(pending_uploads.put, cookie, given))
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
         await run_in_threadpool(take_rig, store, pending, rig)
     try:

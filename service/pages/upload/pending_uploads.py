@@ -10,6 +10,7 @@ import shutil
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -113,6 +114,7 @@ class PendingUploads:
         self._most_bytes = most_bytes
         self._lock = threading.Lock()
         self._held: dict[str, PendingUpload] = {}
+        self._remover = ThreadPoolExecutor(1, "removes-uploads")
 
     def put(self, cookie: str, sent: Sequence[Upload]) -> PendingUpload:
         """Take over the files of an upload; of a session that has too many the oldest goes, a discarded one first."""
@@ -123,16 +125,18 @@ class PendingUploads:
         size = sum(one.path.stat().st_size for one in files)
         added = PendingUpload(name, _digest(cookie), folder, files, size, time.monotonic())
         with self._lock:
-            for old in self._of_session(added.session)[_MOST_OF_SESSION - 1 :]:
-                self._remove(old)
-            self._sweep(size)
+            gone = self._of_session(added.session)[_MOST_OF_SESSION - 1 :]
+            for old in gone:
+                del self._held[old.id]
+            gone += self._swept(size)
             self._held[name] = added
+        wait(self._remove_files(gone))
         return added
 
     def find(self, cookie: str, name: str) -> PendingUpload:
         """The session's own; raises Missing where it is gone or another's."""
+        self._sweep()
         with self._lock:
-            self._sweep(0)
             upload = self._held.get(name)
             if upload is None or upload.session != _digest(cookie):
                 raise Missing(
@@ -151,8 +155,8 @@ class PendingUploads:
         return [held for held in self._not_kept(cookie) if held.discarded]
 
     def _not_kept(self, cookie: str) -> list[PendingUpload]:
+        self._sweep()
         with self._lock:
-            self._sweep(0)
             return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
 
     def empty(self, pending: PendingUpload) -> None:
@@ -163,25 +167,35 @@ class PendingUploads:
     def remove(self, pending: PendingUpload) -> None:
         """Remove it whole."""
         with self._lock:
-            self._remove(pending)
+            self._held.pop(pending.id, None)
+        self._remove_files([pending])
 
     def _of_session(self, session: str) -> list[PendingUpload]:
         own = [held for held in self._held.values() if held.session == session]
         return sorted(own, key=_worth, reverse=True)
 
-    def _sweep(self, coming: int) -> None:
-        """Remove what is too old, and what was discarded, then the oldest, until there is room."""
+    def _sweep(self) -> None:
+        """Remove what is too old."""
+        with self._lock:
+            gone = self._swept(0)
+        self._remove_files(gone)
+
+    def _swept(self, coming: int) -> list[PendingUpload]:
+        """What is too old, and what was discarded, then the oldest, until there is room: held no more, with its files
+        still there."""
+        gone = []
         by_age = sorted(self._held.values(), key=_worth)
         total = coming + sum(held.size for held in by_age)
         for held in by_age:
             too_old = time.monotonic() - held.used > LASTS_S
             if too_old or total > self._most_bytes or len(self._held) >= _MOST_KEPT:
                 total -= held.size
-                self._remove(held)
+                gone.append(self._held.pop(held.id))
+        return gone
 
-    def _remove(self, held: PendingUpload) -> None:
-        self._held.pop(held.id, None)
-        shutil.rmtree(held.folder, ignore_errors=True)
+    def _remove_files(self, gone: Sequence[PendingUpload]) -> list[Future[None]]:
+        """Each as soon as the disk does it, beside whoever asked."""
+        return [self._remover.submit(shutil.rmtree, upload.folder, ignore_errors=True) for upload in gone]
 
 
 def _worth(held: PendingUpload) -> tuple[bool, float]:

@@ -6,7 +6,6 @@ contents as they were synced last, or, since a disk may be ahead of what it was 
 sector by sector.
 """
 
-import functools
 import os
 import random
 import shutil
@@ -16,24 +15,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
+from tests.support import preloadable
 
 _SOURCE = Path(__file__).with_name("synced.c")
 _SECTOR = 512  # bytes that a disk writes whole
 
 Entries = dict[str, tuple[str, str]]  # of a folder: by name, the identity and the type, `d` or `f`
-
-
-@functools.cache
-def library() -> Path:
-    """The library, built for this run; skips the test where no C compiler is."""
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        pytest.skip("power cuts need a C compiler (Debian's package gcc)")
-    built = Path(tempfile.mkdtemp(prefix="underskin-power-")) / "synced.so"
-    built.parent.chmod(0o755)  # for PostgreSQL's user, too
-    subprocess.run([compiler, "-O1", "-shared", "-fPIC", "-o", str(built), str(_SOURCE), "-ldl"], check=True)
-    return built
 
 
 @contextmanager
@@ -98,7 +85,7 @@ class Disk:
         os.chown(lock, owner.st_uid, owner.st_gid)
 
     def _environment(self, to: Path) -> dict[str, str]:
-        return {"LD_PRELOAD": str(library()), "POWER_LIVE": str(self.folder), "POWER_DISK": str(to)}
+        return {"LD_PRELOAD": str(preloadable.built(_SOURCE)), "POWER_LIVE": str(self.folder), "POWER_DISK": str(to)}
 
     def _own(self) -> None:
         owner = self.folder.stat()

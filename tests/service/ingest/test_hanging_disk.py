@@ -1,0 +1,66 @@
+"""A disk that hangs under uploads keeps them waiting, and nobody else."""
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import httpx
+import orjson
+import pytest
+
+from tests.service.pages.forms import BROWSING, token_of
+from tests.support.hanging.disk import CALLS, HangingDisk
+from tests.support.store_server import Place, Server, campaign, running
+
+MANY = 140  # more than there are threads that answer requests
+FEW = 12  # more than there are threads for uploads
+PADDED_BYTES = 600_000  # two files of more are written before the second has come
+PROMPT_S = 2.0  # other tests run beside this one
+OTHERS = ("/health", "/ready", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6", "/v1/campaigns", "/upload")
+
+
+@pytest.fixture(scope="module")
+def disk(tmp_path_factory: pytest.TempPathFactory) -> HangingDisk:
+    folder = tmp_path_factory.mktemp("hanging")
+    return HangingDisk(folder / "data" / "uploads", folder)
+
+
+@pytest.fixture(scope="module")
+def hanging_server(disk: HangingDisk, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.getbasetemp() / "hanging0" / "data"
+    with running(Place(folder), **disk.environment) as server:
+        yield server
+
+
+def send_by_page(server: Server, number: int) -> int:
+    """As a browser does, in a session of its own."""
+    files = [("file", (name, orjson.dumps(campaign(name)) + b" " * PADDED_BYTES)) for name in ("a.json", "b.json")]
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as browser:
+        form = {"form_token": token_of(browser.get("/upload").text), "skin": f"by page {number}"}
+        return browser.post("/upload", data=form, files=files).status_code
+
+
+def send(server: Server, number: int) -> int:
+    return httpx.post(f"{server.http.base_url}/v1/campaigns", json=campaign(f"sent {number}"), timeout=60).status_code
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_others_are_answered_while_the_disk_of_uploads_hangs(
+    hanging_server: Server, disk: HangingDisk, call: str
+) -> None:
+    count = MANY if call == "writing" else FEW
+    with ThreadPoolExecutor(FEW + count) as pool:
+        with disk.hanging(call):
+            by_page = [pool.submit(send_by_page, hanging_server, number) for number in range(FEW)]
+            sent = [pool.submit(send, hanging_server, number) for number in range(count)]
+            end = time.monotonic() + 20
+            while not disk.waiting():
+                assert time.monotonic() < end, "nothing hangs"
+                time.sleep(0.05)
+            time.sleep(1.0)
+            for path in OTHERS:
+                began = time.monotonic()
+                assert hanging_server.http.get(path, timeout=10).status_code == 200
+                assert time.monotonic() - began < PROMPT_S, path
+        assert {one.result() for one in by_page} == {303}
+        assert {one.result() for one in sent} == {201}
