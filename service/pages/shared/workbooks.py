@@ -32,14 +32,20 @@ def add_to(router: APIRouter) -> None:
             router.add_api_route(own + XLSX, endpoint)
 
 
-def _as_workbook(endpoint: Callable[..., Response]) -> Callable[..., Awaitable[Response]]:
-    @functools.wraps(endpoint)
-    def made(*arguments: Any, **values: Any) -> Response:
-        table = endpoint(*arguments, **values)
-        assert isinstance(table, CsvAnswer)
-        return attachment(f"{table.name}{XLSX}", workbook(table.columns), _TYPE)
+def _as_workbook(endpoint: Callable[..., Any]) -> Callable[..., Awaitable[Response]]:
+    """An endpoint that waits for turns of its own has had them before the workbook is made of its table."""
 
-    return heavy_answers.each_in_turn(made)
+    @functools.wraps(endpoint)
+    async def made(*arguments: Any, **values: Any) -> Response:
+        if inspect.iscoroutinefunction(endpoint):
+            return await heavy_answers.in_turn(functools.partial(_of_table, await endpoint(*arguments, **values)))
+        return await heavy_answers.in_turn(lambda: _of_table(endpoint(*arguments, **values)))
+
+    return made
+
+
+def _of_table(table: CsvAnswer) -> Response:
+    return attachment(f"{table.name}{XLSX}", workbook(table.columns), _TYPE)
 
 
 def workbook(columns: Mapping[str, Sequence[Any]]) -> bytes:

@@ -1,12 +1,17 @@
 """What is downloaded of an upload that is not kept: its rig description, its channels, its FRFs."""
 
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
 import orjson
 from fastapi import APIRouter, Request, Response
 
-from service.pages.shared.figures import attachment, csv_answer
+from service.ingest.reading import InspectedFile
+from service.pages.shared.figures import CsvAnswer, attachment, csv_answer
 from service.pages.upload.figures import lines_columns, trace_columns
-from service.pages.upload.looking import looked
+from service.pages.upload.looking import in_turn, looked
 from service.pages.upload.of_session import Pending
+from service.pages.upload.pending_uploads import PendingUpload
 from service.store import Missing
 
 router = APIRouter(prefix="/upload")
@@ -22,12 +27,22 @@ def rig_json(pending: Pending) -> Response:
 
 
 @router.get("/{upload_id}/{file}/traces.csv")
-def traces_csv(request: Request, pending: Pending, file: int) -> Response:
+async def traces_csv(request: Request, pending: Pending, file: int) -> Response:
     """The channels of a file's first part."""
-    return csv_answer("traces", trace_columns(looked(request, pending, file)))
+    return await in_turn(_csv, "traces", trace_columns, request, pending, file)
 
 
 @router.get("/{upload_id}/{file}/frf.csv")
-def frf_csv(request: Request, pending: Pending, file: int) -> Response:
+async def frf_csv(request: Request, pending: Pending, file: int) -> Response:
     """The FRFs of a file."""
-    return csv_answer("frf", lines_columns(looked(request, pending, file)))
+    return await in_turn(_csv, "frf", lines_columns, request, pending, file)
+
+
+def _csv(
+    name: str,
+    columns: Callable[[InspectedFile], Mapping[str, Sequence[Any]]],
+    request: Request,
+    pending: PendingUpload,
+    file: int,
+) -> CsvAnswer:
+    return csv_answer(name, columns(looked(request, pending, file)))

@@ -1,15 +1,17 @@
 """Reading the files of an upload, as its rig description and its form say, and what they hold."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any, TypeVar
 
 from fastapi import Request
+from starlette.concurrency import run_in_threadpool
 
-from service.ingest.reading import InspectedFile, look, require_few
+from service.ingest.reading import READING_SLOTS, InspectedFile, look, require_few
 from service.pages.shared.figures import Drawn
 from service.pages.upload import course_figure
 from service.pages.upload.figures import figures
-from service.pages.upload.file_summary import ChannelSummary, FileSummary, seen
+from service.pages.upload.file_summary import ChannelSummary, FileSummary, RecordingSummary, listed, seen
 from service.pages.upload.keep import counts_pressing_negative, worth_knowing
 from service.pages.upload.mapping import CHOICES, mapped_file
 from service.pages.upload.pending_uploads import PendingUpload
@@ -17,7 +19,15 @@ from service.pages.upload.turned_curves import with_curves_turned
 from service.store import Missing
 from underskin.recordings.rig_mapping import MappedFile, has_channels
 
+_Result = TypeVar("_Result")
+
 _WORKBOOK, _OF_TEXT = "XLSX", ", separated by tabs, with decimal points"
+
+
+async def in_turn(work: Callable[..., _Result], *arguments: Any) -> _Result:
+    """What `work` gives, which reads files that are only looked at: two at once, the others wait without a thread."""
+    async with READING_SLOTS:
+        return await run_in_threadpool(work, *arguments)
 
 
 def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
@@ -63,10 +73,26 @@ def _look_at_all(request: Request, pending: PendingUpload) -> bool:
     return any(fits) or not fits
 
 
-def draw(request: Request, pending: PendingUpload, number: int) -> None:
-    """Draw the figures of a file, unless they are there."""
-    if number not in pending.drawn:
-        pending.draw(number, _figures(pending, number, looked(request, pending, number), pending.seen[number]))
+async def shown(
+    request: Request, pending: PendingUpload, number: int, first: int
+) -> tuple[list[Drawn], Sequence[RecordingSummary]]:
+    """The figures of a file, and a page of its recordings, from the one of number `first` on; the file is read where
+    they are not at hand."""
+    drawn = pending.drawn.get(number)
+    if drawn is not None and not first:
+        return drawn, pending.seen[number].listed
+    return await in_turn(_shown, request, pending, number, first)
+
+
+def _shown(
+    request: Request, pending: PendingUpload, number: int, first: int
+) -> tuple[list[Drawn], Sequence[RecordingSummary]]:
+    inspected = looked(request, pending, number)
+    drawn = pending.drawn.get(number)
+    if drawn is None:
+        drawn = _figures(pending, number, inspected, pending.seen[number])
+        pending.draw(number, drawn)
+    return drawn, listed(inspected, first) if first else pending.seen[number].listed
 
 
 def _figures(pending: PendingUpload, number: int, inspected: InspectedFile, summary: FileSummary) -> list[Drawn]:

@@ -1,6 +1,6 @@
 """Upload: files are read, shown channel by channel, and stored only on confirmation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Annotated, Any
 
@@ -11,10 +11,11 @@ from service.auth import session
 from service.dependencies import WRITE, Store, Table
 from service.ingest import field_words, rig_words, skin_imports
 from service.ingest.accept import RIG
-from service.ingest.reading import MOST_RECORDINGS, READING_SLOTS, keeping
+from service.ingest.reading import MOST_RECORDINGS, keeping
 from service.ingest.uploads import UploadFolder, received, texts
 from service.pages.shared import same_request
 from service.pages.shared.conditions import condition_columns
+from service.pages.shared.figures import Drawn
 from service.pages.shared.forms import OWN_FORM, TOKEN, Form, require_own, see
 from service.pages.shared.html import page
 from service.pages.upload import (
@@ -29,9 +30,9 @@ from service.pages.upload import (
     workbench,
 )
 from service.pages.upload import mapping as mappings
-from service.pages.upload.file_summary import MOST_LISTED, listed
+from service.pages.upload.file_summary import MOST_LISTED, RecordingSummary
 from service.pages.upload.keep import CORRECTS, SKIN_FIELD, field_errors, keep_good, skin_of, take_rig
-from service.pages.upload.looking import channels_of, draw, held_by_some, is_unsaid, look_at_all, looked, used_twice
+from service.pages.upload.looking import channels_of, held_by_some, in_turn, is_unsaid, look_at_all, shown, used_twice
 from service.pages.upload.of_session import Pending
 from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.store import Database, Missing, campaigns, skins
@@ -103,14 +104,13 @@ async def send(request: Request, store: Store) -> Response:
         skin = fields.get(SKIN_FIELD) or await run_in_threadpool(skin_of, store, corrects)
         pending = await folder.threads.run(partial(pending_uploads.put, cookie, given))
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
-        await run_in_threadpool(take_rig, store, pending, rig)
+        await in_turn(take_rig, store, pending, rig)
     try:
         if await run_in_threadpool(exported_skin.holds_skin, pending):
             async with skin_imports.one:
                 await run_in_threadpool(exported_skin.look, store, pending)
         else:
-            async with READING_SLOTS:
-                await run_in_threadpool(look_at_all, request, pending)
+            await in_turn(look_at_all, request, pending)
     except BaseException:
         pending_uploads.remove(pending)
         raise
@@ -118,7 +118,7 @@ async def send(request: Request, store: Store) -> Response:
 
 
 @router.get("/{upload_id}")
-def understood(
+async def understood(
     request: Request,
     pending: Pending,
     store: Store,
@@ -129,10 +129,21 @@ def understood(
     if pending.kept_at is not None:
         return see(pending.kept_at)
     if pending.skin_summary is not None:
-        return exported_skin.shown(request, pending)
+        return await run_in_threadpool(exported_skin.shown, request, pending)
     file = min(file, len(pending.files) - 1)
-    draw(request, pending, file)
-    recordings = listed(looked(request, pending, file), first) if first else pending.seen[file].listed
+    figures, recordings = await shown(request, pending, file, first)
+    return await run_in_threadpool(_understood, request, pending, store, file, first, figures, recordings)
+
+
+def _understood(
+    request: Request,
+    pending: PendingUpload,
+    store: Database,
+    file: int,
+    first: int,
+    figures: Sequence[Drawn],
+    recordings: Sequence[RecordingSummary],
+) -> Response:
     known = [row.id for row in store.read(skins.listed, None, None, _MOST_SKINS)]
     about = _latest(store, pending.skin or pending.seen[file].skin)
     channels = channels_of(pending)
@@ -149,7 +160,7 @@ def understood(
         file=pending.seen[file],
         groups=similar_errors.of_files(pending.seen),
         refusals=similar_errors.of_recordings(pending.seen[file]),
-        figures=pending.drawn[file],
+        figures=figures,
         good=good,
         refused=sum(len(one.refused) or len(one.errors) for one in pending.seen if not is_unsaid(pending, one)),
         unsaid=is_unsaid(pending, pending.seen[file]),
@@ -216,8 +227,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
         pending.rig, pending.draft, pending.rig_label = rig, None, "rig.json"  # as the page saves it
         pending.remembered = pending.lacking = None
         pending.turned &= not pending.is_depth_composed
-        async with READING_SLOTS:
-            await run_in_threadpool(look_at_all, request, pending)
+        await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
@@ -225,8 +235,7 @@ async def mapping(request: Request, sent: Form, pending: Pending) -> Response:
 async def use_template(request: Request, pending: Pending, store: Store) -> Response:
     """Reads the files as those of the same instrument were read before."""
     await run_in_threadpool(use_template_of, store, pending)
-    async with READING_SLOTS:
-        await run_in_threadpool(look_at_all, request, pending)
+    await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
@@ -234,8 +243,7 @@ async def use_template(request: Request, pending: Pending, store: Store) -> Resp
 async def start_afresh(request: Request, pending: Pending) -> Response:
     """Reads the files without what was said of earlier ones."""
     pending.start_afresh()
-    async with READING_SLOTS:
-        await run_in_threadpool(look_at_all, request, pending)
+    await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 
@@ -249,8 +257,7 @@ def use_template_of(store: Database, pending: PendingUpload) -> None:
 async def turn_signs(request: Request, sent: Form, pending: Pending) -> Response:
     """Reads the files again, curves that count pressing negative turned, or as they came."""
     pending.turned = sent.get("turned") == "yes" and not pending.is_depth_composed
-    async with READING_SLOTS:
-        await run_in_threadpool(look_at_all, request, pending)
+    await in_turn(look_at_all, request, pending)
     return see(f"/upload/{pending.id}")
 
 

@@ -1,0 +1,82 @@
+"""Files of an upload that are only looked at are read two at a time, however many ask, and others are answered."""
+
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+import pytest
+
+from tests.service.pages.forms import BROWSING, token_of
+from tests.support.store_server import Server, campaign
+
+BACKEND = "sqlite"
+FILES = 8  # of which the figures of six are kept
+PROMPT_S = 2.0  # other tests run beside this one
+READER = b"underskin.recordings.readers.sandbox"
+
+
+@pytest.fixture
+def upload(server: Server) -> Iterator[tuple[httpx.Client, str]]:
+    """The session of an upload of binary files, which are read in processes of their own, and its address."""
+    sent = server.http.post("/v1/campaigns", json=campaign("binary")).json()
+    content = server.http.get(f"/v1/campaigns/{sent['id']}/document?format=hdf5").content
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=120) as browser:
+        form = {"form_token": token_of(browser.get("/upload").text)}
+        files = [("file", (f"{number}.h5", content)) for number in range(FILES)]
+        yield browser, browser.post("/upload", data=form, files=files).headers["location"]
+
+
+def readers(server: int) -> int:
+    """How many processes of a server read files now."""
+    children = [child for file in Path(f"/proc/{server}/task").glob("*/children") for child in file.read_text().split()]
+    return sum(READER in command(child) for child in children)
+
+
+def command(process: str) -> bytes:
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:  # it has ended meanwhile
+        return b""
+
+
+@contextmanager
+def counted(server: int) -> Iterator[list[int]]:
+    """How many processes read files while the block lasts, again and again."""
+    counts: list[int] = []
+    ended = threading.Event()
+
+    def count() -> None:
+        while not ended.wait(0.005):
+            counts.append(readers(server))
+
+    counting = threading.Thread(target=count)
+    counting.start()
+    try:
+        yield counts
+    finally:
+        ended.set()
+        counting.join()
+
+
+@pytest.mark.parametrize("paths", [["?first=1"], ["/0/frf.csv", "/0/traces.csv"], ["/0/frf.xlsx"], ["?file={}"]])
+def test_two_files_at_a_time_are_read_to_be_looked_at(
+    server: Server, upload: tuple[httpx.Client, str], paths: list[str]
+) -> None:
+    browser, address = upload
+    wanted = [address + paths[number % len(paths)].format(number) for number in range(FILES)]
+
+    def get(path: str) -> int:
+        return browser.get(path).status_code
+
+    with counted(server.process.pid) as counts, ThreadPoolExecutor(FILES) as pool:
+        waiting = [pool.submit(get, path) for path in wanted]
+        time.sleep(0.3)
+        began = time.monotonic()
+        assert server.http.get("/upload").status_code == 200
+        assert time.monotonic() - began < PROMPT_S
+        assert {one.result() for one in waiting} == {200}
+    assert 1 <= max(counts) <= 2
