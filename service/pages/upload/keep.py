@@ -17,7 +17,7 @@ from service.ingest.reading import InspectedFile, checked, error_entry
 from service.ingest.uploads import Upload
 from service.pages.shared.forms import signed
 from service.pages.upload import stated_preload
-from service.pages.upload.pending_uploads import PendingUpload, Remembered
+from service.pages.upload.pending_uploads import PendingUpload, PendingUploads, Remembered
 from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
@@ -30,6 +30,7 @@ SKIN_FIELD, CORRECTS = "skin", "corrects"
 
 def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str], store: Database) -> list[str]:
     """The ids of what was kept; errors are shown on the upload's page. A second request stores nothing again."""
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
     with pending.lock:
         if pending.kept_at is not None or pending.is_stale:  # of which the page shows no button to keep it
             return []
@@ -54,14 +55,15 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 by_kept_rig=False,  # what the page showed is kept, and no more
                 signed=signed(request, sent) if pending.corrects is not None else None,
             )
-            answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
+            with pending_uploads.in_use(pending):
+                answer, _ = accept(store, [*pending.files, *_rig_upload(pending)], options)
         except (InvalidInput, Conflict, Missing, Refusal) as error:
             pending.refused = field_errors(error)
             return []
         stored = [result for result in answer["campaigns"] if result["id"] is not None]
         one = f"/campaigns/{stored[0]['id']}"
         pending.kept_at = one if len(stored) == 1 else f"/skins/{quote(stored[0]['skin_id'], safe='')}"
-        request.app.state.pending_uploads.empty(pending)
+        pending_uploads.empty(pending)
         return [result["id"] for result in stored]
 
 

@@ -14,7 +14,7 @@ from service.pages.upload.figures import figures
 from service.pages.upload.file_summary import ChannelSummary, FileSummary, RecordingSummary, listed, seen
 from service.pages.upload.keep import counts_pressing_negative, worth_knowing
 from service.pages.upload.mapping import CHOICES, mapped_file
-from service.pages.upload.pending_uploads import PendingUpload
+from service.pages.upload.pending_uploads import PendingUpload, PendingUploads
 from service.pages.upload.turned_curves import with_curves_turned
 from service.store import Missing
 from underskin.recordings.rig_mapping import MappedFile, has_channels
@@ -31,10 +31,12 @@ async def in_turn(work: Callable[..., _Result], *arguments: Any) -> _Result:
 
 
 def looked(request: Request, pending: PendingUpload, number: int) -> InspectedFile:
-    """One file, read; raises Missing where there is none of that number."""
+    """One file, read; raises Missing where there is none of that number, or no more."""
     if not 0 <= number < len(pending.files) or pending.kept_at is not None:
         raise Missing("There is no such file in this upload.")
-    inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
+    pending_uploads: PendingUploads = request.app.state.pending_uploads
+    with pending_uploads.in_use(pending):
+        inspected = look(pending.files[number], pending.rig, request.app.state.settings.max_body_bytes)
     campaigns = [one.with_estimator(pending.estimator) for one in inspected.campaigns]
     return replace(
         inspected, campaigns=[one.with_curves_turned() for one in campaigns] if pending.turned else campaigns

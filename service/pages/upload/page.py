@@ -106,11 +106,12 @@ async def send(request: Request, store: Store) -> Response:
         pending.skin, pending.corrects, pending.estimator = skin, corrects, estimator
         await in_turn(take_rig, store, pending, rig)
     try:
-        if await run_in_threadpool(exported_skin.holds_skin, pending):
-            async with skin_imports.one:
-                await run_in_threadpool(exported_skin.look, store, pending)
-        else:
-            await in_turn(look_at_all, request, pending)
+        with pending_uploads.in_use(pending):
+            if await run_in_threadpool(exported_skin.holds_skin, pending):
+                async with skin_imports.one:
+                    await run_in_threadpool(exported_skin.look, store, pending)
+            else:
+                await in_turn(look_at_all, request, pending)
     except BaseException:
         pending_uploads.remove(pending)
         raise

@@ -9,8 +9,9 @@ import secrets
 import shutil
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,10 @@ LASTS_S = 3600.0
 _MOST_KEPT = 50
 _MOST_OF_SESSION = 5
 _MOST_DRAWN = 6  # files whose figures are kept
+_GONE = (
+    "This upload is not here any more: an upload that is not kept goes after an hour, when room is needed for others, "
+    "or when the server is restarted. Nothing of it was kept; send it again."
+)
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,8 @@ class PendingUpload:
     turned: bool = False  # whether those were turned
     kept_at: str | None = None  # the page of what was kept
     discarded: bool = False  # it can be taken back while it is here
+    users: int = 0  # that read its files now
+    given_up: bool = False  # whether its files go as soon as nobody reads them
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     @property
@@ -139,10 +146,7 @@ class PendingUploads:
         with self._lock:
             upload = self._held.get(name)
             if upload is None or upload.session != _digest(cookie):
-                raise Missing(
-                    "This upload is not here any more: an upload that is not kept goes after an hour, when room is "
-                    "needed for others, or when the server is restarted. Nothing of it was kept; send it again."
-                )
+                raise Missing(_GONE)
             upload.used = time.monotonic()
             return upload
 
@@ -159,9 +163,25 @@ class PendingUploads:
         with self._lock:
             return [held for held in self._of_session(_digest(cookie)) if held.kept_at is None]
 
+    @contextmanager
+    def in_use(self, pending: PendingUpload) -> Iterator[None]:
+        """While its files are read: until then they stay, also where it is removed meanwhile. Raises Missing where they
+        are gone."""
+        with self._lock:
+            if pending.given_up and not pending.users:
+                raise Missing(_GONE if pending.kept_at is None else "There is no such file in this upload.")
+            pending.users += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                pending.users -= 1
+            if pending.given_up:
+                self._remove_files([pending])
+
     def empty(self, pending: PendingUpload) -> None:
         """Remove the files; the page that says where they went stays for a while."""
-        shutil.rmtree(pending.folder, ignore_errors=True)
+        self._remove_files([pending])
         pending.size = 0
 
     def remove(self, pending: PendingUpload) -> None:
@@ -194,8 +214,12 @@ class PendingUploads:
         return gone
 
     def _remove_files(self, gone: Sequence[PendingUpload]) -> list[Future[None]]:
-        """Each as soon as the disk does it, beside whoever asked."""
-        return [self._remover.submit(shutil.rmtree, upload.folder, ignore_errors=True) for upload in gone]
+        """Each as soon as the disk does it, beside whoever asked, or when nobody reads it any more."""
+        with self._lock:
+            for upload in gone:
+                upload.given_up = True
+            unused = [upload.folder for upload in gone if not upload.users]
+        return [self._remover.submit(shutil.rmtree, folder, ignore_errors=True) for folder in unused]
 
 
 def _worth(held: PendingUpload) -> tuple[bool, float]:

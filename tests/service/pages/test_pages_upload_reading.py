@@ -5,18 +5,17 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 
 import httpx
 import pytest
 
 from tests.service.pages.forms import BROWSING, token_of
+from tests.support.file_readers import readers
 from tests.support.store_server import Server, campaign
 
 BACKEND = "sqlite"
 FILES = 8  # of which the figures of six are kept
 PROMPT_S = 2.0  # other tests run beside this one
-READER = b"underskin.recordings.readers.sandbox"
 
 
 @pytest.fixture
@@ -28,19 +27,6 @@ def upload(server: Server) -> Iterator[tuple[httpx.Client, str]]:
         form = {"form_token": token_of(browser.get("/upload").text)}
         files = [("file", (f"{number}.h5", content)) for number in range(FILES)]
         yield browser, browser.post("/upload", data=form, files=files).headers["location"]
-
-
-def readers(server: int) -> int:
-    """How many processes of a server read files now."""
-    children = [child for file in Path(f"/proc/{server}/task").glob("*/children") for child in file.read_text().split()]
-    return sum(READER in command(child) for child in children)
-
-
-def command(process: str) -> bytes:
-    try:
-        return Path(f"/proc/{process}/cmdline").read_bytes()
-    except OSError:  # it has ended meanwhile
-        return b""
 
 
 @contextmanager
