@@ -9,9 +9,11 @@ from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from service import durable
+from underskin.recordings.readers.parsing_limits import ParsingLimits
 from underskin.surrogate.sigma_table import tables_folder
 
 _PREFIX = "UNDERSKIN_"
+_PLAIN_UNFOLDS = 4  # times: a number of two bytes, be it a digit and a comma, is kept in eight
 _READ_ELSEWHERE = tuple(  # by the library, commands and tests
     f"{_PREFIX}{name}"
     for name in (
@@ -144,6 +146,12 @@ class Settings(BaseSettings):
     def max_upload_bytes(self) -> int:
         """`max_upload_mb` in bytes."""
         return int(self.max_upload_mb * 1e6)
+
+    @property
+    def max_unfolded_bytes(self) -> int:
+        """What the files of one request may have in all when they are read: as much as any plain ones do, and any
+        single one may."""
+        return max(_PLAIN_UNFOLDS * self.max_upload_bytes, ParsingLimits.from_environment().memory_bytes)
 
     @property
     def host_names(self) -> frozenset[str]:

@@ -9,6 +9,7 @@ import orjson
 from sqlalchemy import Connection
 
 from service.ingest import instruments, repeats
+from service.ingest.held_arrays import HeldArrays
 from service.ingest.reading import CheckedCampaign, ReadCampaign, checked, joined, look, require_few
 from service.ingest.rig_words import said_of
 from service.ingest.uploads import Upload
@@ -40,6 +41,7 @@ class IngestOptions:
     idempotency_key: str | None
     sender: str | None
     most_json_bytes: int
+    most_unfolded_bytes: int
     estimator: Estimator | None = None
     turn_curves: bool = False  # that count pressing negative
     by_kept_rig: bool = True  # whether the rig description kept with the skin counts where none is sent
@@ -129,11 +131,13 @@ def _arrived(uploads: Sequence[Upload], rig: RigDescription | None, options: Ing
     """The campaigns of all files; one of them all where they go together."""
     files: list[ReadCampaign] = []
     recordings = 0
+    held = HeldArrays(options.most_unfolded_bytes)
     for upload in uploads:
         if upload.field != RIG:
             more = look(upload, rig, options.most_json_bytes).campaigns
             more = [one.with_curves_turned() for one in more] if options.turn_curves else more
             files += [one.with_estimator(options.estimator) for one in more]
+            held.add(more)
             recordings += sum(one.recordings for one in more)
             require_few(len(files), recordings)
     if options.together is None or not files:

@@ -128,6 +128,7 @@ async def post(
             idempotency_key=idempotency_key,
             sender=sender(request),
             most_json_bytes=settings.max_body_bytes,
+            most_unfolded_bytes=settings.max_unfolded_bytes,
         )
         answer, repeats = await run_in_threadpool(accept, store, uploads, options)
         kept = [result["id"] for result in answer.get("campaigns", [answer]) if result["id"] is not None]

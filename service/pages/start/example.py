@@ -28,9 +28,9 @@ async def load(request: Request, store: Store, table: Table) -> Response:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
     asked = f"the example skin, {withdrawn} withdrawn" if withdrawn else "the example skin"
-    options = IngestOptions(
-        SKIN, None, None, False, None, asked, sender(request), request.app.state.settings.max_body_bytes
-    )
+    settings = request.app.state.settings
+    most = settings.max_body_bytes, settings.max_unfolded_bytes
+    options = IngestOptions(SKIN, None, None, False, None, asked, sender(request), *most)
     answer, _ = await run_in_threadpool(accept, store, uploads, options)
     await run_in_threadpool(d33_cache.derive, store, table, [entry["id"] for entry in answer["campaigns"]])
     return see(f"/skins/{SKIN}")

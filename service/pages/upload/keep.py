@@ -39,7 +39,7 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
         pending.reason = sent.get("reason", "").strip()
         pending.who = sent.get("who", "").strip()
         reason = pending.reason or None if pending.corrects is not None else None
-        most = request.app.state.settings.max_body_bytes
+        settings = request.app.state.settings
         try:
             options = IngestOptions(
                 pending.skin,
@@ -49,7 +49,8 @@ def keep_good(request: Request, pending: PendingUpload, sent: Mapping[str, str],
                 together,
                 None,
                 sender(request),
-                most,
+                settings.max_body_bytes,
+                settings.max_unfolded_bytes,
                 pending.estimator,
                 turn_curves=pending.turned,
                 by_kept_rig=False,  # what the page showed is kept, and no more
