@@ -25,6 +25,7 @@ from service.problems import RETRY_LATER, Refusal, unexpected
 
 logger = logging.getLogger("underskin")
 
+WITHOUT_CONTENT = "without_content"  # in the scope of a request (HEAD) of whose answer only the headers are sent
 _NUMBERS = frozenset({int, float})
 _LONGEST_HELD = 8  # bodies as large as they may be that are held at once
 _MOST_HOT_BYTES = 10_000  # of a body that a hot route looks at, on the event loop
@@ -109,7 +110,8 @@ class AsgiMiddleware:
         method = scope["method"]
         hot = self._hot.get((method, scope["path"]))
         if method == "HEAD":
-            as_get = {**scope, "method": "GET"}  # a copy: by `scope` the server knows that it sends no body
+            # A copy: by `scope` the server knows that it sends no body.
+            as_get = {**scope, "method": "GET", WITHOUT_CONTENT: True}
             await self._api(as_get, receive, exchange.send)
             scope["route"] = as_get.get("route")
             return

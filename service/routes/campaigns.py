@@ -192,7 +192,7 @@ def document(
     if file_format == "json":
         return StreamingResponse(usecase.json_parts(store, row), media_type="application/json")
     return made_file(
-        request.app.state.uploads,
+        request,
         f"{row.id}.h5",
         "application/x-hdf5",
         partial(usecase.write_hdf5, store, row),

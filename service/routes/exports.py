@@ -4,14 +4,14 @@ import asyncio
 from functools import partial
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.form_fields import split
 from service.ingest.skin_imports import Imported
-from service.ingest.uploads import UploadFolder, received
+from service.ingest.uploads import received
 from service.problems import Refusal
 from service.routes.temporary_files import MadeFile, made_file
 from service.store import Database, skins
@@ -32,18 +32,18 @@ _FILE: dict[str, Any] = {"content": {_MEDIA_TYPE: {"schema": {"type": "string", 
     response_class=MadeFile,
     responses={200: _FILE},
 )
-async def export_skin(skin_id: SkinId, request: Request, store: Store) -> MadeFile:
+async def export_skin(skin_id: SkinId, request: Request, store: Store) -> Response:
     """One HDF5 file (`skin-export/1`) with its campaigns in every state, those of skins joined to it, its rigs,
     diagnoses that have ended and models.
     """
     async with _AT_ONCE:
-        return await run_in_threadpool(_exported, store, request.app.state.uploads, skin_id)
+        return await run_in_threadpool(_exported, store, request, skin_id)
 
 
-def _exported(store: Database, folder: UploadFolder, skin_id: str) -> MadeFile:
+def _exported(store: Database, request: Request, skin_id: str) -> Response:
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
-        return made_file(folder, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
+        return made_file(request, f"{root}.h5", _MEDIA_TYPE, partial(export, connection, root))
 
 
 @router.post(

@@ -5,10 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import anyio
+from fastapi import Request, Response
 from fastapi.responses import FileResponse
 from starlette.types import Receive, Scope, Send
 
 from service.ingest.uploads import UploadFolder, disk_errors_said
+from service.middleware.asgi_middleware import WITHOUT_CONTENT
 
 
 class MadeFile(FileResponse):
@@ -28,11 +30,17 @@ class MadeFile(FileResponse):
                 await anyio.to_thread.run_sync(Path(self.path).unlink)
 
 
-def made_file(folder: UploadFolder, name: str, media_type: str, write: Callable[[Path], object]) -> MadeFile:
-    """The answer that sends what `write` wrote.
+def made_file(request: Request, name: str, media_type: str, write: Callable[[Path], object]) -> Response:
+    """The answer that sends what `write` wrote; nothing is written where only its headers are sent.
 
     Raises StorageFull where the disk is full, StoreMoved where the folder is gone.
     """
+    if WITHOUT_CONTENT in request.scope:
+        headers = FileResponse("", media_type=media_type, filename=name).headers
+        answer = Response(headers=headers)
+        del answer.headers["Content-Length"]  # as long as nothing is written, nobody knows it
+        return answer
+    folder: UploadFolder = request.app.state.uploads
     with disk_errors_said(folder):
         with tempfile.NamedTemporaryFile(dir=folder.path, delete=False) as file:
             path = Path(file.name)

@@ -64,3 +64,18 @@ def test_others_are_answered_while_the_disk_of_uploads_hangs(
                 assert time.monotonic() - began < PROMPT_S, path
         assert {one.result() for one in by_page} == {303}
         assert {one.result() for one in sent} == {201}
+
+
+def test_the_headers_of_an_export_are_answered_without_making_it(hanging_server: Server, disk: HangingDisk) -> None:
+    http = hanging_server.http
+    sent = http.post("/v1/campaigns?skin=exported", json=campaign("exported")).json()
+    for path in ("/v1/skins/exported/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):
+        whole = http.get(path)
+        with disk.hanging("making a file"):
+            head = http.head(path, timeout=10)
+            assert not disk.waiting()
+        assert (head.status_code, head.content) == (200, b"")
+        for name in ("Content-Type", "Content-Disposition"):
+            assert head.headers[name] == whole.headers[name]
+        assert "Content-Length" not in head.headers
+    assert http.head("/v1/skins/unknown/export").status_code == 404
