@@ -1,4 +1,4 @@
-"""Memory of a process and of all below it."""
+"""Memory of a process and of all below it, and the processes that it has started."""
 
 from pathlib import Path
 
@@ -8,12 +8,17 @@ def family_mb(process: int) -> float:
     return sum(map(_own_part_mb, _family(process)))
 
 
+def children(process: int) -> list[int]:
+    """The processes that a process has started and that have not ended."""
+    try:
+        tasks = list(Path(f"/proc/{process}/task").iterdir())
+    except OSError:  # it has ended meanwhile
+        return []
+    return [int(child) for task in tasks for child in _text(task / "children").split()]
+
+
 def _family(process: int) -> list[int]:
-    found = [process]
-    for children in Path(f"/proc/{process}/task").glob("*/children"):
-        for child in _text(children).split():
-            found += _family(int(child))
-    return found
+    return [process, *(one for child in children(process) for one in _family(child))]
 
 
 def _own_part_mb(process: int) -> float:
