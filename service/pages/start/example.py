@@ -23,7 +23,7 @@ _FOLDER = Path(__file__).parent / "example"
 @router.post("/example", dependencies=[*WRITE, OWN_FORM])
 async def load(request: Request, store: Store, table: Table) -> Response:
     """Keeps the example's campaigns, once however often it is asked for; afresh where all were withdrawn."""
-    withdrawn = store.read(_withdrawn)
+    withdrawn = await run_in_threadpool(store.read, _withdrawn)
     if withdrawn is None:
         return see(f"/skins/{SKIN}")
     uploads = [_upload(file) for file in sorted(_FOLDER.glob("*.json"))]
