@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import orjson
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from service.schemas.campaigns import RecordingResult
 from service.schemas.changes import Action
-from service.store import codec
+from service.store import codec, times
 from service.store.skins import require_usable
 from underskin.errors import conflicting, unreadable
 from underskin.recordings import rig_description, validation
@@ -23,7 +23,8 @@ Text = Annotated[str, StringConstraints(max_length=1000, pattern=r"^[^\x00]*$")]
 CampaignId = Annotated[str, StringConstraints(pattern=r"^c-[0-9a-f]{16}$")]
 ChangeId = Annotated[str, StringConstraints(pattern=r"^ch-[0-9a-f]{16}$")]
 Remark = Annotated[str, StringConstraints(max_length=10_000, pattern=r"^[^\x00]*$")]
-Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$")]
+_TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{6}Z$"
+Time = Annotated[str, StringConstraints(pattern=_TIME), AfterValidator(times.checked)]
 
 
 NEWER = (  # columns that files of older versions lack

@@ -192,6 +192,7 @@ SPOILT = {
     "another skin": _edited(ABOUT, skin_id="elsewhere"),
     "half withdrawn": _edited(ABOUT, withdraw_reason="fell down"),
     "exclusion": _edited("campaigns/{last}/recordings", excluded_at="yesterday"),
+    "no such day": _edited("skins", created_at="2017-02-30T09:00:00.000000Z"),
     "dots": _rename_all,
     "another root": _edited("skins", root_id="finger"),
     "campaign to another skin": _changed(action="annotate", campaign_id="{last}", before={"skin_id": "finger"}),
