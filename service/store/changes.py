@@ -7,12 +7,12 @@ import secrets
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sqlalchemy import Connection, insert, select
+from sqlalchemy import Connection, func, insert, select
 
 from service.schemas.changes import Action
+from service.store import moments
 from service.store.errors import Missing
 from service.store.tables import AnyRow, changes, skins
-from service.store.times import now
 
 
 def record(
@@ -35,7 +35,7 @@ def record(
         "skin_id": skin_id,
         "campaign_id": campaign_id,
         "recording": recording,
-        "at": now(),
+        "at": moments.next_of(connection, [skin_id]),
         "made_from": made_from,
         "reason": reason,
         "before": dict(before or {}),
@@ -64,3 +64,10 @@ def of_skin(connection: Connection, root: str) -> Sequence[AnyRow]:
     own = select(skins.c.id).where(skins.c.root_id == root)
     query = select(changes).where(changes.c.skin_id.in_(own), changes.c.campaign_id.is_(None))
     return connection.execute(query.order_by(changes.c.number.desc())).all()
+
+
+def order_of_exclusions(connection: Connection, campaign_id: str) -> dict[str, int]:
+    """The number of the change that excluded each recording of a campaign last, by the recording's id."""
+    excluding = (changes.c.campaign_id == campaign_id) & (changes.c.action == "exclude")
+    query = select(changes.c.recording, func.max(changes.c.number).label("number")).where(excluding)
+    return {row.recording: row.number for row in connection.execute(query.group_by(changes.c.recording))}

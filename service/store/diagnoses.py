@@ -6,7 +6,7 @@ is taken for dead, and the diagnosis is claimed again, by the same server after 
 
 import json
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from sqlalchemy import ColumnElement, Connection, Select, insert, select, text, 
 
 from service.schemas.diagnoses import DiagnosisKind, State
 from service.store import campaigns as kept_campaigns
-from service.store import diagnosed_together, skins
+from service.store import changes, diagnosed_together, moments, skins
 from service.store.campaigns import Excluded
 from service.store.codec import compressed, decompressed
 from service.store.diagnosed_together import Member, Together
@@ -78,7 +78,7 @@ def ask(
         raise Conflict(f"Campaign {campaign_id!r} is not diagnosed: it was {why}.")
     wanted = {"campaign": campaign.number, "excluded": campaign.excluded, "kind": "campaign", "together_sha256": ""}
     wanted |= _basis(basis, without)
-    return _same(connection, wanted) or _queued(connection, {**wanted, "asked_from": asked_from})
+    return _same(connection, wanted) or _queued(connection, [campaign.skin_id], {**wanted, "asked_from": asked_from})
 
 
 def ask_together(
@@ -96,7 +96,8 @@ def ask_together(
     same = _same(connection, wanted)
     if same is not None:
         return same
-    row = _queued(connection, {**wanted, "asked_from": asked_from})
+    of_skins = {member.skin_id for member in together.members}
+    row = _queued(connection, of_skins, {**wanted, "asked_from": asked_from})
     diagnosed_together.keep(connection, row.number, together)
     return find(connection, row.id)
 
@@ -111,10 +112,10 @@ def _same(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow | None:
     return connection.execute(rows().where(*same, diagnoses.c.state.in_(_USABLE)).order_by(diagnoses.c.number)).first()
 
 
-def _queued(connection: Connection, wanted: Mapping[str, Any]) -> AnyRow:
-    """A new one."""
+def _queued(connection: Connection, skin_ids: Collection[str], wanted: Mapping[str, Any]) -> AnyRow:
+    """A new one, of campaigns of these skins."""
     diagnosis_id = f"d-{secrets.token_hex(8)}"
-    asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": now()}
+    asked = {"id": diagnosis_id, "state": "queued", "progress": 0.0, "asked_at": moments.next_of(connection, skin_ids)}
     connection.execute(insert(diagnoses), {**wanted, **asked})
     return find(connection, diagnosis_id)
 
@@ -253,7 +254,9 @@ def as_asked(connection: Connection, member: Member) -> tuple[Campaign, list[Exc
     """A campaign as it was when its diagnosis was asked for, and what had been excluded from it by then."""
     whole = kept_campaigns.load(connection, kept_campaigns.find(connection, member.campaign_id))
     excluded = kept_campaigns.excluded_of(connection, member.number)
-    excluded = sorted(excluded, key=lambda left: left.at)[: member.excluded]
+    order = changes.order_of_exclusions(connection, member.campaign_id)
+    # one without a change was made by an earlier underskin, before all others
+    excluded = sorted(excluded, key=lambda left: (order.get(left.recording, 0), left.at))[: member.excluded]
     names = {left.recording for left in excluded}
     return replace(whole, recordings=tuple(entry for entry in whole.recordings if entry.id not in names)), excluded
 

@@ -115,10 +115,10 @@ def join(connection: Connection, skin_id: str, other: str, reason: str, joined_f
         bring_back(connection, root)
     counted = list(connection.execute(members(other)).scalars())
     before = {"skin_id": other, "members": counted}
-    changes.record(connection, "join", skin_id, joined_from, reason=reason, before=before)
     connection.execute(update(skins).where(skins.c.root_id == other).values(root_id=skin_id))
     joined = {"joined_to": skin_id, "joined_at": now(), "join_reason": reason, "joined_from": joined_from}
     connection.execute(update(skins).where(skins.c.id == other).values(**joined))
+    changes.record(connection, "join", skin_id, joined_from, reason=reason, before=before)
 
 
 def lock(connection: Connection, ids: Sequence[str]) -> dict[str, AnyRow]:

@@ -170,9 +170,10 @@ sensor_d33 = Table(
     sqlite_with_rowid=False,
 )
 
-# One diagnosis of a campaign with `excluded` of its recordings left out: exclusions are never taken back, so that their
-# number says which. One of several campaigns has them in `diagnosed_campaigns`, the latest of them in `campaign`, and
-# in `excluded` how many recordings of all of them are left out.
+# One diagnosis of a campaign with `excluded` of its recordings left out, those that were excluded first: their number
+# says which, since an exclusion is taken back only while nothing was diagnosed after it. One of several campaigns has
+# them in `diagnosed_campaigns`, the latest of them in `campaign`, and in `excluded` how many recordings of all of them
+# are left out.
 diagnoses = Table(
     "diagnoses",
     metadata,

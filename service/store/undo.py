@@ -117,7 +117,8 @@ def _built_since(connection: Connection, change: AnyRow) -> str | None:
 
 
 def _built_on(connection: Connection, change: AnyRow, root: str) -> str | None:
-    """What was built since on a skin and on all that count as it, or on the campaign that was changed."""
+    """What was built since on a skin and on all that count as it, or on the campaign that was changed; their times are
+    in the order in which they were made (moments.py)."""
     numbers = numbers_of(root)
     of_skin = diagnoses.c.campaign.in_(numbers) | has_one_of(numbers)
     if change.campaign_id is not None:
