@@ -200,6 +200,7 @@ def claim(connection: Connection, server: str, basis: Basis) -> AnyRow | None:
     whatever that was when it was asked for.
     """
     moment = clock(connection)
+    _set_back(connection, moment)
     abandoned = (diagnoses.c.alive_at < moment - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
     waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & abandoned)
     query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
@@ -209,6 +210,13 @@ def claim(connection: Connection, server: str, basis: Basis) -> AnyRow | None:
     taken = {"state": "running", "claimed_by": server, "alive_at": moment, "progress": 0.0, "started_at": now()}
     connection.execute(update(diagnoses).where(diagnoses.c.number == row.number).values(**taken, **asdict(basis)))
     return find(connection, row.id)
+
+
+def _set_back(connection: Connection, moment: float) -> None:
+    """Where the clock was set back, have servers be alive as of now: one that runs says so again, one that was killed
+    is taken for dead in time."""
+    ahead = (diagnoses.c.state == "running") & (diagnoses.c.alive_at > moment)
+    connection.execute(update(diagnoses).where(ahead).values(alive_at=moment))
 
 
 def keep_alive(connection: Connection, number: int, server: str, progress: float) -> bool:

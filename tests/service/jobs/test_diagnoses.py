@@ -270,6 +270,26 @@ def test_a_server_whose_clock_is_wrong_takes_nothing_over(place: Place, monkeypa
         assert abs(diagnoses.find(connection, row.id).alive_at - true) < 60
 
 
+def test_a_killed_server_is_taken_for_dead_in_time_where_the_clock_was_set_back(place: Place) -> None:
+    with running(place, **NONE) as server:
+        asked(server, sent(server, campaign("array")))
+    store = database(place.database_url, place.folder)
+    alive_at = table_of_diagnoses.c.alive_at
+    with closing(store), store.writing() as connection:
+        row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
+        assert row is not None
+        connection.execute(table_of_diagnoses.update().values(alive_at=alive_at + 3600))
+        assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
+        assert diagnoses.keep_alive(connection, row.number, "first", 0.5), "a server that runs goes on"
+        connection.execute(table_of_diagnoses.update().values(alive_at=alive_at + 3600))
+        assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
+        waited_s = diagnoses.HEARTBEAT_TIMEOUT_S + 1
+        connection.execute(table_of_diagnoses.update().values(alive_at=alive_at - waited_s))
+        taken = diagnoses.claim(connection, "second", diagnoses.Basis("table", "1"))
+        assert taken is not None
+        assert taken.id == row.id
+
+
 def test_changes_need_a_key_of_scope_write(file_place: Place) -> None:
     done = file_place.command("key", "create", "reader", "--scope", "read")
     assert done.returncode == 0, done.stderr
