@@ -63,15 +63,17 @@ def of_row(connection: Connection, row: AnyRow) -> "AdoptedModel":
     """The model of a diagnosis that is done; raises InvalidInput where it cannot serve."""
     from underskin.prediction.adopted_model import adopted
 
-    if row.id not in _known:
+    model = _known.get(row.id)
+    if model is None:
         report = diagnoses.report_of(connection, row.number)
         assert report is not None
         campaign, _ = diagnoses.campaign_of(connection, row)
-        if len(_known) >= _MOST_KNOWN:
-            _known.clear()
         catalogue()  # another server may have added a mechanism that it has
-        _known[row.id] = adopted(report, campaign)
-    return _known[row.id]
+        model = adopted(report, campaign)
+        if len(_known) >= _MOST_KNOWN:
+            _known.clear()  # by any thread at any time
+        _known[row.id] = model
+    return model
 
 
 def adopt(connection: Connection, skin_id: str, diagnosis_id: str, sender: str | None) -> AnyRow:
