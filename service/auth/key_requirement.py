@@ -7,7 +7,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.auth.keys import KeyStore
 from service.log import LastingFailure
-from service.store import Database, StorageFull, StoreMoved, key_requirement
+from service.store import Database, StorageFailed, StoreMoved, key_requirement
 
 logger = logging.getLogger("underskin")
 
@@ -66,7 +66,7 @@ class KeyRequirement:
                 self._warn_of_missing_keys()
                 self._store.require_in_place()  # connections that are open read on where the file was moved
                 self._failure.is_over()
-            except (SQLAlchemyError, StorageFull, StoreMoved, OSError) as error:
+            except (SQLAlchemyError, StorageFailed, StoreMoved, OSError) as error:
                 self._failure.log("whether keys are needed cannot be looked up", error)
 
     def _warn_of_missing_keys(self) -> None:

@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from service.auth import session
 from service.auth.keys import Key
 from service.log import LastingFailure
-from service.store import AnyRow, Database, Missing, StorageFull, StoreMoved, sessions
+from service.store import AnyRow, Database, Missing, StorageFailed, StoreMoved, sessions
 from service.store.times import stored
 
 logger = logging.getLogger("underskin")
@@ -19,7 +19,7 @@ logger = logging.getLogger("underskin")
 _LOOK_S = 0.5  # how often: an ended session is refused within a second
 _JOIN_S = 10.0
 _LONGEST_BROWSER = 200
-_STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
+_STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 class Sessions:

@@ -10,7 +10,7 @@ from service.auth.keys import KeyStore, keys_missing
 from service.cli.shared import STORE_ERRORS, read_settings, use_folder_of_lab
 from service.log import first_line
 from service.settings import make_data_folder
-from service.store import Database, StorageFull, database, key_requirement, migrate
+from service.store import Database, StorageFailed, database, key_requirement, migrate
 from service.store import backup as backups
 from service.usecases import mechanism_files
 from underskin import UnderskinError
@@ -60,10 +60,10 @@ def restore(file: Annotated[Path, typer.Argument(help="A file that `underskin ba
 
 
 def _remember_mechanisms(store: Database) -> None:
-    """A full disk keeps nobody from a backup elsewhere."""
+    """A disk that takes nothing keeps nobody from a backup elsewhere."""
     try:
         store.write(mechanism_files.remember)
-    except StorageFull as error:
+    except StorageFailed as error:
         typer.echo(f"mechanisms of the lab's own are in the backup as they were at the last one: {error}", err=True)
 
 

@@ -9,12 +9,12 @@ from sqlalchemy.exc import DBAPIError
 
 from service.log import first_line
 from service.settings import Settings
-from service.store import StorageFull, StoreError, StoreMoved
+from service.store import StorageFailed, StoreError, StoreMoved
 from underskin import InvalidInput
 from underskin.mechanisms.declared.document import FOLDER
 from underskin.recordings.time_zone import time_zone
 
-STORE_ERRORS = (StoreError, StoreMoved, StorageFull, DBAPIError)
+STORE_ERRORS = (StoreError, StoreMoved, StorageFailed, DBAPIError)
 
 
 def fail(reason: object) -> NoReturn:

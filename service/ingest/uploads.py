@@ -20,8 +20,8 @@ from python_multipart.multipart import parse_options_header
 
 from service.ingest.arriving_files import ArrivingFile, ArrivingFiles, DiskThreads
 from service.problems import Refusal
-from service.store import StorageFull, StoreMoved
-from service.store.engine import is_full
+from service.store import StoreMoved
+from service.store.engine import storage_failure
 
 if TYPE_CHECKING:
     from python_multipart.multipart import MultipartCallbacks
@@ -95,7 +95,7 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
     """The files of a multipart form, or the whole body as one file; gone at the end of the block.
 
     Raises Refusal where a form cannot be read (400), is of the other kind (415) or the body has more than `most_bytes`,
-    besides the limit of all uploads (413), StorageFull where the disk is full.
+    besides the limit of all uploads (413), StorageFailed where the disk is full or takes nothing.
     """
     with disk_errors_said(parent):
         async with ArrivingFiles.below(parent.path, parent.threads) as files:
@@ -111,7 +111,8 @@ async def received(request: Request, parent: UploadFolder, most_bytes: float = m
 
 @contextmanager
 def disk_errors_said(folder: UploadFolder) -> Iterator[None]:
-    """Turns the system's error for a full disk into StorageFull, and for uploads' folder gone into StoreMoved."""
+    """Turns the system's error for a full disk into StorageFull, for one that takes nothing into StorageFailed, and for
+    uploads' folder gone into StoreMoved."""
     try:
         yield
     except OSError as error:
@@ -120,8 +121,9 @@ def disk_errors_said(folder: UploadFolder) -> Iterator[None]:
                 f"The folder {folder.path} was removed while the service runs: put the data folder back, or restart "
                 "the service."
             ) from error
-        if is_full(error):
-            raise StorageFull(str(error)) from error
+        failure = storage_failure(error)
+        if failure is not None:
+            raise failure from error
         raise
 
 

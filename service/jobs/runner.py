@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from service.jobs.process import Given, Worker, WorkerProcesses
 from service.log import LastingFailure
-from service.store import AnyRow, Database, StorageFull, StoreMoved, diagnoses
+from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.mechanisms.declared.document import digest
 from underskin.recordings.shown_values import LONGEST_NAME
@@ -21,7 +21,7 @@ logger = logging.getLogger("underskin")
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
 _BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
 _JOIN_S = 10.0
-_STORE_FAILED = (SQLAlchemyError, StorageFull, StoreMoved, OSError)
+_STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
 def basis(table_sha256: str) -> diagnoses.Basis:

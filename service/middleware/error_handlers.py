@@ -19,7 +19,7 @@ from service.problems import (
     is_browsing,
     unexpected,
 )
-from service.store import Conflict, Missing, StorageFull, StoreMoved
+from service.store import Conflict, Missing, StorageFailed, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
 from underskin import InvalidInput
 from underskin.several_errors import SeveralInvalid
@@ -42,7 +42,7 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
         return problem_response(request.scope, refusal, problem_page)
 
     ours = (Refusal, InvalidInput, RequestValidationError, HTTPException)
-    for kind in (*ours, *_STATUS, StorageFull, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
+    for kind in (*ours, *_STATUS, StorageFailed, StoreMoved, DataError, IntegrityError, OperationalError, Exception):
         api.add_exception_handler(kind, handle)
 
 
@@ -87,6 +87,9 @@ def _of_the_store(request: Request, error: Exception) -> Refusal:
             return Refusal(_STATUS[type(error)], str(error))
         case StorageFull():
             return Refusal(507, "The disk is full: nothing of this request was kept. What is kept can be read.")
+        case StorageFailed():
+            logger.error("the disk failed: %s", error, extra={"fields": {"request_id": request.scope["request_id"]}})
+            return Refusal(507, f"The disk takes nothing ({error}): nothing of this request was kept.")
         case StoreMoved():
             return Refusal(503, str(error), headers=RETRY_LATER)
         case DataError():

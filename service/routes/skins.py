@@ -54,6 +54,5 @@ def history(
     Campaigns that lack what an adopted model needs are left out, with the reason.
     """
     root = store.read(skins.require_root, skin_id)
-    if model == "paper":
-        d33_cache.complete(store, table, root)
-    return usecase.history_by_model(store, table, root, model)
+    computed = d33_cache.complete(store, table, root) if model == "paper" else {}
+    return usecase.history_by_model(store, table, root, model, computed)

@@ -33,7 +33,7 @@ class MadeFile(FileResponse):
 def made_file(request: Request, name: str, media_type: str, write: Callable[[Path], object]) -> Response:
     """The answer that sends what `write` wrote; nothing is written where only its headers are sent.
 
-    Raises StorageFull where the disk is full, StoreMoved where the folder is gone.
+    Raises StorageFailed where the disk is full or takes nothing, StoreMoved where the folder is gone.
     """
     if WITHOUT_CONTENT in request.scope:
         headers = FileResponse("", media_type=media_type, filename=name).headers

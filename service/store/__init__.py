@@ -5,7 +5,7 @@ from pathlib import Path
 from sqlalchemy.exc import DBAPIError
 
 from service.store import migrate
-from service.store.engine import Database, StorageFull, database
+from service.store.engine import Database, StorageFailed, StorageFull, database
 from service.store.errors import Conflict, Missing, StoreError, StoreMoved
 from service.store.tables import AnyRow
 
@@ -14,6 +14,7 @@ __all__ = [
     "Conflict",
     "Database",
     "Missing",
+    "StorageFailed",
     "StorageFull",
     "StoreError",
     "StoreMoved",

@@ -16,7 +16,7 @@ from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from service.store.errors import StoreError
 from service.store.sqlite_files import SqliteFiles
-from service.store.write_turns import WAIT_S, WriteTurns, busy
+from service.store.write_turns import SOON_S, WAIT_S, WriteTurns, busy
 
 SQLITE_FILE = "underskin.sqlite3"
 CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
@@ -31,7 +31,11 @@ _Answer = TypeVar("_Answer")
 _OnConnection: TypeAlias = Callable[Concatenate[Connection, _Given], _Answer]
 
 
-class StorageFull(Exception):
+class StorageFailed(Exception):
+    """The disk takes nothing: it is mounted read-only, or fails; nothing of the request was kept."""
+
+
+class StorageFull(StorageFailed):
     """There is no room to keep more; nothing of the request was kept."""
 
 
@@ -78,35 +82,40 @@ class Database:
             yield connection
 
     @contextmanager
-    def writing(self) -> Iterator[Connection]:
+    def writing(self, *, soon: bool = False) -> Iterator[Connection]:
         """A transaction that commits at the end of the block.
 
         Raises OperationalError where others write for too long, or too many wait to; StorageFull where there was no
-        room; StoreMoved where it would be kept in a file that is not the one on the disk.
+        room, StorageFailed where the disk takes nothing; StoreMoved where it would be kept in a file that is not the
+        one on the disk. `soon`: a second is too long, for what can be made again.
         """
+        wait_s = SOON_S if soon else WAIT_S
+        engine = self.engine if soon else self._writers  # whose connections may all be waiting
         try:
             with (
-                self._turn(),
-                _connected(self._writers).execution_options(write=True) as connection,
+                self._turn(wait_s),
+                _connected(engine).execution_options(write=True) as connection,
                 connection.begin(),
             ):
                 if not self.is_sqlite:
-                    connection.execute(text(f"SET LOCAL lock_timeout = '{WAIT_S:g}s'"))
+                    connection.execute(text(f"SET LOCAL lock_timeout = '{wait_s:g}s'"))
                     connection.execute(text("SELECT pg_advisory_xact_lock_shared(:number)"), {"number": _PG_WRITING})
                 yield connection
                 self.require_in_place()
             self.require_in_place()  # what was moved during the commit is not acknowledged either
             self._turns.note(in_vain=False)
         except (DBAPIError, OSError) as error:
-            if is_full(error):
-                raise StorageFull(str(error)) from error
+            failure = storage_failure(error)
+            if failure is not None:
+                raise failure from error
             if isinstance(error, OperationalError):
-                self._turns.note(in_vain=True)
+                self._turns.note(in_vain=True, soon=soon)
             raise
 
-    def require_hope(self) -> None:
-        """For what takes long before it writes: raises OperationalError where writers have just waited in vain."""
-        self._turns.require_hope()
+    def require_hope(self, *, soon: bool = False) -> None:
+        """For what takes long before it writes: raises OperationalError where writers have just waited in vain; for
+        what is written `soon`, also where they did not wait long."""
+        self._turns.require_hope(soon=soon)
 
     def read(self, query: _OnConnection[_Given, _Answer], *given: _Given.args, **named: _Given.kwargs) -> _Answer:
         """What one function of a connection answers in a block of `reading`."""
@@ -135,14 +144,14 @@ class Database:
                 connection.execute(text("SELECT pg_advisory_unlock(:number)"), {"number": number})
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
+    def _turn(self, wait_s: float) -> Iterator[None]:
         """SQLite has one writer at a time anyway; this lock also covers what SQLite's own cannot span, a restore."""
         with self._turns.place():
             if not self.is_sqlite:
                 yield
                 return
             self.require_in_place()  # a lock elsewhere, made anew, would keep nobody out
-            with self._turns.sole(self._lock_file):
+            with self._turns.sole(self._lock_file, wait_s):
                 yield
 
     @property
@@ -179,13 +188,19 @@ def database(database_url: str, folder: Path) -> Database:
     return Database(url.set(drivername="postgresql+psycopg"))
 
 
-def is_full(error: BaseException) -> bool:
-    """Whether an error, or what caused it, says that the disk is full."""
-    if isinstance(error, DBAPIError):
-        original = error.orig
-        code = getattr(original, "sqlite_errorcode", 0) & 0xFF
-        return code == sqlite3.SQLITE_FULL or getattr(original, "sqlstate", None) == _PG_DISK_FULL
-    return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
+def storage_failure(error: OSError | DBAPIError) -> StorageFailed | None:
+    """What an error, or what caused it, says of the disk: that it is full, or takes nothing; None where neither."""
+    if isinstance(error, OSError):
+        full, failed = error.errno in (errno.ENOSPC, errno.EDQUOT), error.errno in (errno.EROFS, errno.EIO)
+        said = error.strerror
+    else:
+        code = getattr(error.orig, "sqlite_errorcode", 0) & 0xFF
+        full = code == sqlite3.SQLITE_FULL or getattr(error.orig, "sqlstate", None) == _PG_DISK_FULL
+        failed = code == sqlite3.SQLITE_READONLY
+        said = str(error.orig)
+    if full:
+        return StorageFull(str(error))
+    return StorageFailed(said) if failed else None
 
 
 def holds(connection: Connection, table: Table, **values: Any) -> bool:

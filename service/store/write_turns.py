@@ -13,6 +13,7 @@ from typing import IO
 from sqlalchemy.exc import OperationalError
 
 WAIT_S = 20.0  # for others' writes, a restore included; then the client is asked to come again
+SOON_S = 1.0  # the same for what can be made again, and need not be kept now
 MOST_WAITING = 64  # of the threads of a process (`THREADS`)
 THREADS = 2 * MOST_WAITING  # that answer requests
 FOR_A_PLACE_S = 1.0  # a burst of more writes passes within that, while nobody holds the lock
@@ -27,15 +28,18 @@ class WriteTurns:
         """Nobody writes yet."""
         self._places = threading.BoundedSemaphore(MOST_WAITING)
         self._first = threading.Lock()
-        self._in_vain_at = -math.inf
+        self._in_vain_at = self._not_soon_at = -math.inf
 
-    def note(self, *, in_vain: bool) -> None:
-        """Somebody has waited in vain, or has written."""
-        self._in_vain_at = time.monotonic() if in_vain else -math.inf
+    def note(self, *, in_vain: bool, soon: bool = False) -> None:
+        """Somebody has waited in vain, for long or only `soon`, or has written."""
+        self._not_soon_at = time.monotonic() if in_vain else -math.inf
+        if not soon or not in_vain:
+            self._in_vain_at = self._not_soon_at
 
-    def require_hope(self) -> None:
-        """Raises OperationalError where somebody has just waited in vain, and nobody has written since."""
-        if time.monotonic() - self._in_vain_at < VAIN_S:
+    def require_hope(self, *, soon: bool) -> None:
+        """Raises OperationalError where somebody has just waited in vain, and nobody has written since; `soon`: however
+        long they waited."""
+        if time.monotonic() - (self._not_soon_at if soon else self._in_vain_at) < VAIN_S:
             raise busy("a turn to write")
 
     @contextmanager
@@ -49,10 +53,10 @@ class WriteTurns:
             self._places.release()
 
     @contextmanager
-    def sole(self, lock_file: Path) -> Iterator[None]:
-        """The only writer of all processes, by a lock on a file; raises OperationalError where it takes too long."""
-        ends = time.monotonic() + WAIT_S
-        if not self._first.acquire(timeout=WAIT_S):  # of this process, so that one at a time looks at the file
+    def sole(self, lock_file: Path, wait_s: float) -> Iterator[None]:
+        """The only writer of all processes, by a lock on a file; raises OperationalError where it takes longer."""
+        ends = time.monotonic() + wait_s
+        if not self._first.acquire(timeout=wait_s):  # of this process, so that one at a time looks at the file
             raise busy("a turn to write")
         try:
             with lock_file.open("a") as lock:

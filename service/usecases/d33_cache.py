@@ -1,16 +1,17 @@
 """d33 of stored campaigns, computed once for each state of a campaign and cached in the store."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Literal
 
 import orjson
 from sqlalchemy import Connection
+from sqlalchemy.exc import OperationalError
 
 from service.problems import Refusal
 from service.schemas.campaign_d33 import D33
-from service.store import AnyRow, Conflict, Database, StorageFull, StoreMoved, campaigns, inversions
+from service.store import AnyRow, Conflict, Database, StorageFailed, StoreMoved, campaigns, inversions
 from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
 from service.usecases.campaign_d33 import of_inversion, of_moduli
@@ -37,10 +38,13 @@ _NONE: dict[str, Any] = {
 }
 
 
-def answer(store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None) -> dict[str, Any]:
-    """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own."""
+def answer(
+    store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, *, soon: bool = True
+) -> dict[str, Any]:
+    """The d33 of a campaign as it is now (fields of D33), over its flat zone or a band of the user's own; given `soon`,
+    or once what is computed could be kept."""
     cached = store.read(inversions.find, row, table.sha256) if band_hz is None else None
-    return dict(cached) if cached is not None else _derived(store, table, row, band_hz)[0]
+    return dict(cached) if cached is not None else _derived(store, table, row, band_hz, soon=soon)[0]
 
 
 def by_model(
@@ -59,13 +63,19 @@ def with_numbers(
     cached = store.read(inversions.find_with_numbers, row, table.sha256)
     if cached is not None and band_hz is None:
         return cached
-    return _derived(store, table, row, band_hz, None if cached is None else cached[1]["spreads"])
+    return _derived(store, table, row, band_hz, None if cached is None else cached[1]["spreads"], soon=True)
 
 
 def adopted_answer(
-    store: Database, table: SigmaTable, row: AnyRow, model_in_force: ModelInForce, band_hz: BandHz | None
+    store: Database,
+    table: SigmaTable,
+    row: AnyRow,
+    model_in_force: ModelInForce,
+    band_hz: BandHz | None,
+    *,
+    soon: bool = True,
 ) -> dict[str, Any]:
-    """The same under an adopted model: by the lines that the base model would have shown.
+    """As `answer`, under an adopted model: by the lines that the base model would have shown.
 
     Raises InvalidInput where the campaign lacks what the model needs, or declares the skin otherwise.
     """
@@ -80,25 +90,25 @@ def adopted_answer(
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **origin}
     document, _, failed = _computed(document, translated, table, band_hz, left_out)
     if band_hz is None and not failed:
-        _keep(store, row, inversions.keep_adopted, model_id, table.sha256, document)
+        _keep(store, row, soon, inversions.keep_adopted, model_id, table.sha256, document)
     return document
 
 
-def derive(store: Database, table: SigmaTable, campaign_ids: Sequence[str]) -> None:
-    """Compute and keep; what fails is logged, and tried again when it is asked for."""
+def derive(
+    store: Database, table: SigmaTable, campaign_ids: Sequence[str], *, soon: bool = False
+) -> dict[str, dict[str, Any]]:
+    """Compute and keep, by the paper's model and by the one in force; the paper's answers by the campaigns' ids. What
+    fails is logged, and tried again when it is asked for."""
+    answers = {}
     for campaign_id in campaign_ids:
         try:
             row = store.read(campaigns.find, campaign_id)
-            answer(store, table, row, None)
-            _derive_adopted(store, table, row)
+            answers[campaign_id] = answer(store, table, row, None, soon=soon)
+            with suppress(Refusal, Conflict, InvalidInput):  # where no model is in force, or it cannot tell this one
+                adopted_answer(store, table, row, model_in_force(store, row.skin_id), None, soon=soon)
         except Exception:  # the campaign itself is kept, and that is what was promised
             logger.exception("no d33 from a campaign", extra={"fields": {"campaign": campaign_id}})
-
-
-def _derive_adopted(store: Database, table: SigmaTable, row: AnyRow) -> None:
-    """The same by the model in force of its skin, where there is one that can tell it."""
-    with suppress(Refusal, Conflict, InvalidInput):
-        by_model(store, table, row, "adopted")
+    return answers
 
 
 def foreseen(table: SigmaTable, campaign: Campaign) -> list[str]:
@@ -132,14 +142,21 @@ def _without_d33(campaign: Campaign, told: dict[str, Any], table: SigmaTable) ->
     return [said, meaning]
 
 
-def complete(store: Database, table: SigmaTable, root: str) -> None:
-    """Compute and keep what is missing of a skin's current campaigns."""
+def complete(store: Database, table: SigmaTable, root: str) -> dict[str, dict[str, Any]]:
+    """Compute what is missing of a skin's current campaigns, and keep it where it can be kept soon; the answers by the
+    campaigns' ids."""
     missing = store.read(inversions.missing_of_skin, root, table.sha256)
-    derive(store, table, [row.id for row in missing])
+    return derive(store, table, [row.id for row in missing], soon=True)
 
 
 def _derived(
-    store: Database, table: SigmaTable, row: AnyRow, band_hz: BandHz | None, spreads: list[dict[str, Any]] | None = None
+    store: Database,
+    table: SigmaTable,
+    row: AnyRow,
+    band_hz: BandHz | None,
+    spreads: list[dict[str, Any]] | None = None,
+    *,
+    soon: bool,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Answer and numbers, computed, and kept where they are of the flat zone; `spreads`: where these are known."""
     campaign, left_out = store.read(_used, row)
@@ -147,13 +164,16 @@ def _derived(
     document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
     numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
-        sensors = {
-            entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"])
-            for entry in document["sensors"]
-            if entry["d33_pc_per_n"] is not None and entry["d33_uncertainty_pc_per_n"] is not None
-        }
-        _keep(store, row, inversions.keep, table.sha256, document, numbers, sensors)
+        _keep(store, row, soon, inversions.keep, table.sha256, document, numbers, of_sensors(document))
     return document, numbers
+
+
+def of_sensors(document: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    """d33 with its standard uncertainty [pC/N] of those sensors of an answer that have both, by their ids."""
+    values = {
+        entry["sensor"]: (entry["d33_pc_per_n"], entry["d33_uncertainty_pc_per_n"]) for entry in document["sensors"]
+    }
+    return {sensor: both for sensor, both in values.items() if None not in both}
 
 
 def _used(connection: Connection, row: AnyRow) -> tuple[Campaign, list[tuple[str, str]]]:
@@ -208,9 +228,11 @@ def _inverted(
     return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
 
 
-def _keep(store: Database, row: AnyRow, change: Callable[..., None], *derived: Any) -> None:
-    """Where it cannot be kept, the answer is given all the same."""
+def _keep(store: Database, row: AnyRow, soon: bool, change: Callable[..., None], *derived: Any) -> None:
+    """Where it cannot be kept, or not `soon`, the answer is given all the same."""
     try:
-        store.write(change, row, *derived)
-    except (StorageFull, StoreMoved) as error:
+        store.require_hope(soon=soon)
+        with store.writing(soon=soon) as connection:
+            change(connection, row, *derived)
+    except (StorageFailed, StoreMoved, OperationalError, OSError) as error:
         logger.warning("the d33 of a campaign was not kept: %s", error, extra={"fields": {"campaign": row.id}})

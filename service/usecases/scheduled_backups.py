@@ -24,7 +24,7 @@ from prometheus_client import Counter, Gauge
 
 from service import durable
 from service.log import first_line
-from service.store import Database, StorageFull, StoreError, backup, identity
+from service.store import Database, StorageFailed, StoreError, backup, identity
 from service.usecases import mechanism_files
 
 logger = logging.getLogger("underskin")
@@ -174,7 +174,7 @@ class ScheduledBackups:
             file = self._folder / f"{_PREFIX}{datetime.now(UTC):{_STAMP}}{suffix}"
             try:
                 self._store.write(mechanism_files.remember)
-            except StorageFull as error:  # a full disk here keeps nobody from a backup elsewhere
+            except StorageFailed as error:  # a disk that takes nothing here keeps nobody from a backup elsewhere
                 logger.warning("mechanisms of the lab's own are in the backup as they were at the last one: %s", error)
             backup.make(self._store, file)
             self._rotate(file.stat().st_size)
@@ -192,7 +192,7 @@ class ScheduledBackups:
             durable.write_text(owner, self._store.read(identity.find) or self._store.write(identity.ensure))
         self._owned = True
         if not self._is_noted():
-            with suppress(OSError):  # a full disk here keeps nobody from a backup elsewhere
+            with suppress(OSError):  # a disk that takes nothing here keeps nobody from a backup elsewhere
                 durable.write_text(self._note, self._address)
 
     def _is_noted(self) -> bool:

@@ -91,18 +91,30 @@ def sensors(connection: Connection, root: str) -> list[Mapping[str, Any]]:
 
 
 def history_by_model(
-    store: Database, table: SigmaTable, root: str, model: Literal["paper", "adopted"]
+    store: Database,
+    table: SigmaTable,
+    root: str,
+    model: Literal["paper", "adopted"],
+    computed: Mapping[str, Mapping[str, Any]],
 ) -> models.History:
-    """The history of a skin and of those joined to it; raises Refusal where there is no adopted model."""
+    """The history of a skin and of those joined to it; `computed`: what `d33_cache.complete` had to compute for it.
+
+    Raises Refusal where there is no adopted model.
+    """
     if model == "adopted":
         return _adopted_history(store, table, root)
-    return store.read(_paper_history, root, table.sha256)
+    return store.read(_paper_history, root, table.sha256, computed)
 
 
-def _paper_history(connection: Connection, root: str, table_sha256: str) -> models.History:
-    """From what is kept."""
+def _paper_history(
+    connection: Connection, root: str, table_sha256: str, computed: Mapping[str, Mapping[str, Any]]
+) -> models.History:
+    """From what is kept, and from what was computed and could not be kept."""
     rows = inversions.history(connection, root, table_sha256)
     points = [(row.sensor, _point(row, row.d33_pc_per_n, row.d33_uncertainty_pc_per_n, None)) for row in rows]
+    for row in inversions.missing_of_skin(connection, root, table_sha256) if computed else []:
+        of_sensors = d33_cache.of_sensors(computed[row.id]) if row.id in computed else {}
+        points += [(sensor, _point(row, *values, None)) for sensor, values in of_sensors.items()]
     return _history(connection, root, points, {})
 
 

@@ -50,8 +50,8 @@ def shown_array(
         return ShownArray(sensors, None, figures, [])
     own = [number for number, name in enumerate(told["sensors"]) if name == sensor]
     root = store.read(skins.require_root, campaign.skin_id)
-    d33_cache.complete(store, table, root)
-    history = drawn_history(root, history_by_model(store, table, root, "paper"), sensor, "paper")
+    computed = d33_cache.complete(store, table, root)
+    history = drawn_history(root, history_by_model(store, table, root, "paper", computed), sensor, "paper")
     about = _ABOUT.format(sensor=sensor)
     frf = drawn_before("frf", _only(figure, own), about, f"/diagnoses/{row.id}/frf.csv")
     return ShownArray(sensors, sensor, [*figures, replace(frf, name="frf-of-sensor"), history], _rows(told, own))

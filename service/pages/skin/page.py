@@ -84,7 +84,7 @@ def shown(
     refused: RefusedForm | None = None,
 ) -> Response:
     """The page; `refused`: a form of it that was sent and cannot be used."""
-    root, waiting = _completed(store, table, skin_id)
+    root, waiting, computed = _completed(store, table, skin_id)
     with store.reading() as connection:
         rows = campaigns.by_time(connection, root, number_of_cursor(before), _ON_A_PAGE + 1)
         last = campaigns.describing(connection, root)
@@ -111,7 +111,7 @@ def shown(
     answer = None if last is None else d33_cache.answer(store, table, last, None)
     by_model, why_not = (None, None) if last is None or not serves else answer_by_it(store, table, last)
     by = (by or ("paper" if by_model is None else "adopted")) if serves else "paper"
-    history = usecase.history_by_model(store, table, root, by)
+    history = usecase.history_by_model(store, table, root, by, computed)
     sensor = sensor if sensor in {entry.sensor for entry in history.sensors} else None
     mapped = by_model if by == "adopted" else answer
     figures = []
@@ -213,8 +213,8 @@ def mark(skin_id: SkinId, store: Store, table: Table) -> dict[str, str]:
 def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
     """d33 of each sensor in the latest campaign with FRFs, or its last value and since when that stands (`absent`), and
     its trend."""
-    root, _ = _completed(store, table, skin_id)
-    history = usecase.history_by_model(store, table, root, by)
+    root, _, computed = _completed(store, table, skin_id)
+    history = usecase.history_by_model(store, table, root, by, computed)
     row = store.read(campaigns.describing, root)
     if row is None:
         return csv_of_rows(file_name(root, "map"), _MAP_COLUMNS, [])
@@ -226,21 +226,21 @@ def map_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") 
 @router.get("/history.csv")
 def history_csv(skin_id: SkinId, store: Store, table: Table, by: ByQuery = "paper") -> Response:
     """d33 of every sensor in every current campaign, and the model that each value rests on."""
-    root, _ = _completed(store, table, skin_id)
+    root, _, computed = _completed(store, table, skin_id)
     points = [
         {"sensor": entry.sensor, **point.model_dump(), "model_id": point.model_id or ""}
-        for entry in usecase.history_by_model(store, table, root, by).sensors
+        for entry in usecase.history_by_model(store, table, root, by, computed).sensors
         for point in entry.points
     ]
     return csv_of_rows(file_name(root, "history"), _HISTORY_COLUMNS, points)
 
 
-def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int]:
-    """The skin's own id, and of how many campaigns d33 is still to be computed; a few are computed at once."""
+def _completed(store: Database, table: SigmaTable, skin_id: str) -> tuple[str, int, dict[str, dict[str, Any]]]:
+    """The skin's own id, of how many campaigns d33 is still to be computed, and what was computed, by the campaigns'
+    ids: a few are at once."""
     with store.reading() as connection:
         root = skins.require_root(connection, skin_id)
         missing = len(inversions.missing_of_skin(connection, root, table.sha256))
     if 0 < missing <= _AT_ONCE:
-        d33_cache.complete(store, table, root)
-        return root, 0
-    return root, missing
+        return root, 0, d33_cache.complete(store, table, root)
+    return root, missing, {}

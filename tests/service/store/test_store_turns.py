@@ -170,7 +170,7 @@ def test_turns_are_taken_one_at_a_time(tmp_path: Path) -> None:
     turns, inside, most = write_turns.WriteTurns(), [], []
 
     def write() -> None:
-        with turns.place(), turns.sole(tmp_path / "lock"):
+        with turns.place(), turns.sole(tmp_path / "lock", write_turns.WAIT_S):
             inside.append(threading.get_ident())
             most.append(len(inside))
             time.sleep(0.002)
