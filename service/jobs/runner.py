@@ -4,7 +4,7 @@ import logging
 import secrets
 import threading
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -29,6 +29,15 @@ def basis(table_sha256: str) -> diagnoses.Basis:
     return diagnoses.Basis(table_sha256, __version__, digest())
 
 
+@dataclass
+class _Job:
+    """A diagnosis in a thread of this server; without a worker while that starts."""
+
+    row: AnyRow
+    thread: threading.Thread
+    worker: Worker | None = None
+
+
 class Runner:
     """Runs the queue in threads of the server's process, between `start` and `stop`."""
 
@@ -40,7 +49,7 @@ class Runner:
         self._server = secrets.token_hex(8)
         self._ending = threading.Event()
         self._stirred = threading.Event()
-        self._jobs: dict[threading.Thread, Worker | None] = {}
+        self._jobs: dict[int, _Job] = {}  # by the diagnosis' number
         self._lock = threading.Lock()
         self._failure = LastingFailure(logger)
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
@@ -54,44 +63,56 @@ class Runner:
         """Look at once at what has changed: something new in the queue, or cancelled."""
         self._stirred.set()
         with self._lock:
-            for worker in self._jobs.values():
-                if worker is not None:
-                    worker.news.set()
+            for job in self._jobs.values():
+                if job.worker is not None:
+                    job.worker.news.set()
 
     def stop(self) -> None:
         """End all workers; what they were at goes back into the queue."""
         self._ending.set()
         self.stir()
-        for thread in (self._dispatcher, *self._jobs):
-            if thread.ident is not None:
-                thread.join(_JOIN_S)
+        if self._dispatcher.ident is not None:
+            self._dispatcher.join(_JOIN_S)
+        for job in self._under_way():
+            job.thread.join(_JOIN_S)
         self._processes.stop()
 
     def _dispatch(self) -> None:
         while not self._ending.is_set():
             self._stirred.clear()
+            for job in self._starting():
+                self._is_ours(job.row, 0.0)  # its thread cannot say so before there is a worker
             try:
-                while len(self._jobs) < self._workers and (row := self._claim()) is not None:
-                    thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
-                    with self._lock:
-                        self._jobs[thread] = None
-                    self._start(thread, row)
+                while len(self._under_way()) < self._workers and (row := self._claim()) is not None:
+                    self._start(row)
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
-            if not self._stirred.wait(_POLL_S):
-                self._processes.get_ready()  # now that nothing else is going on
+            # Not while one starts: it may hold for minutes what this would wait for.
+            if not self._stirred.wait(_POLL_S) and not self._starting():
+                self._processes.get_ready()
 
-    def _start(self, thread: threading.Thread, row: AnyRow) -> None:
+    def _under_way(self) -> list[_Job]:
+        with self._lock:
+            return list(self._jobs.values())
+
+    def _starting(self) -> list[_Job]:
+        return [job for job in self._under_way() if job.worker is None]
+
+    def _start(self, row: AnyRow) -> None:
+        thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
+        with self._lock:
+            self._jobs[row.number] = _Job(row, thread)
         try:
             thread.start()
         except RuntimeError as error:  # the system has no room for a thread now
             with self._lock:
-                del self._jobs[thread]
+                del self._jobs[row.number]
             self._release(row)
             raise OSError(str(error)) from error
 
     def _claim(self) -> AnyRow | None:
-        row = self._store.write(diagnoses.claim, self._server, basis(self._processes.table_sha256))
+        own = [job.row.number for job in self._under_way()]
+        row = self._store.write(diagnoses.claim, self._server, basis(self._processes.table_sha256), own)
         self._failure.is_over()
         return row
 
@@ -106,7 +127,7 @@ class Runner:
             self._end(row, diagnoses.fail, f"{type(error).__name__}: {error}")
         finally:
             with self._lock:
-                del self._jobs[threading.current_thread()]
+                del self._jobs[row.number]
             self._stirred.set()
 
     def _run(self, row: AnyRow) -> None:
@@ -114,11 +135,11 @@ class Runner:
         without = diagnoses.without(row)
         with self._processes.at_work(self._given(row), None, without, row.kind, row.name) as worker:
             with self._lock:
-                self._jobs[threading.current_thread()] = worker
+                self._jobs[row.number].worker = worker
             while not worker.ended and not self._ending.is_set():
                 worker.news.wait(_BEAT_S)
                 worker.news.clear()
-                if not self._is_ours(row, worker):
+                if not self._is_ours(row, worker.said["progress"]):
                     return
             if not worker.ended:
                 self._release(row)
@@ -141,10 +162,10 @@ class Runner:
             given.append(Given.of(campaign, member.skin_id, left_out))
         return given
 
-    def _is_ours(self, row: AnyRow, worker: Worker) -> bool:
+    def _is_ours(self, row: AnyRow, progress: float) -> bool:
         """Renew the claim; False where it was cancelled or another server claimed it, True where the store fails."""
         try:
-            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, worker.said["progress"])
+            ours = self._store.write(diagnoses.keep_alive, row.number, self._server, progress)
         except _STORE_FAILED as error:
             self._failure.log("a diagnosis cannot be kept alive", error)
             return True

@@ -193,16 +193,17 @@ def cancel(connection: Connection, diagnosis_id: str) -> None:
         connection.execute(update(diagnoses).where(this).values(**values))
 
 
-def claim(connection: Connection, server: str, basis: Basis) -> AnyRow | None:
+def claim(connection: Connection, server: str, basis: Basis, under_way: Collection[int] = ()) -> AnyRow | None:
     """Take the next diagnosis to run: a queued one, or one whose server is taken for dead; None where there is none.
+    Never one that this server has `under_way`, by its number, whatever others took it for meanwhile.
 
     Servers that claim at once do not get the same one. It is run with what the server that has it now diagnoses with,
     whatever that was when it was asked for.
     """
     moment = clock(connection)
     _set_back(connection, moment)
-    abandoned = (diagnoses.c.alive_at < moment - HEARTBEAT_TIMEOUT_S) & (diagnoses.c.claimed_by != server)
-    waiting = (diagnoses.c.state == "queued") | ((diagnoses.c.state == "running") & abandoned)
+    abandoned = (diagnoses.c.state == "running") & (diagnoses.c.alive_at < moment - HEARTBEAT_TIMEOUT_S)
+    waiting = ((diagnoses.c.state == "queued") | abandoned) & diagnoses.c.number.not_in(under_way)
     query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:

@@ -243,7 +243,7 @@ def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) ->
         assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
         late = table_of_diagnoses.c.alive_at - diagnoses.HEARTBEAT_TIMEOUT_S - 1
         connection.execute(table_of_diagnoses.update().values(alive_at=late))
-        assert diagnoses.claim(connection, "first", diagnoses.Basis("table", "1")) is None
+        assert diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"), [row.number]) is None
         taken = diagnoses.claim(connection, "second", diagnoses.Basis("other", "2"))
         assert taken is not None
         assert (taken.id, taken.table_sha256, taken.version) == (row.id, "other", "2")
