@@ -21,6 +21,7 @@ from service.problems import (
 )
 from service.store import Conflict, Missing, StorageFailed, StorageFull, StoreMoved
 from service.store.answers import OtherRequest
+from service.store.engine import storage_failure
 from underskin import InvalidInput
 from underskin.several_errors import SeveralInvalid
 
@@ -37,7 +38,7 @@ def install_handlers(api: FastAPI, problem_page: ProblemPage, methods: Methods) 
     """One shape for what we raise, what FastAPI raises, and what nobody expected; a page for who looks at pages."""
 
     async def handle(request: Request, error: Exception) -> Response:
-        refusal = _as_refusal(request, error, methods)
+        refusal = _as_refusal(request, _of_the_disk(error) or error, methods)
         request.scope["why"] = refusal.in_log()
         return problem_response(request.scope, refusal, problem_page)
 
@@ -53,6 +54,12 @@ def problem_response(scope: Scope, refusal: Refusal, problem_page: ProblemPage) 
         return problem_page(refusal, request_id)
     body, status = refusal.body(path, request_id), refusal.status_for(path)
     return Response(body, status, headers=refusal.headers, media_type=refusal.media_type(path))
+
+
+def _of_the_disk(error: Exception) -> StorageFailed | None:
+    """What an error says of a disk, as that of temporary files, where long bodies lie; FastAPI wraps it then."""
+    cause = error.__cause__ if isinstance(error, HTTPException) else error
+    return storage_failure(cause) if isinstance(cause, OSError) else None
 
 
 def _as_refusal(request: Request, error: Exception, methods: Methods) -> Refusal:

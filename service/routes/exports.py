@@ -11,7 +11,7 @@ from service.dependencies import WRITE, SkinId, Store
 from service.ingest import skin_imports
 from service.ingest.form_fields import split
 from service.ingest.skin_imports import Imported
-from service.ingest.uploads import received
+from service.ingest.uploads import UploadFolder, received
 from service.problems import Refusal
 from service.routes.temporary_files import MadeFile, made_file
 from service.store import Database, skins

@@ -11,7 +11,7 @@ from typing import Any, Concatenate, ParamSpec, TypeAlias, TypeVar
 import orjson
 from sqlalchemy import URL, Connection, Engine, Table, create_engine, event, make_url, select, text
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import ArgumentError, DBAPIError, OperationalError
+from sqlalchemy.exc import ArgumentError, DBAPIError, InternalError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnectionError
 
 from service.store.errors import StoreError
@@ -21,6 +21,7 @@ from service.store.write_turns import SOON_S, WAIT_S, WriteTurns, busy
 SQLITE_FILE = "underskin.sqlite3"
 CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
 _PG_DISK_FULL = "53100"
+_PG_READ_ONLY = "25006"
 # A server that is gone without a word, as when its power fails, is noticed within half a minute: by the system's own
 # limits it would be a quarter of an hour for what was sent, and two hours for an answer.
 _NOTICED = {"keepalives_idle": 10, "keepalives_interval": 5, "keepalives_count": 3, "tcp_user_timeout": 20_000}  # s, ms
@@ -108,6 +109,8 @@ class Database:
             failure = storage_failure(error)
             if failure is not None:
                 raise failure from error
+            if isinstance(error, InternalError) and error.orig and _sqlstate(error.orig) == _PG_READ_ONLY:
+                raise OperationalError(None, None, error.orig) from error  # a standby: another server takes writes
             if isinstance(error, OperationalError):
                 self._turns.note(in_vain=True, soon=soon)
             raise
@@ -195,12 +198,17 @@ def storage_failure(error: OSError | DBAPIError) -> StorageFailed | None:
         said = error.strerror
     else:
         code = getattr(error.orig, "sqlite_errorcode", 0) & 0xFF
-        full = code == sqlite3.SQLITE_FULL or getattr(error.orig, "sqlstate", None) == _PG_DISK_FULL
+        full = code == sqlite3.SQLITE_FULL or _sqlstate(error.orig) == _PG_DISK_FULL
         failed = code == sqlite3.SQLITE_READONLY
         said = str(error.orig)
     if full:
         return StorageFull(str(error))
     return StorageFailed(said) if failed else None
+
+
+def _sqlstate(error: BaseException | None) -> str | None:
+    """PostgreSQL's code of an error."""
+    return getattr(error, "sqlstate", None)
 
 
 def holds(connection: Connection, table: Table, **values: Any) -> bool:

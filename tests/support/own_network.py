@@ -1,7 +1,7 @@
 """A network between this machine and a PostgreSQL server that can go away without a word, as one whose power fails.
 
-A process in a network namespace of its own listens there and passes on to the server's Unix socket. Run as a script, this
-file is that process.
+A process in a network namespace of its own listens there and passes on to the server's Unix socket. Run as a script,
+this file is that process.
 """
 
 import os
@@ -20,7 +20,7 @@ _CHUNK = 1 << 16
 
 @dataclass(frozen=True)
 class OwnNetwork:
-    """A pair of virtual devices, one of them here and one in the namespace, of which only `peer` is there to be asked."""
+    """A pair of virtual devices: `name`, here, and one in the namespace, which has the address `peer`."""
 
     name: str
     peer: str

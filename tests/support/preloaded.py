@@ -186,6 +186,7 @@ def _become(order: dict[str, Any], files: list[int]) -> None:
     os.environ.clear()
     os.environ.update(order["environment"])
     time.tzset()
+    tempfile.tempdir = None  # which the environment names
     os.chdir(order["folder"])
     sys.argv = [str(UNDERSKIN), *order["arguments"]]
 

@@ -1,4 +1,4 @@
-"""A PostgreSQL server that is gone without a word: nobody waits for the system's limits, and all goes on afterwards."""
+"""A PostgreSQL server that is gone without a word, or takes no writes: requests are told so, and all goes on later."""
 
 import time
 from pathlib import Path
@@ -12,6 +12,26 @@ from tests.support.postgres import Cluster
 from tests.support.store_server import Place, campaign, running
 
 NOTICED_S = 90  # by the system's own limits it would be a quarter of an hour
+
+
+def test_of_a_standby_writers_are_told_to_come_again(cluster: Cluster, tmp_path: Path) -> None:
+    """As after a failover, until it is promoted."""
+    url = cluster.new_database()
+    name = url.rpartition("/")[2]
+
+    def take_writes(*, readily: bool) -> None:
+        cluster.run_sql("postgres", f"ALTER DATABASE {name} SET default_transaction_read_only = {not readily}")
+        ended = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname"
+        cluster.run_sql("postgres", f"{ended} = '{name}'")
+
+    with running(Place(tmp_path, url), **NO_WORKERS) as server:
+        take_writes(readily=False)
+        refused = server.http.post("/v1/campaigns", json=campaign("refused"))
+        assert refused.status_code == 503
+        assert int(refused.headers["Retry-After"]) > 0
+        assert server.http.get("/v1/campaigns").json()["campaigns"] == []
+        take_writes(readily=True)
+        assert server.http.post("/v1/campaigns", json=campaign("kept")).status_code == 201
 
 
 @pytest.mark.slow

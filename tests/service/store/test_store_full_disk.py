@@ -105,10 +105,27 @@ def require_kept(server: Server, acknowledged: dict[str, str]) -> None:
         assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json() == sent
 
 
-def test_a_key_that_finds_no_room_leaves_no_digest_behind(small_disk: Path) -> None:
-    with suppress(OSError), (small_disk / "filling").open("wb", buffering=0) as file:
+def test_a_full_disk_of_temporary_files_is_told(small_disk: Path, tmp_path: Path) -> None:
+    """Long bodies are parsed apart, from files there."""
+    long = {"name": "unknown", "input": [[0.3] * 300_000]}
+    (tmp_path / "data").mkdir()
+    with running(Place(tmp_path / "data"), TMPDIR=str(small_disk), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        read = server.http.post("/umbridge/Evaluate", json=long)
+        assert read.status_code == 400
+        fill(small_disk)
+        assert server.http.post("/umbridge/Evaluate", json=long).status_code == 507
+        (small_disk / "filling").unlink()
+        assert server.http.post("/umbridge/Evaluate", json=long).text == read.text
+
+
+def fill(disk: Path) -> None:
+    with suppress(OSError), (disk / "filling").open("wb", buffering=0) as file:
         while True:
             file.write(bytes(4096))
+
+
+def test_a_key_that_finds_no_room_leaves_no_digest_behind(small_disk: Path) -> None:
+    fill(small_disk)
     with pytest.raises(OSError, match="No space"):
         KeyStore(small_disk).create("lab", "read")
     assert {path.name for path in small_disk.iterdir()} <= {"filling", "keys.lock"}
