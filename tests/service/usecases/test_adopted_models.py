@@ -1,7 +1,6 @@
 """Models adopted from diagnoses: refused where they must be, served by /frf, /d33 and histories, kept and moved."""
 
 from collections.abc import Iterator
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,6 @@ import numpy as np
 import orjson
 import pytest
 
-from service.store import database, diagnoses
-from service.usecases import adopted_models
 from tests.support.diagnosed import D33, SKIN, diagnosed, report, resonant, sent
 from tests.support.store_server import Server, campaign
 from underskin import Client, ServiceError
@@ -50,21 +47,6 @@ def made(mechanisms: dict[str, tuple[float, ...]], names: dict[str, tuple[str, .
         for name, values in mechanisms.items()
     ]
     return {**report(), "mechanisms": found}
-
-
-class Emptied(dict[str, Any]):
-    """As a full one that another thread empties as soon as something is in it."""
-
-    def __setitem__(self, _: str, __: Any) -> None:
-        """Nothing stays."""
-
-
-def test_a_model_is_told_whatever_other_threads_forget(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    _, diagnosis_id = diagnosed(server, resonant("array"), report())
-    monkeypatch.setattr(adopted_models, "_known", Emptied())
-    with closing(database(server.place.database_url, server.place.folder)) as store, store.reading() as connection:
-        model = adopted_models.of_row(connection, diagnoses.find(connection, diagnosis_id))
-    assert model.unsure > 0
 
 
 def test_an_adopted_model_is_the_physics_that_was_found(server: Server, client: Client) -> None:
