@@ -45,16 +45,9 @@ def own_network(unix_socket: Path) -> Iterator[OwnNetwork | None]:
     name, third = f"us{os.getpid()}", os.getpid() % 256
     here, peer = f"10.213.{third}.1", f"10.213.{third}.2"
     try:
-        _ip("netns", "add", name)
-    except (OSError, subprocess.CalledProcessError):
-        yield None
-        return
-    try:
-        _ip("link", "add", name, "type", "veth", "peer", "name", "eth0", "netns", name)
-        _ip("address", "add", f"{here}/24", "dev", name)
-        _ip("-n", name, "address", "add", f"{peer}/24", "dev", "eth0")
-        _ip("-n", name, "link", "set", "eth0", "up")
-        _ip("link", "set", name, "up")
+        if not _is_made(name, here, peer):
+            yield None
+            return
         command = ["ip", "netns", "exec", name, sys.executable, __file__, peer, str(unix_socket)]
         with subprocess.Popen(command, stdout=subprocess.PIPE) as passing_on:
             try:
@@ -64,7 +57,21 @@ def own_network(unix_socket: Path) -> Iterator[OwnNetwork | None]:
             finally:
                 passing_on.kill()
     finally:
-        _ip("netns", "delete", name)  # and with it the devices
+        with suppress(OSError, subprocess.CalledProcessError):
+            _ip("netns", "delete", name)  # and with it the devices
+
+
+def _is_made(name: str, here: str, peer: str) -> bool:
+    try:
+        _ip("netns", "add", name)
+        _ip("link", "add", name, "type", "veth", "peer", "name", "eth0", "netns", name)
+        _ip("address", "add", f"{here}/24", "dev", name)
+        _ip("-n", name, "address", "add", f"{peer}/24", "dev", "eth0")
+        _ip("-n", name, "link", "set", "eth0", "up")
+        _ip("link", "set", name, "up")
+    except (OSError, subprocess.CalledProcessError):
+        return False
+    return True
 
 
 def _ip(*words: str) -> None:
