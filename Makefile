@@ -4,8 +4,8 @@ PYTHON := $(VENV)/bin/python
 PORT   ?= 8000
 TESTS  ?= tests
 
-# From Debian: the proxy with TLS, its certificate, and what runs the examples.
-TEST_PACKAGES = nginx openssl octave curl postgresql chromium
+# From Debian: the proxy with TLS, its certificate, what runs the examples, and networks that are cut.
+TEST_PACKAGES = nginx openssl octave curl postgresql chromium iproute2
 
 # What `.venv` cannot hold, each in an environment of its own: what `make bench` measures against, and what generates a
 # client in `make test`.

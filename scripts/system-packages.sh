@@ -5,6 +5,7 @@ set -eu
 
 command_of() { # PACKAGE
     case $1 in
+        iproute2) echo ip ;;
         octave) echo octave-cli ;;
         postgresql) echo initdb ;;
         *) echo "$1" ;;

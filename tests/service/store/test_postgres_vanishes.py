@@ -38,7 +38,9 @@ def test_of_a_standby_writers_are_told_to_come_again(cluster: Cluster, tmp_path:
 def test_it_is_noticed_and_taken_up_again(cluster: Cluster, tmp_path: Path) -> None:
     with own_network(next(cluster.folder.glob(".s.PGSQL.*[0-9]"))) as network:
         if network is None:
-            pytest.skip("no network of the test's own can be made here (it takes `ip netns` and the rights of root)")
+            pytest.skip(
+                "no network of the test's own can be made here (Debian's package iproute2, and the rights of root)"
+            )
         with running(Place(tmp_path, network.url(cluster.new_database())), **NO_WORKERS) as server:
             sent = server.http.post("/v1/campaigns", json=campaign("before"))
             assert sent.status_code == 201
