@@ -24,7 +24,7 @@ PIP = -m pip install --quiet --disable-pip-version-check --no-compile
 PIP_INSTALL = $(PYTHON) $(PIP)
 
 .DEFAULT_GOAL := help
-.PHONY: help serve unit test check docs tables paper tour openapi mechanisms proof bench soak lock clean
+.PHONY: help serve unit test check docs tables paper tour openapi mechanisms ledger house proof bench soak lock clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -73,6 +73,12 @@ openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the
 
 mechanisms: $(VENV)/.dev ## regenerate docs/mechanisms.md and its figures
 	$(PYTHON) -m docs.mechanisms
+
+ledger: $(VENV)/.dev ## diagnose the ledger's campaigns and print which answers changed (KEEP=1 keeps the new ones; PARTS="frf real"; resumes)
+	$(PYTHON) -m proof.ledger $(if $(KEEP),--keep) $(PARTS)
+
+house: $(VENV)/.dev ## print the size and shape of the library: files, lines, constants, circles
+	@$(PYTHON) -m scripts.house
 
 proof: $(VENV)/.dev ## judge the diagnosis on concealed campaigns and real recordings (several hours; resumes)
 	$(VENV)/bin/underskin prove

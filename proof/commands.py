@@ -1,22 +1,13 @@
 """`underskin prove`: the diagnosis judged on campaigns whose answer it cannot know, and the page about it."""
 
 import os
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TaskID,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+
+from proof.progress import progress_bars
 
 
 def prove(
@@ -54,18 +45,10 @@ def prove(
             raise typer.BadParameter(f"{name!r}: must be one of {', '.join(PARTS)}", param_hint="PART")
     work = Work(work_dir, workers or os.cpu_count() or 1, count)
     written: list[Path] = []
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=Console(stderr=True)) as bars:
+    with progress_bars() as bar:
         for name in part or PARTS:
-            work_out(name, work, results_dir, partial(_tell, bars, bars.add_task(name, total=None)))
+            work_out(name, work, results_dir, bar(name))
             # After each part, so that a stopped run leaves a page.
             written = write_page(stored_parts(results_dir), docs_dir)
     for path in written:
         typer.echo(str(path))
-
-
-def _tell(bars: Progress, task: TaskID, done: int, total: int) -> None:
-    """A bar, or where there is no terminal a line."""
-    bars.update(task, completed=done, total=total)
-    if not bars.console.is_terminal:
-        typer.echo(f"{bars.tasks[task].description}: {done} of {total}", err=True)

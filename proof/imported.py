@@ -3,20 +3,16 @@
 import ast
 from collections.abc import Collection, Mapping
 
-_BEGUN = (
-    "underskin.diagnosis.pipeline", "underskin.diagnosis.reporting.report", "underskin.recordings.campaign",
-    "underskin.surrogate.sigma_table",
-)  # fmt: skip
+_BEGUN = ("underskin.diagnosis.diagnose", "underskin.recordings.campaign", "underskin.surrogate.sigma_table")
 _BY_NAME = "underskin.mechanisms."  # laws are found by the folder that they are in
 # Of the package's own list of names, or where a file is read
 _UNUSED = ("underskin.cli.", "underskin.client.", "underskin.figures.", "underskin.recordings.readers.")
 
 
-def of_a_diagnosis(texts: Mapping[str, str], further: Collection[str] = ()) -> dict[str, str]:
-    """Those of the texts of modules by their dotted names, packages as `package.__init__`: of a diagnosis of one
-    campaign, and of what begins in `further` modules."""
+def of_a_diagnosis(texts: Mapping[str, str]) -> dict[str, str]:
+    """Those of the texts of modules by their dotted names, packages as `package.__init__`."""
     known = {name.removesuffix(".__init__"): name for name in texts}
-    left = [name for name in known if name in _BEGUN or name in further or name.startswith(_BY_NAME)]
+    left = [name for name in known if name in _BEGUN or name.startswith(_BY_NAME)]
     found: set[str] = set()
     while left:
         name = left.pop()

@@ -8,16 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import underskin
 from proof.ideal_fleet import departures
 from proof.judge import answer
-from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, sources, stored
+from proof.stored import Work, diagnosed, diagnosed_by, diagnosing, digest_of, of_each, sources, stored
 from rig.joint import WHAT, drawn_joint, joint_campaigns
 
 SEED, COUNT = 10610, 150
 _VISIBLE = 20.0  # in χ²
 _SURE = 0.8
 _STATED = 0.5  # probability of a departure that is stated
-SEVERAL = ("underskin.diagnosis.several.campaigns", "underskin.diagnosis.several.fleet")
 _ERRORS = ("modulus_error", "thickness_error", "strain_stiffening")
 
 Report = Mapping[str, Any]
@@ -26,7 +26,7 @@ Report = Mapping[str, Any]
 def judge_joint(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
     """Of each joint campaign what was hidden, and what is told together and apart."""
     cases = [(number, WHAT[number % len(WHAT)]) for number in range(min(work.count or COUNT, COUNT))]
-    version = f"{diagnosing(*SEVERAL)} {sources('rig')}"
+    version = f"{diagnosing()} {sources('rig')}"
     return {"seed": SEED, "judged": of_each(work, cases, partial(_judged, work, version), progress)}
 
 
@@ -80,12 +80,24 @@ def _present(report: Report) -> set[str]:
             if len(entry["mechanisms"]) == 1 and entry["probability"] >= _SURE}  # fmt: skip
 
 
-def _dates(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
-    from underskin.diagnosis.several.campaigns import diagnose_together
-    from underskin.recordings.campaign import from_dict
-    from underskin.surrogate.sigma_table import load_table
+def _together(readings: Sequence[underskin.Reading]) -> underskin.Report:
+    return underskin.diagnose_together(readings, "drawn joint")
 
-    together = diagnose_together([from_dict(document)[0] for document in documents], load_table(), truth["name"])
+
+def _fleet(readings: Sequence[underskin.Reading]) -> underskin.Report:
+    return underskin.diagnose_fleet({str(one.campaign.skin.id): [one] for one in readings}, "drawn joint")
+
+
+def _campaign(readings: Sequence[underskin.Reading]) -> underskin.Report:
+    return underskin.diagnose(readings[0])
+
+
+# How each kind of joint campaigns is diagnosed
+DIAGNOSED = {"compression": _campaign, "indentation": _campaign, "dates": _together, "skins": _fleet}
+
+
+def _dates(documents: Sequence[dict[str, Any]], _truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
+    together = diagnosed_by(_together, documents)
     changed = [entry for entry in hidden if entry["since"]]
     scopes = {entry["name"]: entry["scope"] for entry in together["mechanisms"]}
     expected = {entry["effect"] for entry in hidden}
@@ -114,26 +126,24 @@ def _dates_of(effect: str, together: Report) -> set[str | None]:
 
 
 def _skins(documents: Sequence[dict[str, Any]], truth: Report, hidden: Sequence[Report]) -> dict[str, Any]:
-    from underskin.diagnosis.several.fleet import diagnose_fleet
-    from underskin.recordings.campaign import from_dict
-    from underskin.surrogate.sigma_table import load_table
-
-    campaigns = {str(document["skin"]["id"]): [from_dict(document)[0]] for document in documents}
-    fleet = diagnose_fleet(campaigns, load_table(), truth["name"])
-    departing = {entry["departs"] for entry in truth["hidden"] if entry["departs"]}
-    stated = {one["skin"] for entry in fleet["population"] for one in entry["departures"]}
-    stated |= {
-        skin
-        for entry in fleet["mechanisms"]
-        if len(entry["scope"]["skins"]) < len(campaigns)
-        for skin in entry["scope"]["skins"]
-    }
+    fleet = diagnosed_by(_fleet, documents)
+    hidden_in = {entry["departs"] for entry in truth["hidden"] if entry["departs"]}
     d33 = {entry["skin"]: entry for entry in next(
-        (one["skins"] for one in fleet["population"] if one["parameter"] == "d33"), [])}  # fmt: skip
+        (one["skins"] for one in fleet.get("population") or () if one["parameter"] == "d33"), [])}  # fmt: skip
     known = {entry["skin"]: next(iter(entry["d33_pc_per_n"].values())) for entry in truth["documents"]}
     return {
-        "departs": sorted(departing),
+        "departs": sorted(hidden_in),
         "identifiable": sorted(entry["departs"] for entry in hidden if entry["departs"]),
-        "stated": sorted(stated),
+        "stated": sorted(departing(fleet)),
         "d33_held": [d33[skin]["low"] <= value <= d33[skin]["high"] for skin, value in known.items() if skin in d33],
     }
+
+
+def departing(fleet: Report) -> set[str]:
+    """Skins, of one campaign each, that depart by the report: in a quantity, or by a mechanism that others lack."""
+    stated = {one["skin"] for entry in fleet.get("population") or () for one in entry["departures"]}
+    for entry in fleet["mechanisms"]:
+        skins = entry.get("scope", {}).get("skins", ())
+        if len(skins) < len(fleet.get("campaigns", ())):
+            stated.update(skins)
+    return stated

@@ -48,13 +48,23 @@ def _judge(work: Work, seed: int, numbers: Sequence[int], progress: Callable[[in
 
 def _judged(work: Work, seed: int, version: str, number: int) -> dict[str, Any]:
     key = digest_of(["slips", seed, number, version])
-    return stored(work.folder / "slips", key, partial(of_one, seed, number, load_table()))
+    return stored(work.folder / "slips", key, partial(of_one, seed, number))
 
 
-def of_one(seed: int, number: int, sigma: SigmaTable) -> dict[str, Any]:
-    """One campaign: what is named in it without a slip, and of each visible or committed slip what is named."""
+def _description(seed: int, number: int) -> dict[str, Any]:
     single, of = _SINGLE
-    description = drawn(seed, number, "single" if number % of < single else "none")
+    return drawn(seed, number, "single" if number % of < single else "none")
+
+
+def document(seed: int, number: int) -> dict[str, Any]:
+    """The campaign (`campaign/1`) without a slip."""
+    return campaign(record(_description(seed, number)))
+
+
+def of_one(seed: int, number: int) -> dict[str, Any]:
+    """One campaign: what is named in it without a slip, and of each visible or committed slip what is named."""
+    sigma = load_table()
+    description = _description(seed, number)
     recorded = record(description)
     made, _ = from_dict(campaign(recorded))
     case = _case(made, recorded, sigma)

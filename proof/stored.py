@@ -93,18 +93,14 @@ def reports(work: Work, cases: Sequence[Case], progress: Callable[[int, int], No
     return of_each(work, cases, partial(_report, work.folder / "reports", diagnosing()), progress)
 
 
-def of_diagnosis(*further: str) -> str:
-    """Digest of the library's sources on which a report of one campaign can depend, or what begins in `further`
-    modules."""
-    return _digest(of_a_diagnosis(_texts("underskin"), further))
+def of_diagnosis() -> str:
+    """Digest of the library's sources on which a report can depend."""
+    return _digest(of_a_diagnosis(_texts("underskin")))
 
 
-def diagnosing(*further: str) -> str:
-    """Digests of all that a report depends on but its campaign: the library's sources, as in `of_diagnosis`, and its
-    table."""
-    from underskin.surrogate.sigma_table import load_table
-
-    return f"{of_diagnosis(*further)} {load_table().sha256}"
+def diagnosing() -> str:
+    """Digests of all that a report depends on but its campaign: the library's sources, and its table."""
+    return f"{of_diagnosis()} {underskin.load_table().sha256}"
 
 
 def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
@@ -114,14 +110,17 @@ def _report(folder: Path, version: str, case: Case) -> dict[str, Any]:
 
 def diagnosed(document: dict[str, Any], without: Sequence[str] = ()) -> dict[str, Any]:
     """The report (`report/1`) of a campaign/1 document, these mechanisms left out of the catalogue."""
-    from underskin.diagnosis.pipeline import diagnose, with_refused
-    from underskin.diagnosis.reporting.report import report
+    return diagnosed_by(lambda readings: underskin.diagnose(readings[0], without=without), [document])
+
+
+def diagnosed_by(
+    diagnose: Callable[[Sequence["underskin.Reading"]], "underskin.Report"], documents: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """The report of `diagnose` on campaign/1 documents; a failure is a report too, which counts as a wrong answer."""
     from underskin.recordings.campaign import from_dict
-    from underskin.surrogate.sigma_table import load_table
 
     try:
-        campaign, refused = from_dict(document)
-        return report(with_refused(diagnose(campaign, load_table(), without=without), refused))
-    except Exception as error:  # a failed diagnosis counts as a wrong answer; the others go on
+        return dict(diagnose([underskin.Reading(*from_dict(document), []) for document in documents]))
+    except Exception as error:  # the other campaigns go on
         failed = {"verdict": FAILED, "probability": 0.0, "statement": repr(error), "mechanisms": [{"name": FAILED}]}
         return {**failed, "alternatives": [], "fit": None}

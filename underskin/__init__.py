@@ -15,7 +15,9 @@ from underskin.errors import (
 )
 
 if TYPE_CHECKING:
+    from underskin.client.documents.report import Report
     from underskin.client.service_client import Client
+    from underskin.diagnosis.diagnose import diagnose, diagnose_fleet, diagnose_together
     from underskin.inversion.invert import Inversion, invert
     from underskin.physics.charge_response import Sigma
     from underskin.physics.skin import Indenter, Skin
@@ -39,6 +41,7 @@ __all__ = [
     "Inversion",
     "Predicted",
     "Reading",
+    "Report",
     "ServiceError",
     "Sigma",
     "SigmaTable",
@@ -49,6 +52,9 @@ __all__ = [
     "Transmission",
     "UnderskinError",
     "Unreachable",
+    "diagnose",
+    "diagnose_fleet",
+    "diagnose_together",
     "frf_conditions",
     "invert",
     "load_table",
@@ -66,11 +72,15 @@ _MODULES = {
     "Inversion": "inversion.invert",
     "Predicted": "prediction.forward_model",
     "Reading": "recordings.reading",
+    "Report": "client.documents.report",
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
     "Skin": "physics.skin",
     "SkinDescription": "recordings.conditions",
     "Transmission": "prediction.pressed_skin",
+    "diagnose": "diagnosis.diagnose",
+    "diagnose_fleet": "diagnosis.diagnose",
+    "diagnose_together": "diagnosis.diagnose",
     "frf_conditions": "recordings.conditions",
     "invert": "inversion.invert",
     "load_table": "surrogate.sigma_table",

@@ -12,7 +12,6 @@ from proof.text_slips import slips
 from rig.draw import drawn, record
 from rig.recorded import RecordedLines, campaign
 from underskin.recordings.campaign import frf_recordings, from_dict
-from underskin.surrogate.sigma_table import load_table
 
 
 def recorded(effect: str, **values: Any) -> RecordedLines:
@@ -25,7 +24,7 @@ def recorded(effect: str, **values: Any) -> RecordedLines:
 
 @pytest.mark.slow
 def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
-    judged = [of_one(900810, number, load_table()) for number in (7, 8)]
+    judged = [of_one(900810, number) for number in (7, 8)]
     assert [entry["false"] for entry in judged] == [[], []]
     committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
     assert {slip for slip, _ in committed} <= set(SLIPS)

@@ -272,10 +272,9 @@ def plan(
     What is left out is as in the campaign; if all is and that separates nothing, what most rigs can do is tried too.
     """
     one_blas_thread()
-    from underskin.diagnosis.pipeline import diagnose as work_out
+    from underskin.diagnosis.diagnose import diagnose as diagnosed
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.recordings import read_file
-    from underskin.surrogate.sigma_table import load_table
 
     campaign = read_file(file, file.name).campaign
     limits = RigLimits(
@@ -286,5 +285,5 @@ def plan(
         dwell_s=dwell_s,
         recordings=recordings,
     )
-    diagnosis = work_out(campaign, load_table(), limits=limits)
-    typer.echo(json.dumps(diagnosis.next_experiment, ensure_ascii=False, indent=1))
+    planned = diagnosed(campaign, limits=limits)["next_experiment"] or {}
+    typer.echo(json.dumps(planned, ensure_ascii=False, indent=1))

@@ -11,7 +11,6 @@ from underskin.cli.reports import in_words, write_page, write_report
 from underskin.cli.rigs import reading_notes
 
 if TYPE_CHECKING:
-    from underskin.recordings.campaign import Campaign
     from underskin.recordings.reading import Reading
 
 _NAME = re.compile(r"\w[\w .-]*")
@@ -31,16 +30,13 @@ def of_several(
     from rich.console import Console
     from rich.progress import Progress
 
-    from underskin.diagnosis.several.campaigns import diagnose_together
-    from underskin.diagnosis.several.fleet import diagnose_fleet
-    from underskin.surrogate.sigma_table import load_table
+    from underskin.diagnosis.diagnose import diagnose_fleet, diagnose_together
 
     target = output_dir / f"{_name(together, fleet)}.json"
     if any(file.resolve() == target.resolve() for file in files):
         raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
     readings = _read(files, read)
-    campaigns = [reading.campaign for reading in readings]
-    known = sorted({campaign.skin.id for campaign in campaigns if campaign.skin.id is not None})
+    known = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
     if together is not None and len(known) > 1:
         allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
         raise typer.BadParameter(allowed, param_hint="--together")
@@ -52,11 +48,11 @@ def of_several(
             progress.update(bar, completed=share)
 
         if together is not None:
-            document = diagnose_together(campaigns, load_table(), target.stem, without, told)
+            report = diagnose_together(readings, target.stem, without=without, progress=told)
         else:
-            document = diagnose_fleet(_by_skin(campaigns), load_table(), target.stem, without, told)
+            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=told)
         told(1.0)
-    document = {**document, "findings": [*_refused(readings), *document["findings"]]}
+    document = dict(report)
     write_report(document, target)
     if html:
         write_page(document, target.with_suffix(".html"))
@@ -90,32 +86,12 @@ def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Rea
     return readings
 
 
-def _refused(readings: Sequence["Reading"]) -> list[dict[str, str]]:
-    """Findings of the recordings that were refused when they were read, led by the campaign's name."""
-    from underskin.findings.codes import Reason
-    from underskin.findings.finding import Finding
-
-    findings = [
-        (
-            reading.campaign.name,
-            Finding(
-                Reason.REFUSED,
-                problem.recording,
-                problem.field,
-                {"field": problem.field, "value": problem.value, "allowed": problem.allowed},
-            ).in_report(),
-        )
-        for reading in readings
-        for problem in reading.problems
-    ]
-    return [{**said, "statement": f"{name}: {said['statement']}"} for name, said in findings]
-
-
-def _by_skin(campaigns: Sequence["Campaign"]) -> dict[str, list["Campaign"]]:
+def _by_skin(readings: Sequence["Reading"]) -> dict[str, list["Reading"]]:
     """By skin.id, which each must have."""
-    skins: dict[str, list[Campaign]] = {}
-    for campaign in campaigns:
-        if campaign.skin.id is None:
-            raise typer.BadParameter(f"{campaign.name} names no skin (skin.id)", param_hint="--fleet")
-        skins.setdefault(campaign.skin.id, []).append(campaign)
+    skins: dict[str, list[Reading]] = {}
+    for reading in readings:
+        skin = reading.campaign.skin.id
+        if skin is None:
+            raise typer.BadParameter(f"{reading.campaign.name} names no skin (skin.id)", param_hint="--fleet")
+        skins.setdefault(skin, []).append(reading)
     return skins

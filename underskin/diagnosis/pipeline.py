@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import scipy
 
-import underskin
 from underskin.diagnosis.data.curve_samples import curve_lines
 from underskin.diagnosis.data.inspected import Inspected
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
@@ -289,7 +288,7 @@ def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]
 
 def _provenance(table: SigmaTable, mechanisms: Known) -> dict[str, Any]:
     return {
-        "underskin": importlib.metadata.version(underskin.__name__),
+        "underskin": importlib.metadata.version("underskin"),
         "numpy": np.__version__,
         "scipy": scipy.__version__,
         "tables": {"sigma": table.sha256},

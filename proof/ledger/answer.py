@@ -1,0 +1,81 @@
+"""The answer of a report, as the ledger keeps it, and its grade: `right`, `open` or `wrong`."""
+
+from collections.abc import Collection, Mapping
+from typing import Any
+
+from proof.judge import UNKNOWN
+from rig.identifiable import THRESHOLD
+
+Report = Mapping[str, Any]
+RIGHT, OPEN, WRONG = "right", "open", "wrong"
+GRADES = (WRONG, OPEN, RIGHT)  # from bad to good
+
+# Names of one law (PHYSICS: the finite amplitude of a moving edge)
+_ONE_LAW = {"amplitude_nonlinearity": "moving_contact_edge"}
+_DIGITS = 4
+
+
+def named(report: Report) -> list[str]:
+    """The leading set of mechanisms; of `unexplained` the unlisted law and its companions; slips by their codes."""
+    if "slips" in report:
+        return sorted([*report["false"], *(slip for slip, one in report["slips"].items() if one["named"])])
+    names = sorted(entry["name"] for entry in report["mechanisms"])
+    law = report.get("unnamed")
+    if report["verdict"] == "unexplained":
+        names.append("unlisted" if law is None else f"unlisted: {law['acts_on']} over {law['axis']}, {law['form']}")
+    return names
+
+
+def answer(report: Report) -> dict[str, Any]:
+    """Verdict, set, probability, and the d33 or modulus that is stated, with its 95 % interval."""
+    stated = {"verdict": report.get("verdict", "slips"), "names": named(report)}
+    if "slips" in report:
+        return {**stated, "slips": slips_told(report)}
+    fit = report.get("fit") or {}
+    quantity, value = "d33", report.get("d33")
+    if not value or value.get("value") is None:
+        quantity, value = "youngs_modulus", (fit.get("after") or {}).get("youngs_modulus")
+    stated["probability"] = report["probability"]
+    if value and value.get("value") is not None:
+        stated[quantity] = [_rounded(value.get(end)) for end in ("value", "low", "high")]
+        stated["quotable"] = bool(value.get("quotable", report["verdict"] in ("explained", "no_mismatch")))
+    return stated
+
+
+def slips_told(report: Report) -> list[int]:
+    """How many of the slips that can be told from other causes are named, and how many there are."""
+    identifiable = [one["named"] for one in report["slips"].values() if one["over_rivals"] > THRESHOLD]
+    return [sum(identifiable), len(identifiable)]
+
+
+def graded(report: Report, effects: Collection[str], shows: Collection[str]) -> str:
+    """A set is right that holds all that shows and nothing that is not hidden; open is an `ambiguous` answer with a
+    right set among its alternatives, and no conclusion where something shows."""
+    hidden, seen = _merged(effects), _merged(shows)
+
+    def is_right(names: Collection[str]) -> bool:
+        return seen <= _merged(names) <= hidden
+
+    verdict = report["verdict"]
+    if verdict == "unexplained":
+        return RIGHT if UNKNOWN in hidden else WRONG
+    stated = [entry["name"] for entry in report["mechanisms"]]
+    if is_right(stated):
+        return OPEN if verdict == "insufficient_data" and hidden else RIGHT
+    rivals = [_of_rival(entry["mechanisms"]) for entry in report.get("alternatives", ())]
+    left_open = verdict == "ambiguous" and any(is_right(names) for names in rivals)
+    return OPEN if left_open or verdict == "insufficient_data" else WRONG
+
+
+def _of_rival(names: Collection[str]) -> list[str]:
+    """A rival set: `nothing_missing` is the empty one, `none_of_these` is what is in no catalogue."""
+    said = {"nothing_missing": [], "none_of_these": [UNKNOWN]}
+    return [one for name in names for one in said.get(name, [name])]
+
+
+def _merged(names: Collection[str]) -> set[str]:
+    return {_ONE_LAW.get(name, name) for name in names}
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.{_DIGITS}g}")

@@ -1,0 +1,330 @@
+"""The ledger's campaigns, part by part: what is diagnosed, what is true, and what a right answer is.
+
+Drawn campaigns have seeds that no part of the proof uses, since the ledger is looked at every day.
+"""
+
+import importlib.util
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, ClassVar
+
+from proof import joint, judge, slips
+from proof.cases import DrawnCase, DrawnCurves
+from proof.ledger.answer import OPEN, RIGHT, WRONG, graded, slips_told
+from proof.results import data_folder
+from proof.stored import diagnosed, diagnosed_by
+from proof.unlisted import judged as judged_by_law
+from rig.draw import record
+from rig.draw_curves import drawn_curves
+from rig.effects import INDENTATION
+from rig.identifiable import THRESHOLD
+from rig.joint import WHAT, drawn_joint
+from rig.truth import truth_of_curves, truth_of_lines
+from rig.visible_curves import THRESHOLD as CURVE_THRESHOLD
+
+Report = Mapping[str, Any]
+Truth = dict[str, Any]
+
+FRF_SEED, CURVE_SEED, JOINT_SEED, SLIP_SEED = 51763, 51764, 51765, 51766
+FRFS, CURVES, JOINT, SLIPS = 150, 60, 30, 60
+_HIDDEN_IN_CURVES = ("single", "pair", "unknown", "single", "none")  # in turn
+_CAMPAIGNS, _RECORDINGS = "UNDERSKIN_CAMPAIGNS", "UNDERSKIN_RECORDINGS"
+# What the judge of real recordings says of an answer
+_GRADES = {
+    RIGHT: ("right", "right: no listed law"),
+    OPEN: ("partly", "honest", "refused"),
+    WRONG: ("right, E off", "honest, E off", "wrong", "confidently wrong"),
+}
+_SOLVED_GRADES = {"right": RIGHT, "equivalent": RIGHT, "partly": OPEN, "honest": OPEN, "wrong": WRONG}
+
+
+@cache
+def _read(path: Path) -> dict[str, Any]:
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+@dataclass(frozen=True)
+class Item:
+    """One campaign of the ledger, or some to be judged together; small, so that any process can get it."""
+
+    name: str
+    needs: ClassVar[str] = ""  # the setting that names the folder of its data
+
+    def documents(self) -> list[dict[str, Any]]:
+        """What the diagnosis is given."""
+        raise NotImplementedError
+
+    def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
+        """The report on them."""
+        return diagnosed(documents[0])
+
+    def truth(self) -> Truth:
+        """What is hidden (`effects`), which of it shows (`shows`), and the true `d33` or `youngs_modulus`."""
+        raise NotImplementedError
+
+    def grade(self, report: Report, truth: Truth, /) -> str:
+        """`right`, `open` or `wrong`."""
+        return graded(report, truth["effects"], truth["shows"])
+
+
+@dataclass(frozen=True)
+class DrawnFrf(Item):
+    """FRFs of the virtual rig, of its usual mixture of what is hidden."""
+
+    number: int
+
+    @property
+    def _case(self) -> DrawnCase:
+        return DrawnCase(FRF_SEED, self.number)
+
+    def documents(self) -> list[dict[str, Any]]:
+        """One campaign."""
+        return [self._case.document()]
+
+    def truth(self) -> Truth:
+        """By the rig's own fit."""
+        known = truth_of_lines(record(self._case.description))
+        return {**_that_shows(known, THRESHOLD), "d33": known["d33_pc_per_n"]}
+
+
+@dataclass(frozen=True)
+class DrawnRawCurves(Item):
+    """Raw indentation curves of the virtual rig."""
+
+    number: int
+
+    @property
+    def _case(self) -> DrawnCurves:
+        return DrawnCurves(CURVE_SEED, self.number, _HIDDEN_IN_CURVES[self.number % len(_HIDDEN_IN_CURVES)])
+
+    def documents(self) -> list[dict[str, Any]]:
+        """One campaign."""
+        return [self._case.document()]
+
+    def truth(self) -> Truth:
+        """By the rig's own fit."""
+        known = truth_of_curves(*drawn_curves(CURVE_SEED, self.number, INDENTATION, self._case.what))
+        return {**_that_shows(known, CURVE_THRESHOLD), "youngs_modulus": known["youngs_modulus_mpa"]}
+
+
+@dataclass(frozen=True)
+class DrawnJoint(Item):
+    """FRFs beside curves, dates of a skin, or skins of one make, judged together."""
+
+    number: int
+
+    @property
+    def _what(self) -> str:
+        return WHAT[self.number % len(WHAT)]
+
+    def documents(self) -> list[dict[str, Any]]:
+        """All that are judged together."""
+        return drawn_joint(JOINT_SEED, self.number, self._what)[0]
+
+    def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
+        """Of several campaigns one report."""
+        return diagnosed_by(joint.DIAGNOSED[self._what], documents)
+
+    def truth(self) -> Truth:
+        """What shows in all together."""
+        hidden = drawn_joint(JOINT_SEED, self.number, self._what)[1]["hidden"]
+        shows = [entry for entry in hidden if entry["identifiable"]]
+        if self._what == "skins":
+            effects, seen = ([one["departs"] for one in entries if one["departs"]] for entries in (hidden, shows))
+        else:
+            effects, seen = ([one["effect"] for one in entries] for entries in (hidden, shows))
+        return {"what": self._what, "effects": sorted(effects), "shows": sorted(seen)}
+
+    def grade(self, report: Report, truth: Truth, /) -> str:
+        """Of skins by which depart, otherwise by the set of mechanisms."""
+        if self._what != "skins":
+            return super().grade(report, truth)
+        return RIGHT if joint.departing(report) == set(truth["shows"]) else WRONG
+
+
+@dataclass(frozen=True)
+class Slips(Item):
+    """A campaign of the virtual rig as it is, and with each slip of a lab in it."""
+
+    number: int
+
+    def documents(self) -> list[dict[str, Any]]:
+        """The campaign as it is."""
+        return [slips.document(SLIP_SEED, self.number)]
+
+    def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
+        """What the screening names in it without a slip, and with each."""
+        del documents  # drawn again, since slips are judged by the rig's equations
+        return slips.of_one(SLIP_SEED, self.number)
+
+    def truth(self) -> Truth:
+        """The slips themselves are the truth."""
+        return {}
+
+    def grade(self, report: Report, _truth: Truth, /) -> str:
+        """Right where every slip that can be told is named and none without one."""
+        named, told = slips_told(report)
+        if report["false"]:
+            return WRONG
+        return RIGHT if named == told else OPEN
+
+
+@dataclass(frozen=True)
+class Concealed(Item):
+    """A campaign of another rig, from a folder of `UNDERSKIN_CAMPAIGNS`, with its truth in a file."""
+
+    folder: str
+    truths: str
+    needs: ClassVar[str] = _CAMPAIGNS
+
+    def documents(self) -> list[dict[str, Any]]:
+        """One campaign."""
+        return [json.loads((data_folder(_CAMPAIGNS) / self.folder / f"{self.name}.json").read_text(encoding="utf-8"))]
+
+    @property
+    def known(self) -> Truth:
+        """Its entry in the file of truths."""
+        return dict(_read(data_folder(_CAMPAIGNS) / self.truths)[self.name])
+
+    def truth(self) -> Truth:
+        """Effects, and whether they show."""
+        known = self.known
+        value = {"d33": "d33_pc_per_n", "youngs_modulus": "youngs_modulus_mpa"}
+        values = {name: known[field] for name, field in value.items() if field in known}
+        return {**_that_shows(known, CURVE_THRESHOLD if "youngs_modulus" in values else THRESHOLD), **values}
+
+
+@dataclass(frozen=True)
+class UnlistedLaw(Concealed):
+    """The same with a law in no catalogue."""
+
+    def truth(self) -> Truth:
+        """The law, and whether it shows."""
+        known = self.known
+        law = f"{known['law']['acts_on']} over {known['law']['axis']}"
+        return {"effects": [law], "shows": [law] if known["identifiable"] else [], "d33": known["d33_pc_per_n"]}
+
+    def grade(self, report: Report, truth: Truth, /) -> str:
+        """Right where it is recognised as unlisted and placed; open where it is recognised or left open."""
+        judged = judged_by_law(self.name, self.known, report)
+        if not truth["shows"]:
+            return RIGHT if report["verdict"] in judge.QUIET or judged["recognised"] else WRONG
+        if judged["recognised"]:
+            return RIGHT if judged["placed"] else OPEN
+        return OPEN if report["verdict"] in ("ambiguous", "insufficient_data") else WRONG
+
+
+@dataclass(frozen=True)
+class Solved(Concealed):
+    """A campaign made by solving the physics, judged by the scorer beside it."""
+
+    def truth(self) -> Truth:
+        """The effect, and the true d33 or E."""
+        known = self.known
+        quantity = "youngs_modulus" if "case" in known else "d33"
+        value = known["youngs_modulus_mpa" if "case" in known else "d33_pc_per_n"]
+        return {"effects": [known["effect"]], "shows": [], quantity: value}
+
+    def grade(self, report: Report, _truth: Truth, /) -> str:
+        """By the scorer's classes."""
+        scorer = _module(data_folder(_CAMPAIGNS) / "solved-open" / "score.py")
+        known = self.known
+        judged = (scorer.grade_curve if "case" in known else scorer.grade)(known, report)
+        return _SOLVED_GRADES[judged["cls"]]
+
+
+@dataclass(frozen=True)
+class Real(Item):
+    """A real recording of `UNDERSKIN_RECORDINGS`, with what its owner says of it, judged by the judge beside it."""
+
+    needs: ClassVar[str] = _RECORDINGS
+
+    @property
+    def known(self) -> Truth:
+        """Its entry in the file of truths."""
+        return dict(_read(data_folder(_RECORDINGS) / "real" / "open" / "truth.json")[self.name])
+
+    def documents(self) -> list[dict[str, Any]]:
+        """Its files as text: what they are read as belongs to the answer."""
+        known = self.known
+        folder = data_folder(_RECORDINGS) / "real" / "open" / known["folder"]
+        paths = [folder / name for name in (*known["files"], *([known["rig"]] if known["rig"] else []))]
+        return [{"name": path.name, "content": path.read_bytes().hex()} for path in paths]
+
+    def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
+        """Read as the command line reads it; no report where it is refused."""
+        from underskin import diagnose, diagnose_together, read_file
+        from underskin.errors import UnderskinError
+        from underskin.recordings.rig_description import parse
+
+        contents = {one["name"]: bytes.fromhex(one["content"]) for one in documents}
+        known = self.known
+        try:
+            rig = parse(contents[known["rig"]], known["rig"]) if known["rig"] else None
+            readings = [read_file(contents[name], name, rig) for name in known["files"]]
+            report = diagnose(readings[0]) if len(readings) == 1 else diagnose_together(readings, self.name)
+        except UnderskinError as error:
+            return {"verdict": "refused", "probability": 0.0, "statement": str(error), "mechanisms": []}
+        return report.document
+
+    def truth(self) -> Truth:
+        """What its owner says."""
+        return {"effects": self.known["required"], "shows": self.known["required"], "says": self.known["truth"]}
+
+    def grade(self, report: Report, _truth: Truth, /) -> str:
+        """By the judge's words."""
+        judging = _module(data_folder(_RECORDINGS) / "real" / "judge.py")
+        word = judging.judge(self.known, None if report["verdict"] == "refused" else report)[0]
+        return next(grade for grade, words in _GRADES.items() if word in words)
+
+
+def _concealed(kind: type[Concealed], folder: str, truths: str) -> list[Item]:
+    names = sorted(_read(data_folder(_CAMPAIGNS) / truths))
+    return [kind(name, folder, truths) for name in names]
+
+
+PARTS: dict[str, Callable[[], list[Item]]] = {
+    "frf": lambda: [DrawnFrf(f"{FRF_SEED}-{number:03d}", number) for number in range(FRFS)],
+    "curves": lambda: [DrawnRawCurves(f"{CURVE_SEED}-{number:03d}", number) for number in range(CURVES)],
+    "joint": lambda: [DrawnJoint(f"{JOINT_SEED}-{number:03d}", number) for number in range(JOINT)],
+    "slips": lambda: [Slips(f"{SLIP_SEED}-{number:03d}", number) for number in range(SLIPS)],
+    "open": lambda: _concealed(Concealed, "open", "open-truth.json"),
+    "curves-open": lambda: _concealed(Concealed, "curves-open", "curves-open-truth.json"),
+    "unlisted-open": lambda: _concealed(UnlistedLaw, "unlisted-open", "unlisted-open-truth.json"),
+    "solved-frf": lambda: _concealed(Solved, "solved-open/frf", "solved-open/truth_frf.json"),
+    "solved-curves": lambda: _concealed(Solved, "solved-open/curves", "solved-open/truth_curves.json"),
+    "real": lambda: [Real(name) for name in sorted(_read(data_folder(_RECORDINGS) / "real" / "open" / "truth.json"))],
+}  # fmt: skip
+NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.startswith("solved")} | {
+    "open": _CAMPAIGNS,
+    "real": _RECORDINGS,
+}
+
+
+def _that_shows(known: Mapping[str, Any], threshold: float) -> Truth:
+    """The effects, and those that gain more than the threshold in χ²; as a whole, where the gain of each is unknown."""
+    effects = list(known["effects"])
+    if not effects:
+        return {"effects": [], "shows": []}
+    gains = list(known.get("chi2_gain_of_each") or [])
+    if isinstance(known.get("chi2_gain_of_each"), Mapping):
+        gains = list(known["chi2_gain_of_each"].values())
+    if len(effects) == 1 or len(gains) != len(effects):
+        return {"effects": sorted(effects), "shows": sorted(effects) if known["identifiable"] else []}
+    seen = [effect for effect, gain in zip(effects, gains, strict=True) if gain is None or gain > threshold]
+    return {"effects": sorted(effects), "shows": sorted(seen)}
+
+
+@cache
+def _module(path: Path) -> ModuleType:
+    """A Python file that lies beside the data."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

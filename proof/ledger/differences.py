@@ -1,0 +1,175 @@
+"""What changed between the kept answers and new ones, and whether right answers were won or lost beyond chance."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scipy.stats import binomtest
+
+from proof.ledger.answer import GRADES, OPEN, RIGHT, WRONG
+from proof.markdown import table
+from proof.phrases import percent
+from proof.statistics import Share, calibration, share
+
+Line = Mapping[str, Any]  # name, documents (their digest), truth, answer, grade
+
+_PROBABILITY = 0.05
+_OF_INTERVAL = 0.1
+_QUANTITIES = ("d33", "youngs_modulus")
+SIGNIFICANT = 0.05
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A part's kept lines and its new ones, in pairs of one campaign."""
+
+    part: str
+    pairs: Sequence[tuple[Line, Line]]
+    seconds: tuple[float, float]  # processor time of the diagnoses, kept and new; nan where it is not known
+
+    def changed(self) -> list[tuple[Line, Line]]:
+        """Pairs of different answers."""
+        return [(kept, new) for kept, new in self.pairs if next(differences(kept, new), None)]
+
+    @property
+    def better(self) -> int:
+        """Answers that were graded higher: from wrong to open or right, from open to right."""
+        return sum(GRADES.index(new["grade"]) > GRADES.index(kept["grade"]) for kept, new in self.pairs)
+
+    @property
+    def worse(self) -> int:
+        """Answers that were graded lower."""
+        return sum(GRADES.index(new["grade"]) < GRADES.index(kept["grade"]) for kept, new in self.pairs)
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided sign test of better against worse: the probability of so uneven a split of equal chances."""
+        return float(binomtest(self.better, self.better + self.worse).pvalue) if self.better + self.worse else 1.0
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether more answers were lost than chance allows."""
+        return self.worse > self.better and self.p_value < SIGNIFICANT
+
+
+def differences(kept: Line, new: Line) -> Iterator[str]:
+    """What differs in one answer, in words: set, verdict, probability by more than 0.05, a number or its interval by
+    more than a tenth of the kept interval."""
+    if kept["documents"] != new["documents"]:
+        yield "the campaign itself"
+    before, after = kept["answer"], new["answer"]
+    for name in ("verdict", "names"):
+        if before[name] != after[name]:
+            yield f"{_said(before[name])} → {_said(after[name])}"
+    if abs(before.get("probability", 0.0) - after.get("probability", 0.0)) > _PROBABILITY:
+        yield f"probability {before['probability']:.2f} → {after['probability']:.2f}"
+    for quantity in _QUANTITIES:
+        if _moved(before.get(quantity), after.get(quantity)):
+            yield f"{quantity} {_interval(before.get(quantity))} → {_interval(after.get(quantity))}"
+    if before.get("quotable", False) != after.get("quotable", False):
+        yield "quotable now" if after.get("quotable") else "no longer quotable"
+
+
+def _moved(before: Sequence[float | None] | None, after: Sequence[float | None] | None) -> bool:
+    if before is None or after is None:
+        return before is not after
+    _, low, high = before
+    if low is None or high is None:
+        return before != after
+    allowed = _OF_INTERVAL * (high - low)
+    pairs = zip(before, after, strict=True)
+    return any(one is None or other is None or abs(one - other) > allowed for one, other in pairs)
+
+
+def _interval(stated: Sequence[float | None] | None) -> str:
+    if stated is None:
+        return "not stated"
+    value, low, high = stated
+    return f"{value:g}" if low is None or high is None else f"{value:g} ({low:g} to {high:g})"
+
+
+def _said(value: Any) -> str:
+    return value if isinstance(value, str) else " + ".join(value) or "nothing"
+
+
+def text(compared: Sequence[Compared]) -> str:
+    """All that changed, by part, and a table of the parts in Markdown."""
+    lines: list[str] = []
+    for part in compared:
+        changed = part.changed()
+        if changed:
+            lines.append(f"{part.part}: {len(changed)} of {len(part.pairs)} answers changed{_by_effect(changed)}")
+        for kept, new in changed:
+            hidden = _said(kept["truth"].get("effects", ()))
+            graded = new["grade"] if kept["grade"] == new["grade"] else f"{kept['grade']} → {new['grade']}"
+            lines.append(f"  {new['name']} ({hidden}; {graded}): {'; '.join(differences(kept, new))}")
+    header = [
+        *("part", "changed", "right", "open", "wrong", "better", "worse", "p"),
+        *("error of probabilities (by chance)", "interval holds the truth", "processor time, s"),
+    ]
+    parts = table(header, [_row(part) for part in compared])
+    slips = [f"\nSlips: {_slips(part)}." for part in compared if any("slips" in new["answer"] for _, new in part.pairs)]
+    return "\n".join([*lines, *([""] if lines else []), parts, *slips])
+
+
+def _slips(part: Compared) -> str:
+    """Of the slips that can be told, how many are named; and campaigns in which one is named without a slip."""
+    kept, new = ([pair[place] for pair in part.pairs] for place in (0, 1))
+    told = [[sum(line["answer"]["slips"][place] for line in lines) for place in (0, 1)] for lines in (kept, new)]
+    false = [_count(lines, WRONG) for lines in (kept, new)]
+    named = " → ".join(percent(Share(*counts)) for counts in told)
+    return f"named {named}; one named without a slip in {false[0]} → {false[1]} of {len(new)} campaigns"
+
+
+def _by_effect(changed: Sequence[tuple[Line, Line]]) -> str:
+    """How many changed of each hidden effect, the most first: where to look."""
+    counts = Counter(effect for kept, _ in changed for effect in kept["truth"].get("effects", ()))
+    return f", by what is hidden: {', '.join(f'{name} {count}' for name, count in counts.most_common(6))}" * bool(
+        counts
+    )
+
+
+def _row(part: Compared) -> list[str]:
+    kept, new = ([pair[place] for pair in part.pairs] for place in (0, 1))
+    grades = [[f"{_count(kept, grade)} → {_count(new, grade)}"] for grade in (RIGHT, OPEN, WRONG)]
+    before, after = part.seconds
+    return [
+        part.part,
+        f"{len(part.changed())} of {len(part.pairs)}",
+        *(cell for cells in grades for cell in cells),
+        str(part.better),
+        f"{part.worse}{' (significant)' if part.is_worse else ''}",
+        f"{part.p_value:.2g}",
+        f"{_calibration(kept)} → {_calibration(new)}",
+        f"{_held(kept)} → {_held(new)}",
+        f"{before:.0f} → {after:.0f}",
+    ]
+
+
+def _count(lines: Sequence[Line], grade: str) -> int:
+    return sum(line["grade"] == grade for line in lines)
+
+
+def _calibration(lines: Sequence[Line]) -> str:
+    """Expected calibration error of the stated probabilities, and the range that chance gives a calibrated tool."""
+    stated = [line for line in lines if "probability" in line["answer"] and line["answer"]["verdict"] != "refused"]
+    if not stated:
+        return "–"
+    told = calibration([line["answer"]["probability"] for line in stated], [line["grade"] == RIGHT for line in stated])
+    low, high = told.chance_range
+    return f"{told.error:.3f} ({low:.3f}–{high:.3f})"
+
+
+def _held(lines: Sequence[Line]) -> str:
+    """How many of the stated intervals of d33 or E hold the true value, and of those that may be quoted."""
+    held: list[bool] = []
+    quoted: list[bool] = []
+    for line in lines:
+        for quantity in _QUANTITIES:
+            true, stated = line["truth"].get(quantity), line["answer"].get(quantity)
+            if true is None or stated is None or stated[1] is None or stated[2] is None:
+                continue
+            held.append(stated[1] <= true <= stated[2])
+            quoted += [held[-1]] if line["answer"].get("quotable") else []
+    return f"{percent(share(held))}; quotable {percent(share(quoted))}" if held else "–"

@@ -1,0 +1,209 @@
+"""The size and shape of the library in figures: python -m scripts.house prints them as a table in Markdown.
+
+The catalogue (laws, readers, slips, units) is many small files by design, and is counted by itself.
+"""
+
+import ast
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+LIBRARY = ROOT / "underskin"
+CATALOGUE = ("mechanisms/laws/", "recordings/readers/", "diagnosis/screening/", "diagnosis/slips/", "units.py")
+SLIPS = ("diagnosis/screening/", "diagnosis/slips/")
+ENGINE = ("diagnosis/", "inference/")
+_KINDS = ("frf", "indentation", "compression")
+_RECORDINGS = re.compile(r"\w*Recording$")
+_TRACE = """
+import importlib, sys
+from pathlib import Path
+import underskin
+root = Path(underskin.__file__).parent
+for path in root.rglob("*.py"):  # all first, so that what runs at an import is not taken for the path
+    if path.stem != "__main__":
+        importlib.import_module(".".join(("underskin", *path.relative_to(root).with_suffix("").parts)))
+from underskin.cli.app import main
+passed = set()
+def note(frame, event, _):
+    if event == "call":
+        passed.add(frame.f_code.co_filename)
+sys.argv[1:] = ["diagnose", *sys.argv[2:], "--workers", "1"]
+sys.setprofile(note)
+try:
+    main()
+except SystemExit as ended:
+    assert not ended.code, ended.code
+finally:
+    sys.setprofile(None)
+    print(*sorted(passed), sep="\\n")
+"""  # compiled functions are no Python frames: their files are passed by whatever calls them
+
+
+def main() -> None:
+    """Print the table."""
+    modules = {_name(path): ast.parse(path.read_text(encoding="utf-8")) for path in LIBRARY.rglob("*.py")}
+    lines = {_name(path): len(path.read_text(encoding="utf-8").splitlines()) for path in LIBRARY.rglob("*.py")}
+    kept = [name for name in modules if not name.startswith(CATALOGUE)]
+    engine = [name for name in modules if name.startswith(ENGINE) and not name.startswith(SLIPS)]
+    circles = import_circles(modules)
+    split = split_classes(modules)
+    rows = [
+        ("`underskin`: files, lines", f"{len(modules)}, {sum(lines.values()):,}"),
+        ("without the catalogue", f"{len(kept)}, {sum(lines[name] for name in kept):,}"),
+        ("diagnosis and inference without slips", f"{len(engine)}, {sum(lines[name] for name in engine):,}"),
+        ("numeric module constants, of these", f"{sum(map(constants, (modules[name] for name in engine)))}"),
+        ("numeric module constants in the diagnosis, slips included",
+         f"{sum(constants(tree) for name, tree in modules.items() if name.startswith(ENGINE))}"),
+        ("branches on the kind of recording", f"{sum(map(kind_branches, modules.values()))}"),
+        ("files on the path of an FRF line, CSV to verdict", f"{len(passed_files())}"),
+        ("circles of imports", " · ".join(" ↔ ".join(one) for one in circles) or "0"),
+        ("classes over several files", f"{len(split)}: {', '.join(split)}" if split else "0"),
+    ]  # fmt: skip
+    print("| | |\n|---|---|")
+    for name, figure in rows:
+        print(f"| {name} | {figure} |")
+
+
+def _name(path: Path) -> str:
+    return path.relative_to(LIBRARY).as_posix()
+
+
+def constants(tree: ast.Module) -> int:
+    """Names in capitals at module level whose value holds a number."""
+    count = 0
+    for node in tree.body:
+        targets = (
+            node.targets if isinstance(node, ast.Assign) else [node.target] if isinstance(node, ast.AnnAssign) else []
+        )
+        value = getattr(node, "value", None)
+        if value is None or not any(_is_number(one) for one in ast.walk(value)):
+            continue
+        names = chain.from_iterable(one.elts if isinstance(one, ast.Tuple) else [one] for one in targets)
+        count += sum(isinstance(one, ast.Name) and one.id == one.id.upper() for one in names)
+    return count
+
+
+def _is_number(node: ast.AST) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool)
+
+
+def kind_branches(tree: ast.Module) -> int:
+    """Comparisons with the name of a kind of recording, tests of a recording's class, and conditions on `kind` or
+    `curves`."""
+    nodes = list(ast.walk(tree))
+    direct = [node for node in nodes if _compares_kinds(node)]
+    conditions: list[ast.expr] = []
+    for node in nodes:
+        conditions += node.ifs if isinstance(node, ast.comprehension) else []
+        conditions += [node.test] if isinstance(node, ast.If | ast.IfExp | ast.While) else []
+    indirect = [
+        test
+        for test in conditions
+        if any(_is_kind(one) for one in ast.walk(test)) and not any(_compares_kinds(one) for one in ast.walk(test))
+    ]
+    return len(direct) + len(indirect)
+
+
+def _is_kind(node: ast.AST) -> bool:
+    name = node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return name == "kind" or (name == "curves" and isinstance(node, ast.Attribute))
+
+
+def _compares_kinds(node: ast.AST) -> bool:
+    if isinstance(node, ast.Compare):
+        parts = chain.from_iterable(ast.walk(part) for part in (node.left, *node.comparators))
+        return any(isinstance(part, ast.Constant) and part.value in _KINDS for part in parts)
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "isinstance":
+        return any(isinstance(part, ast.Name) and _RECORDINGS.match(part.id) for part in ast.walk(node.args[1]))
+    return False
+
+
+def passed_files() -> list[str]:
+    """Files of the library in which a function runs while the command line diagnoses a CSV file of FRFs."""
+    sample = ROOT / "examples" / "campaigns" / "2017-05.csv"
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", _TRACE, "diagnose", str(sample), "--output-dir", folder]
+        run = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True)
+    return [line for line in run.stdout.splitlines() if line.startswith(str(LIBRARY))]
+
+
+def import_circles(modules: Mapping[str, ast.Module]) -> list[list[str]]:
+    """Groups of modules that import one another, wherever in the file the import is, for type checking too."""
+    known = {_dotted(name): name for name in modules}
+    graph = {
+        name: {known[one] for one in _imported(tree, known) if known[one] != name} for name, tree in modules.items()
+    }
+    groups = [sorted(group) for group in _strongly_connected(graph) if len(group) > 1]
+    return sorted(groups)
+
+
+def _dotted(name: str) -> str:
+    return ".".join(("underskin", *Path(name).with_suffix("").parts)).removesuffix(".__init__")
+
+
+def _imported(tree: ast.Module, known: Mapping[str, str]) -> Iterator[str]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                if name in known or node.module in known:
+                    yield name if name in known else node.module
+
+
+def _strongly_connected(graph: Mapping[str, Iterable[str]]) -> list[list[str]]:
+    """Tarjan's algorithm."""
+    order: dict[str, int] = {}
+    lowest: dict[str, int] = {}
+    stack: list[str] = []
+    groups: list[list[str]] = []
+
+    def visit(node: str) -> None:
+        order[node] = lowest[node] = len(order)
+        stack.append(node)
+        for other in graph[node]:
+            if other not in order:
+                visit(other)
+                lowest[node] = min(lowest[node], lowest[other])
+            elif other in stack:
+                lowest[node] = min(lowest[node], order[other])
+        if lowest[node] == order[node]:
+            place = stack.index(node)
+            groups.append(stack[place:])
+            del stack[place:]
+
+    sys.setrecursionlimit(10_000)
+    for node in graph:
+        if node not in order:
+            visit(node)
+    return groups
+
+
+def split_classes(modules: Mapping[str, ast.Module]) -> list[str]:
+    """Classes that one class alone extends, in another file of the same folder: one class in two pieces."""
+    home: dict[str, str] = {}
+    children: dict[str, list[str]] = {}
+    for name, tree in modules.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                home[node.name] = name
+                for base in node.bases:
+                    children.setdefault(ast.unparse(base).rpartition(".")[2].partition("[")[0], []).append(node.name)
+    return sorted(
+        f"{parent} ({home[parent]}) + {child[0]}"
+        for parent, child in children.items()
+        if parent in home
+        and len(child) == 1
+        and home[parent] != home[child[0]]
+        and Path(home[parent]).parent == Path(home[child[0]]).parent
+    )
+
+
+if __name__ == "__main__":
+    main()

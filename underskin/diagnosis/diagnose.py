@@ -1,0 +1,123 @@
+"""Diagnoses in Python: of one campaign, of several of a skin, of the skins of a fleet; each answers with a `Report`.
+
+>>> reading = underskin.read_file("palm-3.csv", "palm-3.csv")
+>>> report = underskin.diagnose(reading)
+>>> report.verdict, [mechanism.name for mechanism in report.mechanisms]
+('explained', ['contact_resonance'])
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+from underskin.client.documents.report import Report
+from underskin.diagnosis import pipeline
+from underskin.diagnosis.planning.rig_limits import RigLimits
+from underskin.diagnosis.reporting.report import report as report_document
+from underskin.diagnosis.several import campaigns as several
+from underskin.diagnosis.several import fleet
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.reading import Reading
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+Progress = Callable[[float], None]
+
+
+def diagnose(
+    campaign: Campaign | Reading,
+    table: SigmaTable | None = None,
+    *,
+    without: Collection[str] = (),
+    limits: RigLimits = pipeline.NO_LIMITS,
+    progress: Progress = lambda _: None,
+) -> Report:
+    """The report (`report/1`) on where recordings and model disagree, and what physics the model left out.
+
+    FRFs are diagnosed where the campaign has any, else its indentation curves, else its compressions; recordings of the
+    other kinds count with them. The same input gives the same report.
+
+    Parameters
+    ----------
+    campaign
+        A campaign, or what `read_file` returned: then the recordings that were refused are among the findings.
+    table
+        σ; default: the shipped one.
+    without
+        Mechanisms to leave out of the catalogue.
+    limits
+        What the rig can do, for the experiment to make next.
+    progress
+        Called with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    InvalidInput
+        A mechanism `without` that the catalogue does not have.
+    """
+    campaign, refused = (campaign.campaign, campaign.problems) if isinstance(campaign, Reading) else (campaign, [])
+    result = pipeline.diagnose(campaign, table or load_table(), progress, limits, without)
+    return Report.of(report_document(pipeline.with_refused(result, refused)))
+
+
+def diagnose_together(
+    campaigns: Sequence[Campaign | Reading],
+    name: str,
+    table: SigmaTable | None = None,
+    *,
+    without: Collection[str] = (),
+    progress: Progress = lambda _: None,
+) -> Report:
+    """The report on campaigns of one skin: what acts in all of them, and since when; parameters as for `diagnose`.
+
+    Parameters
+    ----------
+    campaigns
+        At least two, one of them with FRFs.
+    name
+        What the report calls them.
+
+    Raises
+    ------
+    InvalidInput
+        Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs in two campaigns.
+    """
+    read = [_campaign(one) for one in campaigns]
+    document = several.diagnose_together(read, table or load_table(), name, without, progress)
+    return _with_refused(document, campaigns)
+
+
+def diagnose_fleet(
+    skins: Mapping[str, Sequence[Campaign | Reading]],
+    name: str,
+    table: SigmaTable | None = None,
+    *,
+    without: Collection[str] = (),
+    progress: Progress = lambda _: None,
+) -> Report:
+    """The report on skins of one make, by their ids: what they share, and which of them depart; as for `diagnose`.
+
+    Raises
+    ------
+    InvalidInput
+        Fewer than two skins, or campaigns of a skin that cannot be diagnosed together.
+    """
+    read = {skin: [_campaign(one) for one in campaigns] for skin, campaigns in skins.items()}
+    document = fleet.diagnose_fleet(read, table or load_table(), name, without, progress)
+    return _with_refused(document, [one for campaigns in skins.values() for one in campaigns])
+
+
+def _campaign(campaign: Campaign | Reading) -> Campaign:
+    return campaign.campaign if isinstance(campaign, Reading) else campaign
+
+
+def _with_refused(document: Mapping[str, object], campaigns: Sequence[Campaign | Reading]) -> Report:
+    """With the recordings that were refused when they were read first among the findings, after their campaign."""
+    refused = []
+    for reading in [one for one in campaigns if isinstance(one, Reading)]:
+        for problem in reading.problems:
+            arguments = {"field": problem.field, "value": problem.value, "allowed": problem.allowed}
+            finding = Finding(Reason.REFUSED, problem.recording, problem.field, arguments).in_report()
+            refused.append({**finding, "statement": f"{reading.campaign.name}: {finding['statement']}"})
+    findings = document["findings"]
+    assert isinstance(findings, list)
+    return Report.of({**document, "findings": [*refused, *findings]})
