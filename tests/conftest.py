@@ -11,9 +11,16 @@ from pathlib import Path
 
 import httpx
 import pytest
+from hypothesis import HealthCheck, settings
 
 from bench import soak
 from tests.support.server import Server, running
+
+# A busy machine is slow and fails no test for it; the examples of a run are those of the next, but in a soak.
+settings.register_profile(
+    "tests", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=not soak.SOAK
+)
+settings.load_profile("tests")
 
 # A shell that runs the tests in the background has them ignore it, and the servers would inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -77,11 +84,16 @@ def _after_one_has_compiled() -> Iterator[None]:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark each test with what it needs, and `unit` where that is nothing but a second of this process.
 
-    Files of quick tests come last, so that all processes of a run end together.
+    Those of the soak are left out of other runs. Files of quick tests come last, so that all processes of a run end
+    together.
     """
+    if not soak.SOAK:
+        of_the_soak = [item for item in items if item.get_closest_marker("soak")]
+        config.hook.pytest_deselected(items=of_the_soak)
+        items[:] = [item for item in items if item not in of_the_soak]
     for item in items:
         for marker in _needs(item):
             item.add_marker(marker)
