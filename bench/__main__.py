@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 import time
+from datetime import UTC, datetime
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -58,14 +59,14 @@ def main(names: list[str], against: str | None) -> None:
     parts = PARTS if against is None else {AGAINST: partial(against_revision.measure, against)}
     all_parts = [name for name in parts if name != SOAK]  # that is measured by make soak
     for name in names if names and against is None else all_parts:
-        about = machine()
-        print(f"{name}: {about}", flush=True)
+        measured = {"commit": commit(), "date": datetime.now(UTC).date().isoformat(), "machine": machine()}
+        print(f"{name}: {measured}", flush=True)
         figures = parts[name]()
         print(markdown(figures), flush=True)
         if figures and name == SOAK:
-            keep_soak(about, figures, commit())
+            keep_soak(measured, figures)
         elif figures:
-            keep(name, about, figures)
+            keep(name, measured, figures)
     write()
 
 

@@ -11,10 +11,11 @@ from pathlib import Path
 from statistics import median
 
 from bench.diagnosed import document
-from bench.diagnosis import CASES, PRELOADS_N
+from bench.diagnosis import CASES, ONE_THREAD, PRELOADS_N, ROOT, command_seconds
 from bench.figures import Figure
 
 ROUNDS = 3
+_COMMANDS = 8  # campaigns of which the whole command is timed
 _FASTER = 5.0
 _WITH_LAWS = 1.5  # times as long may it take to try laws that nobody listed as well, which no earlier revision did
 NAMED_ALONE = """
@@ -25,11 +26,15 @@ OF_ANY_REVISION = """
 import json, sys, time
 from pathlib import Path
 try:
-    from underskin.diagnosis.pipeline import diagnosis_report
-    from underskin.surrogate.sigma_table import load_table
-except ImportError:  # the layout before the library had wings
-    from underskin.diagnosis.diagnose import diagnosis_report
-    from underskin.surrogate import load_table
+    from underskin import diagnose as diagnosis_report
+    from underskin import load_table
+except ImportError:  # of before the diagnosis had a public name
+    try:
+        from underskin.diagnosis.pipeline import diagnosis_report
+        from underskin.surrogate.sigma_table import load_table
+    except ImportError:  # of before the library had wings
+        from underskin.diagnosis.diagnose import diagnosis_report
+        from underskin.surrogate import load_table
 from underskin.recordings.campaign import parse
 
 table = load_table()
@@ -46,20 +51,24 @@ for file in sys.argv[1:]:
 
 def measure(revision: str) -> list[Figure]:
     """Medians over the open campaigns, where there are any, and over those of `bench diagnosis`, and their ratios."""
-    root = Path(__file__).parents[1]
     folder = os.environ.get("UNDERSKIN_CAMPAIGNS")
     sets = {"open campaigns": sorted((Path(folder) / "open").glob("*.json")) if folder else []}
     figures = []
-    with tempfile.TemporaryDirectory() as temporary, worktree(root, revision, Path(temporary) / "tree") as other:
+    with tempfile.TemporaryDirectory() as temporary, worktree(ROOT, revision, Path(temporary) / "tree") as other:
         sets["campaigns of 100 recordings × 60 lines"] = _written(Path(temporary))
         for name, files in sets.items():
             if not files:
                 continue
             rounds = [
-                (_seconds(root, files), _seconds(root, files, NAMED_ALONE), _seconds(other, files))
+                (
+                    *(_seconds(ROOT, files), _seconds(ROOT, files, NAMED_ALONE), _seconds(other, files)),
+                    *([command_seconds(file, tree) for file in files[:_COMMANDS]] for tree in (ROOT, other)),
+                )
                 for _ in range(ROUNDS)
             ]
-            ours, named, theirs = (median(map(median, zip(*times, strict=True))) for times in zip(*rounds, strict=True))
+            ours, named, theirs, waited, waited_theirs = (
+                median(map(median, zip(*times, strict=True))) for times in zip(*rounds, strict=True)
+            )
             figures += [
                 Figure(f"{len(files)} {name}, median", ours, "s"),
                 Figure("the same by named mechanisms alone", named, "s"),
@@ -68,6 +77,10 @@ def measure(revision: str) -> list[Figure]:
                     f"{len(files)} {name}: {revision}, by named mechanisms alone", theirs / named, "× ours", _FASTER
                 ),
                 Figure(f"{len(files)} {name}: {revision}", theirs / ours, "× ours", round(_FASTER / _WITH_LAWS, 2)),
+                Figure(
+                    f"as a command, from the start to the report, {min(len(files), _COMMANDS)} of them", waited, "s"
+                ),
+                Figure(f"the same by {revision}", waited_theirs / waited, "× ours"),
             ]
     return figures
 
@@ -94,11 +107,10 @@ def _written(folder: Path) -> list[Path]:
 
 def _seconds(tree: Path, files: Sequence[Path], before: str = "") -> list[float]:
     """Processor time of each campaign's diagnosis, all in one process, `before` which this is run."""
-    one_thread = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "UNDERSKIN_TABLES": str(tree / "tables")}
     run = subprocess.run(
         [sys.executable, "-c", before + OF_ANY_REVISION + _TIMES, *map(str, files)],
         cwd=tree,
-        env={**os.environ, **one_thread, "PYTHONPATH": str(tree)},
+        env={**os.environ, **ONE_THREAD, "PYTHONPATH": str(tree), "UNDERSKIN_TABLES": str(tree / "tables")},
         check=True,
         capture_output=True,
         text=True,

@@ -19,15 +19,14 @@ ROUNDS = 3
 _ONE_CURVE, _TWELVE_CURVES, _REAL = 3.0, 10.0, 5.0  # s
 _ONE = """
 import json, sys, time
-from underskin.diagnosis.pipeline import diagnosis_report
+from underskin import diagnose, load_table
 from underskin.recordings.campaign import parse
-from underskin.surrogate.sigma_table import load_table
 
 with open(sys.argv[1]) as text:
     campaign = parse(json.load(text))
 table = load_table()
 start = time.process_time()
-diagnosis_report(campaign, table)
+diagnose(campaign, table)
 print(time.process_time() - start)
 """
 

@@ -95,25 +95,25 @@ contacts' positions, under three mechanisms; processor time on one core.""",
 }
 
 
-def keep(part: str, machine: Mapping[str, object], figures: Sequence[Figure]) -> None:
-    """Store the results of one part in the place of its previous ones."""
-    _store(part, machine, [asdict(figure) for figure in figures])
+def keep(part: str, measured: Mapping[str, object], figures: Sequence[Figure]) -> None:
+    """Store the results of one part in the place of its previous ones; `measured`: commit, date and machine."""
+    _store(part, measured, [asdict(figure) for figure in figures])
 
 
-def keep_soak(machine: Mapping[str, object], figures: Sequence[Figure], commit: str) -> None:
+def keep_soak(measured: Mapping[str, object], figures: Sequence[Figure]) -> None:
     """Store those of a soak of a commit beside what it has not measured yet: a soak takes hours, so that its parts may
     be of several commits, each of which is named. Counts that have not reached their target replace nothing."""
     kept = {entry["name"]: entry for entry in _results().get(SOAK, {}).get("figures", [])}
     for figure in figures:
         unfinished = figure.better == "higher" and figure.met is False
         if not (unfinished and figure.name in kept):
-            kept[figure.name] = {**asdict(figure), "commit": commit}
-    _store(SOAK, machine, [kept[name] for name in sorted(kept)])
+            kept[figure.name] = {**asdict(figure), "commit": measured["commit"]}
+    _store(SOAK, measured, [kept[name] for name in sorted(kept)])
 
 
-def _store(part: str, machine: Mapping[str, object], figures: Sequence[Mapping[str, object]]) -> None:
+def _store(part: str, measured: Mapping[str, object], figures: Sequence[Mapping[str, object]]) -> None:
     results = _results()
-    results[part] = {"machine": dict(machine), "figures": [dict(figure) for figure in figures]}
+    results[part] = {**measured, "figures": [dict(figure) for figure in figures]}
     RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False, sort_keys=True) + "\n")
 
 
@@ -127,10 +127,12 @@ def write() -> None:
                 figure["name"]: figure.pop("commit") for figure in results[part]["figures"] if "commit" in figure
             }
             figures = [Figure(**figure) for figure in results[part]["figures"]]
-            machine = ", ".join(f"{name} {value}" for name, value in results[part]["machine"].items())
+            made = results[part]
+            machine = ", ".join(f"{name} {value}" for name, value in made["machine"].items())
             command = "diagnosis --against 127b47b" if part == AGAINST else part
             text += f"\n## {title}\n\n`python -m bench {command}`. {EXPLANATIONS[part]}\n\n"
-            text += f"{markdown(figures, commits)}\n\nMeasured on: {machine}.\n"
+            of_commit = "" if commits else f" on commit {made['commit']}"
+            text += f"{markdown(figures, commits)}\n\nMeasured{of_commit}, {made['date']}, on: {machine}.\n"
     PAGE.write_text(text)
 
 

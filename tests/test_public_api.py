@@ -22,6 +22,7 @@ PUBLIC = {
     "Predicted",
     "Reading",
     "Report",
+    "RigLimits",
     "ServiceError",
     "Sigma",
     "SigmaTable",

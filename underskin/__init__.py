@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from underskin.client.documents.report import Report
     from underskin.client.service_client import Client
     from underskin.diagnosis.diagnose import diagnose, diagnose_fleet, diagnose_together
+    from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.inversion.invert import Inversion, invert
     from underskin.physics.charge_response import Sigma
     from underskin.physics.skin import Indenter, Skin
@@ -42,6 +43,7 @@ __all__ = [
     "Predicted",
     "Reading",
     "Report",
+    "RigLimits",
     "ServiceError",
     "Sigma",
     "SigmaTable",
@@ -73,6 +75,7 @@ _MODULES = {
     "Predicted": "prediction.forward_model",
     "Reading": "recordings.reading",
     "Report": "client.documents.report",
+    "RigLimits": "diagnosis.planning.rig_limits",
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
     "Skin": "physics.skin",

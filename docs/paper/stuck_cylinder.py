@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+import underskin
 from docs.paper import cylinder
 from docs.paper.markdown import percent, table
 from docs.paper.prototype import (
@@ -23,7 +24,6 @@ from rig.description import parse
 from rig.elastomer import record_curves
 from rig.joint_campaign import CurveSet, JointDocument
 from rig.recorded import record_lines
-from underskin.diagnosis.pipeline import diagnosis_report
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -139,7 +139,7 @@ def diagnosed(sigma_table: SigmaTable, heights_mm: tuple[float, ...]) -> Diagnos
     pressed = parse(block)
     joint = JointDocument(record_lines(parse(frfs)), CurveSet(pressed, tuple(record_curves(pressed))))
     campaign, _ = from_dict(joint.campaign())
-    return Diagnosed(heights_mm, diagnosis_report(campaign, sigma_table))
+    return Diagnosed(heights_mm, underskin.diagnose(campaign, sigma_table))
 
 
 def _consequences(sigma_table: SigmaTable, lower_mpa: float) -> str:

@@ -61,13 +61,9 @@ def planned(request: Request, campaign_id: str, options: Sequence[str], limits: 
     file = "campaign.json"
     fetch = f"{_curl(request, f'/v1/campaigns/{campaign_id}/document')} -o {file}"
     python = (
-        "from pathlib import Path\n\n"
-        "from underskin import load_table, read_file\n"
-        "from underskin.diagnosis.pipeline import diagnose\n"
-        "from underskin.diagnosis.planning.rig_limits import RigLimits\n\n"
-        f"campaign = read_file(Path({file!r}), {file!r}).campaign\n"
-        f"diagnosis = diagnose(campaign, load_table(), limits=RigLimits({limits}))\n"
-        "print(dict(diagnosis.next_experiment))"
+        "from underskin import RigLimits, diagnose, read_file\n\n"
+        f"report = diagnose(read_file({file!r}, {file!r}), limits=RigLimits({limits}))\n"
+        "print(report['next_experiment'])"
     )
     return SameRequest(f"{fetch}\n{shlex.join(['underskin', 'plan', file, *options])}", python)
 
