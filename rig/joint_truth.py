@@ -33,6 +33,12 @@ def joint_truth(joint: Joint) -> dict[str, Any]:
     }
 
 
+def that_show(joint: Joint) -> list[Hidden]:
+    """What of the hidden shows in all campaigns together: the `identifiable` of the truth, without the rest of it."""
+    everything = tuple(range(len(joint.documents)))
+    return [hidden for hidden in joint.hidden if _gain(joint, hidden, everything, curves=True) > SHOWS]
+
+
 def _document(joint: Joint, number: int) -> dict[str, Any]:
     document = joint.documents[number]
     response, experiment = document.lines.response, document.experiment

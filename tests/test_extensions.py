@@ -12,6 +12,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
+from tests.support.cases import first
 from tests.support.installed_package import installed
 from tests.support.repository import ROOT
 from underskin import ExtensionError, InvalidInput, extensions
@@ -180,7 +181,9 @@ class Other(Ageing):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", [["diagnose", "examples/campaigns/2017-07.json"], ["serve", "--port", "0"]])
+@pytest.mark.parametrize(
+    "command", first(1, [["serve", "--port", "0"], ["diagnose", "examples/campaigns/2017-07.json"]])
+)
 def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(command: list[str], tmp_path: Path) -> None:
     folder = installed(tmp_path / "site", GROUP, "Other", TAKEN)
     if command[0] == "diagnose":
@@ -263,7 +266,7 @@ def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_pr
     assert answer.stdout == "used\n"
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_texts_are_there_without_docstrings() -> None:
     """`python -OO` drops docstrings and asserts; a statement and a report need the mechanisms' texts."""
     script = (

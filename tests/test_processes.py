@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import BESIDE_SKINS
 from underskin.recordings.campaign import to_dict
 from underskin.surrogate.sigma_table import load_table
 
@@ -31,14 +33,15 @@ PATIENCE_S = 120.0
 def files(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("campaigns")
     table = load_table()
-    for number in range(3):
+    for number in range(4):
         document = to_dict(campaign(replace(SMALL, seed=number), table))
         (folder / f"palm-{number}.json").write_text(json.dumps(document), encoding="utf-8")
     return sorted(folder.iterdir())
 
 
-def diagnosing(files: list[Path], output_dir: Path, workers: int) -> list[str]:
+def diagnosing(files: list[Path], output_dir: Path, workers: int, *without: str) -> list[str]:
     given = ["--output-dir", str(output_dir), "--workers", str(workers)]
+    given += [part for name in without for part in ("--without", name)]
     return [sys.executable, "-m", "underskin", "diagnose", *map(str, files), *given]
 
 
@@ -85,12 +88,15 @@ def awaited(what: Callable[[], bool]) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "number"),
-    [
-        (sleeping, signal.SIGTERM),
-        (sleeping, signal.SIGINT),
-        (sleeping, signal.SIGKILL),
-        (diagnosing_in_two, signal.SIGTERM),
-    ],
+    first(
+        2,
+        [
+            (sleeping, signal.SIGKILL),
+            (diagnosing_in_two, signal.SIGTERM),
+            (sleeping, signal.SIGTERM),
+            (sleeping, signal.SIGINT),
+        ],
+    ),
 )
 def test_workers_end_with_what_started_them(
     command: Callable[[list[Path], Path], list[str]], number: signal.Signals, files: list[Path], tmp_path: Path
@@ -108,25 +114,20 @@ def test_workers_end_with_what_started_them(
 
 
 @pytest.mark.slow
-def test_a_worker_that_is_killed_takes_no_campaign_with_it(files: list[Path], tmp_path: Path) -> None:
-    with subprocess.Popen(diagnosing_in_two(files, tmp_path), stderr=subprocess.PIPE, text=True) as parent:
-        assert awaited(lambda: len(workers_of(parent.pid)) == 2)
-        os.kill(workers_of(parent.pid)[0], signal.SIGKILL)
-        _, said = parent.communicate()
-    assert parent.returncode == 0, said
-    assert sorted(file.name for file in tmp_path.iterdir()) == [file.name for file in files]
-
-
-@pytest.mark.slow
-def test_reports_are_the_same_bytes_whatever_the_number_of_processes_and_threads(
+def test_reports_are_the_same_bytes_whatever_the_number_of_processes_and_threads_and_whichever_is_killed(
     files: list[Path], tmp_path: Path
 ) -> None:
     found = []
-    for workers, threads, given in ((1, "1", files[:2]), (2, "2", files[:2]), (1, "2", files[:1])):
-        folder = tmp_path / f"{workers}-{threads}"
+    for workers, threads in ((1, "1"), (2, "2")):
+        folder = tmp_path / str(workers)
         environment = os.environ | {"OMP_NUM_THREADS": threads, "OPENBLAS_NUM_THREADS": threads}
-        subprocess.run(diagnosing(given, folder, workers), env=environment, check=True, capture_output=True)
+        command = diagnosing(files[:2], folder, workers, *BESIDE_SKINS)
+        with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as parent:
+            if workers == 2:
+                assert awaited(lambda: len(workers_of(parent.pid)) == 2)
+                os.kill(workers_of(parent.pid)[0], signal.SIGKILL)
+            _, said = parent.communicate()
+        assert parent.returncode == 0, said
         found.append({file.name: file.read_bytes() for file in folder.iterdir()})
+    assert sorted(found[0]) == [file.name for file in files[:2]]
     assert found[0] == found[1]
-    assert sorted(found[0]) == ["palm-0.json", "palm-1.json"]
-    assert found[2] == {"palm-0.json": found[0]["palm-0.json"]}

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench.soak import SOAK
 from tests.support import preloaded
 from tests.support.repository import ROOT
 from underskin.errors import FileError
@@ -61,7 +62,7 @@ def has_repeated(text: str) -> bool:
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300 if SOAK else 100)
 @given(DOCUMENTS, st.sampled_from(["", " ", "\n\t "]), st.booleans(), st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))
 def test_a_repeated_key_is_seen_wherever_it_is(document: Any, blank: str, ascii_only: bool, encoding: str) -> None:
     text = written(document, blank, ascii_only)

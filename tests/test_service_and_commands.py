@@ -4,25 +4,16 @@ import csv
 import io
 import math
 import subprocess
-from collections.abc import Iterator
 from typing import Any
 
 import httpx
 import pytest
 
 from tests.support import preloaded
-from tests.support.server import Server, running
 
 SKIN = {"thickness_mm": 2.5, "youngs_modulus_mpa": 16.0, "sensor_radius_mm": 1.5, "indenter_radius_mm": 4.0}
 FRF = {**SKIN, "preload_n": 1.0, "d33_pc_per_n": 14.0}
 D33 = {**SKIN, "preload_n": 1.0, "frf_pc_per_n": 7.0, "frf_uncertainty_pc_per_n": 0.1}
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """One for all tests here."""
-    with running(tmp_path_factory.mktemp("parity")) as started:
-        yield started
 
 
 def as_csv(columns: dict[str, Any]) -> str:
@@ -52,9 +43,9 @@ def columns_of(text: str) -> dict[str, list[str]]:
         ("d33", {**D33, "preload_n": [1.0, 300.0]}),
     ],
 )
-def test_rows_are_answered_alike(server: Server, command: str, columns: dict[str, Any]) -> None:
+def test_rows_are_answered_alike(http: httpx.Client, command: str, columns: dict[str, Any]) -> None:
     headers = {"Content-Type": "text/csv", "Accept": "text/csv"}
-    answer = httpx.post(f"{server.url}/v1/{command}", content=as_csv(columns), headers=headers)
+    answer = http.post(f"/v1/{command}", content=as_csv(columns), headers=headers)
     assert answer.status_code == 200, answer.text
     done = by_command(command, columns)
     assert done.returncode == 0, done.stderr
@@ -63,9 +54,9 @@ def test_rows_are_answered_alike(server: Server, command: str, columns: dict[str
     assert {name: told[name] for name in by_server} == by_server
 
 
-def test_a_result_that_is_not_finite_is_outside_for_both(server: Server) -> None:
+def test_a_result_that_is_not_finite_is_outside_for_both(http: httpx.Client) -> None:
     columns = {**D33, "frf_pc_per_n": [7.0, 1e308], "sensor_radius_mm": 0.05}
-    answer = httpx.post(f"{server.url}/v1/d33", json={**columns, "units_checked": True})
+    answer = http.post("/v1/d33", json={**columns, "units_checked": True})
     assert answer.status_code == 200, answer.text
     done = by_command("d33", columns, "--units-checked")
     assert answer.json()["status"] == columns_of(done.stdout)["status"] == ["ok", "out_of_domain"]
@@ -84,8 +75,8 @@ def test_a_result_that_is_not_finite_is_outside_for_both(server: Server) -> None
         ("d33", {**D33, "frf_uncertainty_pc_per_n": [math.nan, math.nan]}, "frf_uncertainty_pc_per_n"),
     ],
 )
-def test_rows_are_refused_alike(server: Server, command: str, columns: dict[str, Any], field: str) -> None:
-    answer = httpx.post(f"{server.url}/v1/{command}", content=as_csv(columns), headers={"Content-Type": "text/csv"})
+def test_rows_are_refused_alike(http: httpx.Client, command: str, columns: dict[str, Any], field: str) -> None:
+    answer = http.post(f"/v1/{command}", content=as_csv(columns), headers={"Content-Type": "text/csv"})
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     assert error["field"] == field

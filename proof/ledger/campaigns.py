@@ -22,7 +22,9 @@ from rig.draw import record
 from rig.draw_curves import drawn_curves
 from rig.effects import INDENTATION
 from rig.identifiable import THRESHOLD
-from rig.joint import WHAT, drawn_joint
+from rig.joint import WHAT, joint_campaigns
+from rig.joint_campaign import Hidden, Joint
+from rig.joint_truth import that_show
 from rig.truth import truth_of_curves, truth_of_lines
 from rig.visible_curves import THRESHOLD as CURVE_THRESHOLD
 
@@ -121,23 +123,28 @@ class DrawnJoint(Item):
     def _what(self) -> str:
         return WHAT[self.number % len(WHAT)]
 
+    @property
+    def _joint(self) -> Joint:
+        return joint_campaigns(JOINT_SEED, self.number, self._what)
+
     def documents(self) -> list[dict[str, Any]]:
         """All that are judged together."""
-        return drawn_joint(JOINT_SEED, self.number, self._what)[0]
+        return [document.campaign() for document in self._joint.documents]
 
     def diagnosed(self, documents: Sequence[dict[str, Any]]) -> Report:
         """Of several campaigns one report."""
         return diagnosed_by(joint.DIAGNOSED[self._what], documents)
 
     def truth(self) -> Truth:
-        """What shows in all together."""
-        hidden = drawn_joint(JOINT_SEED, self.number, self._what)[1]["hidden"]
-        shows = [entry for entry in hidden if entry["identifiable"]]
-        if self._what == "skins":
-            effects, seen = ([one["departs"] for one in entries if one["departs"]] for entries in (hidden, shows))
-        else:
-            effects, seen = ([one["effect"] for one in entries] for entries in (hidden, shows))
-        return {"what": self._what, "effects": sorted(effects), "shows": sorted(seen)}
+        """What shows in all together: effects, of skins those that depart."""
+        drawn = self._joint
+        effects, shows = ([self._named(drawn, one) for one in some] for some in (drawn.hidden, that_show(drawn)))
+        return {"what": self._what, "effects": sorted(filter(None, effects)), "shows": sorted(filter(None, shows))}
+
+    def _named(self, drawn: Joint, hidden: Hidden) -> str:
+        if self._what != "skins":
+            return hidden.effect
+        return drawn.documents[hidden.documents[0]].skin if hidden.departs else ""
 
     def grade(self, report: Report, truth: Truth, /) -> str:
         """Of skins by which depart, otherwise by the set of mechanisms."""
@@ -306,15 +313,18 @@ NEEDS = {name: _CAMPAIGNS for name in PARTS if name.endswith("-open") or name.st
 
 
 def _that_shows(known: Mapping[str, Any], threshold: float) -> Truth:
-    """The effects, and those that gain more than the threshold in χ²; as a whole, where the gain of each is unknown."""
+    """The effects, and those that show: all together gain in χ² over the base model, and each over the others.
+
+    As a whole, where the gain of each is unknown; two effects that cancel each other do not show.
+    """
     effects = list(known["effects"])
-    if not effects:
-        return {"effects": [], "shows": []}
+    if not effects or not known["identifiable"]:
+        return {"effects": sorted(effects), "shows": []}
     gains = list(known.get("chi2_gain_of_each") or [])
     if isinstance(known.get("chi2_gain_of_each"), Mapping):
         gains = list(known["chi2_gain_of_each"].values())
     if len(effects) == 1 or len(gains) != len(effects):
-        return {"effects": sorted(effects), "shows": sorted(effects) if known["identifiable"] else []}
+        return {"effects": sorted(effects), "shows": sorted(effects)}
     seen = [effect for effect, gain in zip(effects, gains, strict=True) if gain is None or gain > threshold]
     return {"effects": sorted(effects), "shows": sorted(seen)}
 

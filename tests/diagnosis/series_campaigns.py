@@ -1,5 +1,6 @@
 """Campaigns of time series that a quiet rig records, and what is found in them."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -22,10 +23,10 @@ def recorded(**changes: Any) -> Campaign:
     return campaign
 
 
-def codes(found: Any) -> set[tuple[str, str, str]]:
+def codes(report: Mapping[str, Any]) -> set[tuple[str, str, str]]:
     """Those that say that something is wrong: all of these have one preload axis only, and lines beside the band."""
-    usual = {"constant_axis", "lines_left_out"}
-    return {(entry.code, entry.recording, entry.field) for entry in found if entry.code not in usual}
+    told = [entry for entry in report["findings"] if entry["code"] not in ("constant_axis", "lines_left_out")]
+    return {(entry["code"], entry["recording"], entry["field"]) for entry in told}
 
 
 def forces(campaign: Campaign, **changes: Any) -> Campaign:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +10,17 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.support.cases import first
-from tests.support.lean_reports import COSTLY, lean_report
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.errors import InvalidInput
+from tests.support.lean_reports import beside, lean_report, whole_report
+from underskin import InvalidInput
+from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.saving import document
-from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign, IndentationRecording, parse
-from underskin.recordings.conditions import curves_of
-from underskin.recordings.curve_course import course
+from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
+pytestmark = pytest.mark.slow
+
+FEW = beside("instrument_compliance", "strain_stiffening")
 RADIUS_MM, MODULUS_MPA, DEPTH_MM, NOISE = 4.0, 1.5, 0.3, 1e-3  # noise of the largest force
 SECONDS, PAUSE = 40.0, 0.2  # of a recording; the share of its way that lies in the air
 Change = Callable[[Floats, Floats], Floats]  # of the travel beyond contact [mm] and the time [s]
@@ -91,19 +89,15 @@ SOFTER: Mapping[str, Change] = {"factor": lambda travel, _: -0.04 * turned(trave
 
 @pytest.fixture(scope="module")
 def reports(table: SigmaTable) -> Callable[[str], dict[str, Any]]:
-    """The report on a campaign with a law of `LAWS`, or with `SOFTER` (by no name), made once for all tests here.
-
-    On the first law that of a search among all mechanisms.
-    """
+    """The report on a campaign with a law of `LAWS`, or with `SOFTER` (by no name), made once for all tests here."""
 
     def made(name: str) -> dict[str, Any]:
         whole = campaign(LAWS[name][0]) if name else campaign(SOFTER, held_s=5.0)
-        return lean_report(parse(whole), table, *(() if name == next(iter(LAWS)) else COSTLY))
+        return lean_report(parse(whole), table, *FEW)
 
     return cache(made)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", first(1, LAWS))
 def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(
     name: str, reports: Callable[[str], dict[str, Any]]
@@ -135,7 +129,6 @@ def turned(travel: Floats) -> Floats:
     return (np.arange(len(travel)) > last).astype(float)
 
 
-@pytest.mark.slow
 def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(
     reports: Callable[[str], dict[str, Any]],
 ) -> None:
@@ -150,12 +143,11 @@ def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_
     assert "friction that turns with the sphere" in report["statement"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("back", first(1, [False, True]))
 def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaTable) -> None:
     """Also where no way back tells it a second time."""
     bump: dict[str, Change] = {"added": lambda travel, _: 0.3 * LARGEST / (1 + ((travel - 0.15) / 0.02) ** 2)}
-    report = lean_report(parse(campaign(bump, back=back)), table, *COSTLY)
+    report = lean_report(parse(campaign(bump, back=back)), table, *FEW)
     law = report["unnamed"]
     assert (law["acts_on"], law["axis"], law["form"]) == ("force", "displacement_mm", "peak")
     values = {entry["name"]: entry["value"] for entry in law["parameters"]}
@@ -164,15 +156,13 @@ def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaT
     assert law["heldout_rmse_percent"]["after"] < 0.3 * law["heldout_rmse_percent"]["before"]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [6, 7, 8]))
 def test_where_nothing_is_missing_no_law_is_stated(seed: int, table: SigmaTable) -> None:
-    report = diagnosis_report(parse(campaign({}, seed)), table)
+    report = lean_report(parse(campaign({}, seed)), table, *FEW)
     assert report["verdict"] == "no_mismatch"
     assert report["unnamed"] is None
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [1, 2, 3]))
 def test_slow_noise_that_the_air_shows_is_no_law(seed: int, table: SigmaTable) -> None:
     """Noise of a second's correlation, as large as the white noise, which second differences of samples do not see."""
@@ -183,24 +173,22 @@ def test_slow_noise_that_the_air_shows_is_no_law(seed: int, table: SigmaTable) -
         shocks = np.sqrt(1 - kept**2) * random.normal(size=len(travel))
         return NOISE * LARGEST * np.asarray(lfilter([1.0], [1.0, -kept], shocks))
 
-    report = lean_report(parse(campaign({"added": wandering}, seed, air=1.0)), table, "adhesion")
+    report = lean_report(parse(campaign({"added": wandering}, seed, air=1.0)), table, *FEW)
     assert report["verdict"] == "no_mismatch"
     assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(MODULUS_MPA, rel=0.02)
 
 
-@pytest.mark.slow
 def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: SigmaTable) -> None:
     """A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it."""
     stiffness = LARGEST / (0.05 * DEPTH_MM)
     travel = np.linspace(0.0, DEPTH_MM, 2000)
     commanded = travel + force_on(travel) / stiffness
     gives: dict[str, Change] = {"moved": lambda at, _: np.interp(at, commanded, travel) - np.maximum(at, 0.0)}
-    report = diagnosis_report(parse(campaign(gives)), table)
+    report = lean_report(parse(campaign(gives)), table, *FEW)
     assert report["unnamed"] is None
     assert report["mechanisms"][0]["name"] == "instrument_compliance"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", first(1, LAWS))
 def test_a_law_of_curves_is_kept_and_recognised_by_name(
     name: str,
@@ -214,8 +202,8 @@ def test_a_law_of_curves_is_kept_and_recognised_by_name(
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
     CATALOGUE.reload()
     try:
-        later = lean_report(parse(campaign(changes, seed=8)), table, *COSTLY)
-        fitted = lean_report(parse(campaign({}, seed=8)), table, *COSTLY)
+        later = whole_report(parse(campaign(changes, seed=8)), table, *FEW)
+        fitted = whole_report(parse(campaign({}, seed=8)), table, *FEW)
     finally:
         CATALOGUE.reload()
     assert later["verdict"] == "explained"
@@ -225,31 +213,8 @@ def test_a_law_of_curves_is_kept_and_recognised_by_name(
     assert fitted["verdict"] == "no_mismatch"
 
 
-@pytest.mark.slow
 def test_a_step_where_the_sphere_turns_back_cannot_be_kept(
     reports: Callable[[str], dict[str, Any]],
 ) -> None:
     with pytest.raises(InvalidInput, match="turns back is no expression"):
         document(reports(""), "softer_back")
-
-
-def indentations(whole: Campaign) -> list[IndentationRecording]:
-    return [entry for entry in whole.recordings if isinstance(entry, IndentationRecording)]
-
-
-def test_where_contact_begins_means_lie_on_the_curve() -> None:
-    """Over 40 draws of noise the thinned force lies on Hertz's within a third of its deviation on average, also where
-    the curve has its kink; a mean over that lies one to two deviations above."""
-    places, off = [], []
-    for seed in range(40):
-        whole = parse(campaign({}, seed))
-        thinned = curve_lines(whole, "indentation")
-        travel = np.concatenate([entry.displacement_mm for entry in curves_of(thinned.campaign)])
-        zeros = [course(one.displacement_mm, one.force_n, one.time_s).zero for one in indentations(whole)]
-        force = thinned.value.real + np.array(zeros)[thinned.recording]
-        places.append(travel / DEPTH_MM)
-        off.append((force - force_on(travel)) / thinned.deviation)
-    place, error = np.concatenate(places), np.concatenate(off)
-    edges = np.linspace(-0.06, 0.06, 7)
-    means = [error[(place > low) & (place <= high)].mean() for low, high in pairwise(edges)]
-    assert np.abs(means).max() < 0.33

@@ -1,4 +1,4 @@
-"""Curves with slips of units, reversed forces and copies: named, put right or left out, before any law is tried."""
+"""Curves with slips of units, reversed forces and copies, and curves that cannot be used: named before any law."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.support.pressed_curves import pressed
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.diagnosis.reporting.fit_warnings import fit_warnings
-from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
-from underskin.recordings.campaign import Campaign, CompressionRecording
+from tests.diagnosis.rig_pads import pressed
+from tests.support.cases import first
+from tests.support.slip_campaigns import looked_at
+from underskin.recordings.campaign import Campaign, CompressionRecording, parse
 from underskin.recordings.conditions import SkinDescription
-from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.sigma_table import SigmaTable
 
 Change = Callable[[CompressionRecording], CompressionRecording]
 MODULUS_MPA = 0.5
@@ -45,98 +42,101 @@ def changed(pads: Campaign, change: Change, *names: str) -> Campaign:
     return replace(pads, recordings=tuple(change(entry) if entry.id in names else entry for entry in entries))
 
 
-def codes(found: Any) -> set[tuple[str, str, str]]:
-    return {(entry.code, entry.recording, entry.field) for entry in found}
+def codes(report: dict[str, Any]) -> set[tuple[str, str, str]]:
+    return {(entry["code"], entry["recording"], entry["field"]) for entry in report["findings"]}
+
+
+def modulus(report: dict[str, Any]) -> dict[str, Any]:
+    return dict(report["fit"]["before"]["youngs_modulus"])
 
 
 ALL = ("c0", "c1", "c2", "c3")
 ONE = [
-    (times(1e3, "force_n"), ("units_off_by_1000", "c1", "force_n"), 3),
-    (times(1e-3, "force_n"), ("units_off_by_1000", "c1", "force_n"), 3),
-    (times(1e3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
-    (times(1e-3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm"), 3),
-    (times(-1.0, "force_n"), ("sign_flipped", "c1", "force_n"), 4),
+    (times(1e3, "force_n"), ("units_off_by_1000", "c1", "force_n")),
+    (times(1e-3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm")),
+    (times(-1.0, "force_n"), ("sign_flipped", "c1", "force_n")),
+    (times(0.0, "displacement_mm"), ("curve_not_usable", "c1", "displacement_mm")),
+    (times(1e-3, "force_n"), ("units_off_by_1000", "c1", "force_n")),
+    (times(1e3, "displacement_mm"), ("units_off_by_1000", "c1", "displacement_mm")),
 ]
 
 
-@pytest.mark.parametrize(("change", "finding", "left"), ONE)
-def test_what_is_wrong_with_one_curve_is_named(
-    change: Change, finding: tuple[str, str, str], left: int, pads: Campaign
+@pytest.mark.parametrize(("change", "finding"), first(4, ONE))
+def test_what_is_wrong_with_one_curve_is_named_and_invents_nothing(
+    change: Change, finding: tuple[str, str, str], pads: Campaign, table: SigmaTable
 ) -> None:
-    found = without_inconsistent(changed(pads, change, "c1"), "compression")
-    assert codes(found.findings) == {finding}
-    assert len(found.campaign.recordings) == left
-    assert found.lacking is None
+    report = looked_at(changed(pads, change, "c1"), table, "strain_stiffening")
+    assert codes(report) == {finding}
+    assert report["verdict"] == "no_mismatch"
+    assert modulus(report)["low"] < MODULUS_MPA < modulus(report)["high"]
+
+
+def test_reversed_forces_of_all_are_put_right(pads: Campaign, table: SigmaTable) -> None:
+    report = looked_at(changed(pads, times(-1.0, "force_n"), *ALL), table, "strain_stiffening")
+    assert report["verdict"] == "no_mismatch"
+    assert {name for _, name, _ in codes(report)} == set(ALL)
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 @pytest.mark.parametrize("field", ["force_n", "displacement_mm"])
-def test_where_all_curves_are_off_nothing_is_concluded(factor: float, field: str, pads: Campaign) -> None:
-    wrong = changed(pads, times(factor, field), *ALL)
-    report = diagnosis_report(wrong, load_table())
-    assert report["verdict"] == "insufficient_data"
-    assert "units_off_by_1000" in {entry["code"] for entry in report["findings"]}
-    if (field, factor) != ("displacement_mm", 1e3):  # pressed through the sample: nobody can mean that
-        meant = without_inconsistent(replace(wrong, units_checked=True), "compression")
-        assert (meant.lacking, codes(meant.findings)) == (None, set())
-
-
-def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign) -> None:
-    skin = replace(pads.skin, youngs_modulus_mpa=1000 * MODULUS_MPA)
-    found = without_inconsistent(replace(pads, skin=skin), "compression")
-    assert codes(found.findings) == {("units_off_by_1000", "", "force_n")}
-    assert found.lacking
-
-
-@pytest.mark.parametrize("change", [change for change, (code, *_), _ in ONE if code == "units_off_by_1000"])
-def test_of_two_curves_the_declared_modulus_tells_which_is_off(change: Change, pads: Campaign) -> None:
-    two = replace(pads, recordings=pads.recordings[:2])
-    wrong = changed(two, change, "c1")
-    found = without_inconsistent(wrong, "compression")
-    assert {entry.code for entry in found.findings} == {"units_off_by_1000"}
-    by_reach = {entry.id for entry in found.campaign.recordings} == {"c0"}  # pressed through its own height
-    assert by_reach or found.lacking
-    declared = replace(wrong, skin=replace(pads.skin, youngs_modulus_mpa=1.2 * MODULUS_MPA))
-    told = without_inconsistent(declared, "compression")
-    assert {(entry.code, entry.recording) for entry in told.findings} == {("units_off_by_1000", "c1")}
-    assert (told.lacking, [entry.id for entry in told.campaign.recordings]) == (None, ["c0"])
-    assert without_inconsistent(two, "compression").findings == []
-
-
-@pytest.mark.slow
-def test_reversed_forces_are_put_right_and_invent_nothing(pads: Campaign) -> None:
-    for names in (ALL, ("c2",)):
-        report = diagnosis_report(changed(pads, times(-1.0, "force_n"), *names), load_table())
-        assert report["verdict"] == "no_mismatch"
-        assert {entry["recording"] for entry in report["findings"]} == set(names)
-
-
-def test_a_curve_that_does_not_move_is_left_out(pads: Campaign) -> None:
-    report = diagnosis_report(changed(pads, times(0.0, "displacement_mm"), "c1"), load_table())
-    assert report["verdict"] == "no_mismatch"
-    assert [(entry["code"], entry["recording"], entry["field"]) for entry in report["findings"]] == [
-        ("curve_not_usable", "c1", "displacement_mm")
-    ]
-
-
-def test_a_copy_of_a_curve_is_left_out(pads: Campaign) -> None:
-    whole = replace(pads, recordings=(*pads.recordings, replace(pads.recordings[0], id="copy")))
-    found = without_inconsistent(whole, "compression")
-    assert codes(found.findings) == {("duplicated_recording", "copy", "force_n")}
-    assert len(found.campaign.recordings) == len(pads.recordings)
-    assert without_inconsistent(pads, "compression").findings == []
-
-
-@pytest.mark.parametrize(("thickness_mm", "said"), [(None, ["thickness_unknown"]), (80.0, [])])
-def test_a_layer_that_could_not_be_tried_is_said(
-    thickness_mm: float | None, said: list[str], table: SigmaTable
+def test_where_all_curves_are_off_nothing_is_concluded(
+    factor: float, field: str, pads: Campaign, table: SigmaTable
 ) -> None:
-    campaign = pressed(1e6, (4.0,))
-    campaign = replace(campaign, skin=replace(campaign.skin, thickness_mm=thickness_mm))
-    problem = FittingProblem(curve_lines(campaign, "indentation"), table)
-    (null,) = problem.explain([Request(())])
-    assert null is not None
-    (found,) = problem.explain([Request(("strain_stiffening",), begin=null.point)])
-    assert found is not None
-    assert [entry.code.value for entry in fit_warnings(problem, found) if entry.field == "thickness_mm"] == said
-    assert [entry for entry in fit_warnings(problem, null) if entry.field == "thickness_mm"] == []
+    """Unless they are meant: but to be pressed through the sample nobody can mean."""
+    wrong = changed(pads, times(factor, field), *ALL)
+    report = looked_at(wrong, table)
+    assert report["verdict"] == "insufficient_data"
+    assert "units_off_by_1000" in {code for code, _, _ in codes(report)}
+    meant = looked_at(replace(wrong, units_checked=True), table)
+    assert (meant["verdict"] == "insufficient_data") == ((field, factor) == ("displacement_mm", 1e3))
+
+
+def test_curves_far_from_the_declared_modulus_are_named(pads: Campaign, table: SigmaTable) -> None:
+    skin = replace(pads.skin, youngs_modulus_mpa=1000 * MODULUS_MPA)
+    report = looked_at(replace(pads, skin=skin), table)
+    assert codes(report) == {("units_off_by_1000", "", "force_n")}
+    assert report["verdict"] == "insufficient_data"
+
+
+def test_of_two_curves_the_declared_modulus_tells_which_is_off(pads: Campaign, table: SigmaTable) -> None:
+    wrong = changed(replace(pads, recordings=pads.recordings[:2]), times(1e3, "force_n"), "c1")
+    report = looked_at(wrong, table)
+    assert {code for code, _, _ in codes(report)} == {"units_off_by_1000"}
+    assert report["verdict"] == "insufficient_data"
+    declared = replace(wrong, skin=replace(pads.skin, youngs_modulus_mpa=1.2 * MODULUS_MPA))
+    told = looked_at(declared, table, "modulus_error")
+    assert {entry for entry in codes(told) if entry[0] == "units_off_by_1000"} == {
+        ("units_off_by_1000", "c1", "force_n")
+    }
+    assert told["verdict"] != "insufficient_data"
+
+
+def test_a_copy_of_a_curve_does_not_count(pads: Campaign, table: SigmaTable) -> None:
+    whole = replace(pads, recordings=(*pads.recordings, replace(pads.recordings[0], id="copy")))
+    report = looked_at(whole, table)
+    assert codes(report) == {("duplicated_recording", "copy", "force_n")}
+    assert report["fit"] == looked_at(pads, table)["fit"]
+
+
+def loops(*lengths: int | None) -> Campaign:
+    """Two whole loops of the rig on a pad, cut after so many samples."""
+    usual = {"largest_displacement_mm": 0.5, "speeds_mm_per_s": [0.05], "samples": 240, "force_noise_n": 3e-4}
+    document = pressed("loops", 5, 8, usual)
+    for recording, length in zip(document["recordings"], lengths, strict=True):
+        for column in ("displacement_mm", "force_n", "time_s"):
+            recording[column] = recording[column][:length]
+    return parse(document)
+
+
+def test_a_curve_that_cannot_be_used_is_named_and_the_others_are_diagnosed(table: SigmaTable) -> None:
+    report = looked_at(loops(None, 6), table, "layered_contact")
+    (finding,) = [entry for entry in report["findings"] if entry["code"] == "curve_not_usable"]
+    assert (finding["recording"], finding["field"]) == ("c02", "force_n")
+    assert "at least 8 entries" in finding["statement"]
+    assert report["verdict"] != "insufficient_data"
+
+
+def test_where_no_curve_can_be_used_nothing_is_said_but_that(table: SigmaTable) -> None:
+    report = looked_at(loops(4, 4), table)
+    assert report["verdict"] == "insufficient_data"
+    assert [entry["code"] for entry in report["findings"]] == ["curve_not_usable"] * 2

@@ -1,38 +1,34 @@
-"""The report as a page: complete, self-contained, and safe whatever a campaign holds."""
+"""The report as a page that the command writes: complete, self-contained, safe, and its figures as the report has it."""
 
 import json
 import re
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 
-from tests.support.adhesive_curves import adhesive_figure
+from tests.support.adhesive_curves import NOISE_N, adhesive_curves, adhesive_figure, adhesive_page
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.lean_reports import COSTLY, lean_diagnosis
-from tests.support.mechanism_campaigns import indentation_campaign
-from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting import wording
-from underskin.diagnosis.reporting.figures import figures
-from underskin.diagnosis.reporting.html_report import page
-from underskin.diagnosis.reporting.report import DiagnosisResult, report
-from underskin.diagnosis.reporting.wording import readable
-from underskin.mechanisms import compose
-from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording
-from underskin.surrogate.sigma_table import load_table
+from tests.support.lean_reports import EVERY, beside
+from tests.support.report_pages import figures_in, written
+from underskin.mechanisms import CATALOGUE, compose
+from underskin.recordings.campaign import Campaign, frf_recordings, to_dict
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+pytestmark = pytest.mark.slow
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(2)>&amp;<a href='https://example.org'>x</a>"
-RESONANT = Made(
-    mechanisms=("contact_resonance",), parameters=(6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2
-)
-OFF_CENTRE = Made(("misalignment",), (0.5, 0.4), offsets_mm=(-2.0, 0.0, 2.0))
+RESONANT = Made(("contact_resonance",), (6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0, sensors=2)
+D33 = 15.0
+OF_LINES = beside("contact_resonance", "timing_delay", "ageing")
 CHROMIUM = shutil.which("chromium")
 
 
@@ -57,64 +53,54 @@ class Tags(HTMLParser):
         return sum(name == tag for name, _ in self.tags)
 
 
-def hostile() -> Campaign:
+def hostile(table: SigmaTable) -> Campaign:
     """A resonant campaign whose every text is markup; one recording's sign is flipped, so that it is named."""
-    whole = campaign(RESONANT, load_table())
+    whole = campaign(RESONANT, table)
     recordings = []
-    for number, entry in enumerate(whole.recordings):
-        assert isinstance(entry, FrfRecording)
+    for number, entry in enumerate(frf_recordings(whole)):
         assert entry.frf_re_pc_per_n is not None
         assert entry.frf_im_pc_per_n is not None
         sign = -1 if number == 3 else 1
-        recordings.append(
-            replace(
-                entry,
-                id=f"{HOSTILE}{number}",
-                sensor=f"{HOSTILE}{entry.sensor}",
-                frf_re_pc_per_n=sign * entry.frf_re_pc_per_n,
-                frf_im_pc_per_n=sign * entry.frf_im_pc_per_n,
-            )
-        )
+        real, imag = sign * entry.frf_re_pc_per_n, sign * entry.frf_im_pc_per_n
+        named = replace(entry, id=f"{HOSTILE}{number}", sensor=f"{HOSTILE}{entry.sensor}")
+        recordings.append(replace(named, frf_re_pc_per_n=real, frf_im_pc_per_n=imag))
     sensors = tuple(replace(sensor, id=f"{HOSTILE}{sensor.id}") for sensor in whole.skin.sensors)
-    return replace(
-        whole, name=f"palm {HOSTILE}", skin=replace(whole.skin, sensors=sensors), recordings=tuple(recordings)
-    )
+    skin = replace(whole.skin, sensors=sensors)
+    return replace(whole, name=f"palm {HOSTILE}", skin=skin, recordings=tuple(recordings))
 
 
 @pytest.fixture(scope="module")
-def found() -> DiagnosisResult:
-    return diagnose(hostile(), load_table())
+def attacked(table: SigmaTable) -> str:
+    return written([to_dict(hostile(table))], without=OF_LINES)[1]
 
 
 @pytest.fixture(scope="module")
-def document(found: DiagnosisResult) -> dict[str, Any]:
-    return report(found)
+def resonant(table: SigmaTable) -> tuple[dict[str, Any], str]:
+    return written([to_dict(campaign(RESONANT, table))], without=OF_LINES)
 
 
 @pytest.fixture(scope="module")
-def text(found: DiagnosisResult, document: dict[str, Any]) -> str:
-    return page(document, figures(found, document))
+def figures(resonant: tuple[dict[str, Any], str]) -> dict[str, go.Figure]:
+    return figures_in(resonant[1])
 
 
-@pytest.mark.slow
-def test_it_says_all_that_the_report_says(text: str, document: dict[str, Any]) -> None:
+def test_it_says_all_that_the_report_says(resonant: tuple[dict[str, Any], str]) -> None:
+    report, text = resonant
     tags = Tags(text)
-    assert document["verdict"] == "explained"
-    first = "the paper's model lacks contact resonance (probability 98.5 %)"
+    assert report["verdict"] == "explained"
+    first = "The paper's model lacks contact resonance (probability 98.5 %)"
     assert tags.text.index(first) < tags.text.index("Where")
-    headings = re.findall(r"<h2>(.*?)</h2>", text)
-    assert headings == [
+    assert re.findall(r"<h2>(.*?)</h2>", text) == [
         "Where the model and the recordings differ", "What the model lacks, and the values found",
         "How well the models describe the recordings", "Look at these recordings", "What to measure next", "Made with",
     ]  # fmt: skip
-    wanted = [document["location"]["statement"], *(readable(entry["statement"]) for entry in document["findings"])]
-    wanted += [entry["why_not"] for entry in document["alternatives"]]
-    wanted += [readable(entry["reason"]) for entry in document["not_identifiable"]]
-    wanted += [f"{entry['value']:.4g}" for entry in document["mechanisms"][0]["parameters"]]
-    wanted += [document["provenance"]["tables"]["sigma"], f"{document['fit']['noise_floor_percent']:.3g} %"]
+    wanted = [report["location"]["statement"], *(entry["why_not"] for entry in report["alternatives"])]
+    wanted += [f"{entry['value']:.4g}" for entry in report["mechanisms"][0]["parameters"]]
+    wanted += [report["provenance"]["tables"]["sigma"], f"{report['fit']['noise_floor_percent']:.3g} %"]
     wanted += [CATALOGUE["contact_resonance"].plain, "these recordings decide", "stays open"]
     assert [piece for piece in wanted if piece not in tags.text] == []
-    assert [name for name in CATALOGUE if "_" in name and name in tags.text] == []  # no names of the code
+    said = tags.text.replace(" ".join(report["provenance"]["without"]), "")
+    assert "dynamic force is the same in all recordings" in said  # in words, no names of the code
 
 
 def drawn_texts(figure: Any) -> Iterator[str]:
@@ -122,7 +108,7 @@ def drawn_texts(figure: Any) -> Iterator[str]:
     in a list of the page."""
     if isinstance(figure, str):
         yield figure
-    elif isinstance(figure, list):
+    elif isinstance(figure, list | tuple):
         for entry in figure:
             yield from drawn_texts(entry)
     elif isinstance(figure, dict):
@@ -132,23 +118,21 @@ def drawn_texts(figure: Any) -> Iterator[str]:
                 yield from drawn_texts(entry)
 
 
-@pytest.mark.slow
-def test_markup_in_a_campaign_stays_text(text: str, found: DiagnosisResult, document: dict[str, Any]) -> None:
-    tags = Tags(text)
+def test_markup_in_a_campaign_stays_text(attacked: str) -> None:
+    tags = Tags(attacked)
     assert f"Diagnosis of palm {HOSTILE}" in tags.text
     assert f"{HOSTILE}3" in tags.text
     assert tags.count("img") == tags.count("a") == 0
     assert tags.count("script") == 4 + 5 + 1  # plotly's, three of figures, one a figure, the page's
-    assert "<script>alert" not in text
+    assert "<script>alert" not in attacked
     # In the figures, too, texts reach plotly escaped: it would show <a> and <b> as such.
-    texts = [one for figure in figures(found, document).values() for one in drawn_texts(json.loads(figure.to_json()))]
+    texts = [one for figure in figures_in(attacked).values() for one in drawn_texts(json.loads(figure.to_json()))]
     assert not any("<a href" in one for one in texts)
     assert any("&lt;a href" in one for one in texts)
 
 
-@pytest.mark.slow
-def test_it_needs_nothing_from_outside(text: str) -> None:
-    tags = Tags(text)
+def test_it_needs_nothing_from_outside(attacked: str) -> None:
+    tags = Tags(attacked)
     assert [attributes for tag, attributes in tags.tags if {"src", "href"} & set(attributes)] == []
     assert tags.count("link") == 0
     policy = next(a["content"] for tag, a in tags.tags if a.get("http-equiv") == "Content-Security-Policy")
@@ -157,121 +141,239 @@ def test_it_needs_nothing_from_outside(text: str) -> None:
     assert "http" not in policy
 
 
-def drawn_by_a_browser(text: str, folder: Path, width: int = 1280) -> str:
-    """The document of a page after its scripts have run, in a window of that many pixels."""
+def drawn_by_a_browser(text: str, folder: Path, script: str) -> tuple[str, Any]:
+    """The document of a page in a narrow window after its scripts have run, and what `script` leaves in its title."""
     assert CHROMIUM is not None
     file = folder / "page.html"
-    file.write_text(text, encoding="utf-8")
+    run = f"<script>addEventListener('load', () => setTimeout(() => {{{script}}}, 2000))</script></html>"
+    file.write_text(text.replace("</html>", run), encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000", "--dump-dom"]
-    options.append(f"--window-size={width},844")
-    command = [CHROMIUM, *options, f"--user-data-dir={folder / 'profile'}", file.as_uri()]
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=120).stdout
+    command = [CHROMIUM, *options, "--window-size=500,844", f"--user-data-dir={folder / 'profile'}", file.as_uri()]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True, timeout=600).stdout
+    return shown, json.loads(re.findall("<title>(.*?)</title>", shown)[0])
 
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_a_browser_draws_every_figure(text: str, tmp_path: Path) -> None:
-    drawn = drawn_by_a_browser(text, tmp_path)
-    for name in ("where", "frf", "before_after", "explanations", "parameters"):
-        part = drawn[drawn.index(f'id="figure-{name}"') :]
-        assert "main-svg" in part[: part.index("</script>")]
-    assert "<img src=x" not in drawn
-
-
-@pytest.mark.browser
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_titles_of_figures_are_seen_whole_in_a_narrow_window(text: str, tmp_path: Path) -> None:
+def test_a_browser_draws_every_figure_whole_and_buttons_lead_from_one_frf_to_the_next(
+    attacked: str, tmp_path: Path
+) -> None:
+    """Titles are seen whole in a narrow window, and no text of the campaign becomes an element."""
     look = "const right = (one) => one.getBoundingClientRect().right, wide = document.documentElement.clientWidth;"
     look += "const titles = [...document.querySelectorAll('.summary .gtitle')].map(right);"
-    look += "document.title = JSON.stringify([wide, titles]);"
-    script = f"<script>addEventListener('load', () => setTimeout(() => {{{look}}}, 2000))</script></html>"
-    shown = drawn_by_a_browser(text.replace("</html>", script), tmp_path, width=500)
-    wide, titles = json.loads(re.findall("<title>(.*?)</title>", shown)[0])
+    look += "const [back, on] = document.querySelectorAll('label + button, label + button + button');"
+    look += "const seen = () => [back.disabled, on.disabled, document.getElementById('figure-frf').data[0].y[0]];"
+    look += "const before = seen(); on.click(); document.title = JSON.stringify([wide, titles, before, seen()]);"
+    shown, (wide, titles, before, after) = drawn_by_a_browser(attacked, tmp_path, look)
+    for name in ("where", "frf", "before_after", "explanations", "parameters"):
+        part = shown[shown.index(f'id="figure-{name}"') :]
+        assert "main-svg" in part[: part.index("</script>")]
+    assert "<img src=x" not in shown
     assert len(titles) >= 3
     assert max(titles) <= wide
+    buttons = figures_in(attacked)["frf"].layout.updatemenus[0].buttons
+    assert before == [True, False, buttons[0].args[0]["y"][0][0]]
+    assert after == [False, False, buttons[1].args[0]["y"][0][0]]
 
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_a_list_that_keys_reach_chooses_the_recording(document: dict[str, Any], tmp_path: Path) -> None:
+def test_a_list_that_keys_reach_chooses_the_recording(tmp_path: Path) -> None:
     choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
-    choosing += "list.dispatchEvent(new Event('change')); document.title = "
-    choosing += "document.getElementById('figure-curve').data.filter((t) => t.visible).map((t) => t.meta.recording);"
+    choosing += "list.dispatchEvent(new Event('change')); const drawn = document.getElementById('figure-curve');"
     choosing += "const bottom = (one) => one.getBoundingClientRect().bottom;"
-    choosing += "const drawn = document.getElementById('figure-curve'); document.title += '|';"
-    choosing += "document.title += bottom(drawn) - bottom(drawn.parentElement);"
-    script = f"<script>addEventListener('load', () => setTimeout(() => {{{choosing}}}, 500))</script></html>"
-    text = page(document, {"curve": adhesive_figure()}).replace("</html>", script)
-    shown = drawn_by_a_browser(text, tmp_path)
-    title, beyond = re.findall("<title>(.*?)</title>", shown)[0].split("|")
-    assert float(beyond) <= 1  # pixels: what lies below its box is hidden by what follows
-    menu = adhesive_figure().layout.updatemenus[0]
-    assert set(title.split(",")) == {menu.buttons[1].name.partition(":")[0]}
+    choosing += "document.title = JSON.stringify([drawn.data.filter((t) => t.visible).map((t) => t.meta.recording),"
+    choosing += "bottom(drawn) - bottom(drawn.parentElement)]);"
+    _, (recordings, beyond) = drawn_by_a_browser(adhesive_page()[1], tmp_path, choosing)
+    assert beyond <= 1  # pixels: what lies below its box is hidden by what follows
+    assert set(recordings) == {adhesive_figure().layout.updatemenus[0].buttons[1].name.partition(":")[0]}
 
 
-@pytest.mark.browser
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_buttons_lead_from_one_frf_to_the_next(
-    found: DiagnosisResult, document: dict[str, Any], tmp_path: Path
+@pytest.mark.parametrize(
+    ("made", "verdict", "names"),
+    [
+        (Made(), "no_mismatch", {"where", "frf", "before_after", "explanations"}),
+        (Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,)), "insufficient_data", set()),
+    ],
+    ids=["nothing", "too little"],
+)
+def test_a_report_without_mechanisms_has_its_page(
+    made: Made, verdict: str, names: set[str], table: SigmaTable
 ) -> None:
-    figure = figures(found, document)["frf"]
-    look = "const [back, on] = document.querySelectorAll('label + button, label + button + button');"
-    look += "const seen = () => [back.disabled, on.disabled, document.getElementById('figure-frf').data[0].y[0]];"
-    look += "const before = seen(); on.click(); document.title = JSON.stringify([before, seen()]);"
-    script = f"<script>addEventListener('load', () => setTimeout(() => {{{look}}}, 500))</script></html>"
-    shown = drawn_by_a_browser(page(document, {"frf": figure}).replace("</html>", script), tmp_path)
-    first, second = json.loads(re.findall("<title>(.*?)</title>", shown)[0])
-    buttons = figure.layout.updatemenus[0].buttons
-    assert (first, second) == (
-        [True, False, buttons[0].args[0]["y"][0][0]],
-        [False, False, buttons[1].args[0]["y"][0][0]],
-    )
-
-
-def curves() -> Campaign:
-    """A thin layer's indentation."""
-    table, empty = load_table(), indentation_campaign()
-    model = compose(("layered_contact",), empty, table, "indentation")
-    force = model.predict(np.array([entry.start for entry in model.parameters])).value.real
-    random = np.random.default_rng(1)
-    recordings = []
-    for number, entry in enumerate(empty.recordings):
-        assert isinstance(entry, IndentationRecording)
-        own = force[model.recording == number]
-        recordings.append(replace(entry, force_n=own + 1e-3 * np.abs(own).max() * random.normal(size=len(own))))
-    return replace(empty, recordings=tuple(recordings))
-
-
-EVERY = {"where", "frf", "before_after", "explanations", "parameters"}
-ALONE = Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,))
-KINDS = [
-    (lambda: campaign(Made(), load_table()), "no_mismatch", EVERY - {"parameters"}),
-    (lambda: campaign(OFF_CENTRE, load_table()), "explained", EVERY),
-    (lambda: campaign(ALONE, load_table()), "insufficient_data", set()),
-    (curves, "explained", EVERY - {"parameters", "frf"} | {"curve"}),  # a thin layer has no parameter
-]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("make", "verdict", "names"), KINDS, ids=["nothing", "off centre", "too little", "curves"])
-def test_every_kind_of_report_has_its_page(make: Callable[[], Campaign], verdict: str, names: set[str]) -> None:
-    whole = make()
-    found = lean_diagnosis(whole, load_table(), *COSTLY)
-    document = report(found)
-    drawn = figures(found, document)
-    assert (document["verdict"], set(drawn)) == (verdict, names)
-    tags = Tags(page(document, drawn))
-    assert readable(document["statement"]).partition(". ")[0].rstrip(".") in tags.text
+    report, text = written([to_dict(campaign(made, table))], without=EVERY)
+    tags = Tags(text)
+    assert (report["verdict"], set(figures_in(text))) == (verdict, names)
+    assert ("The grey band holds 95 %" in tags.text) == ("frf" in names)
     if not names:
         assert tags.count("script") == 1  # the page's own, without plotly
-    assert ("The grey band holds 95 %" in tags.text) == ("frf" in names)
-    assert ("Depth is counted from the fitted contact point" in tags.text) == ("curve" in names)
-    fitted = document["fit"]["after"].get("youngs_modulus") if document["fit"] else None
-    assert ("Young's modulus [MPa]" in tags.text) == (fitted is not None) == ("curve" in names)
-    if fitted is not None:
-        stated = f"{wording.number(fitted['value'])}{wording.interval(fitted)}".replace(" ", "")
-        settled = document["verdict"] in ("explained", "no_mismatch")
-        label = "addstothelaw." if settled else "donotsettleit."
-        assert f"{label}{stated}" in tags.text.replace(" ", "")
-    for figure in drawn.values():
-        json.loads(figure.to_json())
+        assert "What is lacking: " in tags.text
+
+
+def test_figures_show_the_report_s_numbers(
+    resonant: tuple[dict[str, Any], str], figures: dict[str, go.Figure]
+) -> None:
+    report, _ = resonant
+    bars = figures["explanations"].data[0]
+    assert next(iter(bars.y)) == "contact resonance"
+    assert list(bars.x) == [report["probability"], *(entry["probability"] for entry in report["alternatives"])]
+    intervals = [trace.x for trace in figures["parameters"].data if trace.name == "95 % interval"]
+    parameters = report["mechanisms"][0]["parameters"]
+    assert [list(ends) for ends in intervals] == [[entry["low"], entry["high"]] for entry in parameters]
+    for axis, (low, high) in zip(figures["parameters"].select_xaxes(), intervals, strict=True):
+        assert (high - low) / (axis.range[1] - axis.range[0]) == pytest.approx(1 / 3)  # it is seen, however narrow
+    where = figures["where"]
+    cells, (outline,) = np.abs(np.asarray(where.data[0].z, dtype=float)), where.layout.shapes
+    inside = cells[:, int(outline.x0 + 0.5) : int(outline.x1 + 0.5)]
+    assert set(report["location"]["region"]) == {"frequency_hz"}
+    assert np.nanmean(inside) > 5 * np.nanmean(cells[:, : int(outline.x0 + 0.5)])
+    lowest = float(where.layout.xaxis.ticktext[int(outline.x0 + 0.5)])
+    assert lowest == pytest.approx(report["location"]["region"]["frequency_hz"][0], rel=5e-3)
+
+
+def test_after_the_points_lie_within_the_noise_s_band(figures: dict[str, go.Figure]) -> None:
+    traces = figures["before_after"].data
+    outside = []
+    for band, name in zip([one for one in traces if one.fill == "toself"], ("before", "after"), strict=True):
+        points = next(trace for trace in traces if trace.name == name)
+        x, y = np.asarray(band.x, dtype=float), np.asarray(band.y, dtype=float)
+        count = len(x) // 2
+        above = np.asarray(points.y) > np.interp(points.x, x[:count], y[:count])
+        below = np.asarray(points.y) < np.interp(points.x, x[:count], y[count:][::-1])
+        outside.append(float(np.mean(above | below)))
+    before, after = outside
+    assert after < 0.1 < 0.2 < before
+
+
+def shown_frf(figure: go.Figure, recording: str) -> dict[str, Floats]:
+    """What the figure shows once a recording was chosen, by what it is; and the frequencies."""
+    meta = figure.layout.meta
+    changed = figure.layout.updatemenus[0].buttons[list(meta["recordings"]).index(recording)].args[0]
+    x = changed.get("x", [trace.x for trace in figure.data])
+    named = zip(meta["shows"], changed["y"], strict=True)
+    return {"frequency_hz": np.asarray(x[0]), **{name: np.asarray(y, dtype=float) for name, y in named}}
+
+
+def test_frfs_are_shown_as_recorded_beside_the_truth_and_on_the_noise_s_band(
+    figures: dict[str, go.Figure], table: SigmaTable
+) -> None:
+    figure, made = figures["frf"], campaign(RESONANT, table)
+    model = compose(RESONANT.mechanisms, made, table)
+    values = [*RESONANT.parameters, D33, 1.0, 1.0]
+    fit = [entry.to_fit(value) for entry, value in zip(model.parameters, values, strict=True)]
+    truth = 1e12 * model.predict(np.array(fit)).value
+    inside: dict[str, list[bool]] = {"before": [], "after": []}
+    for number, entry in enumerate(frf_recordings(made)):
+        drawn, exact = shown_frf(figure, entry.id), truth[model.recording == number]
+        recorded = np.asarray(entry.frf_re_pc_per_n) + 1j * np.asarray(entry.frf_im_pc_per_n)
+        np.testing.assert_allclose(drawn["frequency_hz"], entry.frequency_hz, rtol=1e-4)
+        again = drawn["measured"] * np.exp(1j * np.radians(drawn["measured phase"]))
+        np.testing.assert_allclose(again, recorded, atol=1e-2 * np.abs(recorded).max())
+        np.testing.assert_allclose(drawn["after"], np.abs(exact), rtol=0.06)  # gains of sensors, and the fit
+        turned = np.angle(np.exp(1j * np.radians(drawn["after phase"])) / exact, deg=True)
+        assert np.abs(turned).max() < 4.0
+        np.testing.assert_allclose(drawn["before phase"], 0.0, atol=1e-6)  # without mass, no phase
+        for which, found in inside.items():
+            for part in ("real", "imaginary"):
+                found += (np.abs(drawn[f"residual {which} {part}"]) <= drawn[f"noise {part} high"]).tolist()
+    assert np.mean(inside["after"]) == pytest.approx(0.95, abs=0.03)
+    assert np.mean(inside["before"]) < 0.75
+    (menu,) = figure.layout.updatemenus
+    assert len(menu.buttons) == len(made.recordings)
+    assert "% before" in menu.buttons[0].name
+
+
+@pytest.mark.soak
+def test_of_very_many_recordings_each_sensor_s_worst_are_shown_and_the_figure_stays_small(table: SigmaTable) -> None:
+    made = replace(RESONANT, mechanisms=(), parameters=(), sensors=20, lines=300, highest_hz=100.0)
+    figure = figures_in(written([to_dict(campaign(made, table))], without=EVERY)[1])["frf"]
+    sensors = [name.partition("(")[2].partition(",")[0] for name in (one.name for one in figure.layout.updatemenus[0].buttons)]
+    assert {sensors.count(f"s{number}") for number in range(20)} == {6}
+    assert len(figure.to_json()) < 900_000
+    assert "of 300 lines" in figure.layout.updatemenus[0].buttons[0].name
+
+
+def trace_of(recording: str, shows: str) -> go.Scatter:
+    meta = ("recording", "shows")
+    (trace,) = [one for one in adhesive_figure().data if tuple(one.meta[name] for name in meta) == (recording, shows)]
+    return trace
+
+
+def in_lab_units(recording: str, shows: str) -> tuple[Floats, Floats]:
+    """Depth [mm] and force [N] of a trace."""
+    trace = trace_of(recording, shows)
+    return np.asarray(trace.x) * trace.meta["mm"], np.asarray(trace.y) * trace.meta["n"]
+
+
+def test_curves_are_explained_by_adhesion_alone_and_their_page_says_the_modulus() -> None:
+    """A jump into contact between two samples asks for no companion."""
+    report, text = adhesive_page()
+    assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["adhesion"])
+    modulus = report["fit"]["after"]["youngs_modulus"]
+    assert modulus["low"] <= 0.5 <= modulus["high"]
+    assert report["fit"]["after"]["heldout_rmse_percent"] < 1.2 * report["fit"]["noise_floor_percent"]
+    said = Tags(text).text.replace(" ", "")
+    assert f"addstothelaw.{modulus['value']:.4g}" in said
+    assert set(figures_in(text)) == {"where", "curve", "before_after", "explanations", "parameters"}
+    titles = [axis.title.text for axis in adhesive_figure().select_yaxes()]
+    assert titles == ["force [N]", "residual<br>before [mN]", "residual<br>after [mN]"]
+
+
+def test_the_residual_of_a_curve_is_what_was_measured_less_what_is_predicted() -> None:
+    for which in ("before", "after"):
+        depth, predicted = in_lab_units("c01", which)
+        place, left = in_lab_units("c01", f"residual {which}")
+        at, measured = in_lab_units("c01", "measured")
+        np.testing.assert_array_equal(place, depth)
+        turn, top = int(depth.argmax()), int(at.argmax())
+        pressed = depth[:turn] > 0.02
+        expected = np.interp(depth[:turn][pressed], at[:top], measured[:top])
+        assert (predicted + left)[:turn][pressed] == pytest.approx(expected, abs=5 * NOISE_N)
+        assert (float(np.median(np.abs(left[:turn][pressed]))) > 2 * NOISE_N) == (which == "before")
+
+
+def test_only_the_true_law_leaves_its_residuals_on_the_noise_s_band() -> None:
+    inside: dict[str, list[bool]] = {"before": [], "after": []}
+    for recording in ("c01", "c02"):
+        for which, told in inside.items():
+            depth, left = in_lab_units(recording, f"residual {which}")
+            turn = int(depth.argmax())
+            for way, own in (("in", slice(None, turn + 1)), ("back", slice(turn + 1, None))):
+                place, high = in_lab_units(recording, f"noise {way} {which} high")
+                assert (np.diff(place) >= 0).all()  # the area is filled in one direction
+                told += list(np.abs(left[own]) <= np.interp(depth[own], place, high))
+    assert len(inside["after"]) > 100
+    assert np.mean(inside["after"]) > 0.9
+    assert np.mean(inside["before"]) < 0.5
+
+
+@pytest.mark.parametrize("recording", ["c01", "c02"])
+def test_marks_stand_where_contact_begins_and_where_it_jumps_and_samples_there_are_kept(recording: str) -> None:
+    document, truth = adhesive_curves()
+    (entry,) = [one for one in document["recordings"] if one["id"] == recording]
+    said = re.search(r"as recorded: (\S+) mm", trace_of(recording, "contact point after").hovertemplate)
+    assert said
+    contact = float(said[1])
+    assert contact == pytest.approx(0.0, abs=1e-3)
+    assert in_lab_units(recording, "contact point after")[0] == 0
+    assert in_lab_units(recording, "contact point before")[0] > 0.004  # Hertz's law has no pull
+    measured, _ = in_lab_units(recording, "measured")
+    name, total = trace_of(recording, "measured").name, len(entry["force_n"])
+    assert len(measured) < total / 2
+    assert name == f"measured ({len(measured)} of {total} samples)"
+    for mark, sample in (("snap-in", truth[recording].first), ("pull-off", truth[recording].last)):
+        (depth,), (force,) = in_lab_units(recording, mark)
+        assert depth + contact == pytest.approx(entry["displacement_mm"][sample], abs=1e-5)
+        assert force == pytest.approx(entry["force_n"][sample], abs=NOISE_N)
+        for beside_it in entry["displacement_mm"][sample - 3 : sample + 4]:
+            assert np.abs(measured + contact - beside_it).min() < 1e-5
+
+
+def test_one_recording_is_seen_at_a_time() -> None:
+    (menu,) = adhesive_figure().layout.updatemenus
+    names = [button.name.partition(":")[0] for button in menu.buttons]
+    assert sorted(names) == ["c01", "c02"]
+    for name, button in zip(names, menu.buttons, strict=True):
+        changed, layout = button.args
+        traces = zip(adhesive_figure().data, changed["visible"], strict=True)
+        assert {trace.meta["recording"] for trace, on in traces if on} == {name}
+        assert layout["yaxis.title.text"].startswith("force [")

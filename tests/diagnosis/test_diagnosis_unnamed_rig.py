@@ -1,48 +1,42 @@
-"""Laws that nobody listed, hidden by the virtual rig and by an independent one: found and predicted."""
+"""Laws that nobody listed, hidden by independent rigs: found and predicted."""
 
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from rig.draw import drawn, record
+from rig.recorded import campaign as recorded
 from tests.support.cases import first
-from tests.support.rig_reports import rig_report
-from underskin.diagnosis.pipeline import diagnosis_report
-from underskin.recordings.campaign import from_dict
+from tests.support.lean_reports import BESIDE_SKINS, lean_report, whole_report
+from underskin.recordings.campaign import from_dict, parse
 from underskin.surrogate.sigma_table import SigmaTable
+
+pytestmark = pytest.mark.slow
 
 TRUTH = "unlisted-open-truth.json"
 ALIKE = {"day_time": "time_of_day", "previous_preload": "previous_preload_n", "drift_then_plateau": "saturating"}
-
-
-@pytest.mark.slow
-def test_what_remembers_the_preload_before_is_found(table: SigmaTable) -> None:
-    law = rig_report(table, {"hysteretic_d33": {"amplitude": 0.1}})["unnamed"]
-    assert law["axis"] == "previous_preload_n"
-
-
-@pytest.mark.slow
-def test_a_place_that_runs_round_is_a_periodic_place(table: SigmaTable) -> None:
-    law = rig_report(table, {"stage_wobble": {"amplitude_mm": 0.5, "period_recordings": 6.3}})["unnamed"]
-    assert (law["acts_on"], law["axis"], law["form"]) == ("position", "order", "periodic")
-    period = next(entry for entry in law["parameters"] if entry["name"] == "period")
-    assert period["value"] == pytest.approx(6.3, rel=0.02)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
+SHARED = Path(os.environ.get("UNDERSKIN_CAMPAIGNS", ""))
+needs_campaigns = pytest.mark.skipif(
     "UNDERSKIN_CAMPAIGNS" not in os.environ, reason="UNDERSKIN_CAMPAIGNS does not name the folder of campaigns"
 )
+
+
+def report_on(name: str, table: SigmaTable) -> dict[str, Any]:
+    document = json.loads((SHARED / "unlisted-open" / f"{name}.json").read_text(encoding="utf-8"))
+    return lean_report(parse(document), table, *BESIDE_SKINS)
+
+
+@needs_campaigns
 def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out(table: SigmaTable) -> None:
-    folder = Path(os.environ["UNDERSKIN_CAMPAIGNS"])
-    truths = [entry for entry in json.loads((folder / TRUTH).read_text()).items() if entry[1]["identifiable"]]
+    truths = [entry for entry in json.loads((SHARED / TRUTH).read_text()).items() if entry[1]["identifiable"]]
     right, shares = 0, []
     for name, truth in (tried := first(5, truths)):
-        found, _ = from_dict(json.loads((folder / "unlisted-open" / f"{name}.json").read_text()))
-        document = diagnosis_report(found, table)
-        law, own = document["unnamed"], truth["law"]
+        report = report_on(name, table)
+        law, own = report["unnamed"], truth["law"]
         if law is None:
             continue
         good = all(
@@ -52,6 +46,25 @@ def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out
         right += good
         before, after = law["heldout_rmse_percent"]["before"], law["heldout_rmse_percent"]["after"]
         if good:
-            shares.append((before**2 - after**2) / (before**2 - document["fit"]["noise_floor_percent"] ** 2))
+            shares.append((before**2 - after**2) / (before**2 - report["fit"]["noise_floor_percent"] ** 2))
     assert right >= 0.8 * len(tried)
     assert np.median(shares) > 0.8
+
+
+@needs_campaigns
+@pytest.mark.soak
+def test_a_delay_that_disperses_is_a_delay_with_another_exponent(table: SigmaTable) -> None:
+    """A phase that grows with the square of frequency."""
+    report = report_on("c6h8e3rgx", table)
+    assert "this is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
+    exponent = next(entry for entry in report["unnamed"]["parameters"] if entry["name"] == "exponent")
+    assert exponent["value"] == pytest.approx(2.0, abs=0.05)
+
+
+@pytest.mark.soak
+def test_a_law_that_leads_a_fit_to_absurd_responses_is_no_better_for_it(table: SigmaTable) -> None:
+    """A high pass whose corner rises with the preload, of which this diagnosis once failed."""
+    content, _ = from_dict(recorded(record(drawn(61496, 231, None))))
+    report = whole_report(content, table)
+    assert report["verdict"] == "unexplained"
+    assert (report["unnamed"]["acts_on"], report["unnamed"]["axis"]) == ("frequency_response", "preload_n")

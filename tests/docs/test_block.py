@@ -34,8 +34,8 @@ def test_the_half_spaces_error_falls_with_the_depth_of_the_base() -> None:
     np.testing.assert_allclose(percent, [-34.7, -7.8, -0.7, -0.01], atol=0.05)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("depth", "bonded"), first(2, [(1.0, True), (1.0, False), (4.0, True)]))
+@pytest.mark.soak
+@pytest.mark.parametrize(("depth", "bonded"), [(1.0, False), (4.0, True)])
 def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> None:
     wide = 16 * max(1.0, depth)
     block = solve(FiniteBlock(wide, wide, depth, bonded), A, RHO, order=5)
@@ -44,11 +44,12 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
 
 @pytest.mark.slow
 def test_the_error_falls_with_the_order_of_the_elements() -> None:
+    """Of a very wide block, which is the endless layer."""
     exact = linear_layer.sigma(A, RHO)
     errors = [
         float(np.max(np.abs(solve(FiniteBlock(16.0, 16.0, 1.0), A, RHO, order).sigma / exact - 1))) for order in (4, 5)
     ]
-    assert errors[1] < errors[0] / 10
+    assert errors[1] < min(1e-5, errors[0] / 10)
 
 
 @pytest.mark.slow
@@ -61,7 +62,7 @@ def test_the_papers_block_converges_and_carries_the_whole_force(depth: float) ->
     np.testing.assert_allclose(coarse.sigma, fine.sigma, rtol=2e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_length_and_width_can_be_exchanged() -> None:
     along = solve(FiniteBlock(PAPER_LENGTH, PAPER_WIDTH, 4.0), A, RHO, order=3)
     across = solve(FiniteBlock(PAPER_WIDTH, PAPER_LENGTH, 4.0), A, RHO, order=3)
@@ -75,6 +76,7 @@ def test_a_narrow_column_carries_the_mean_pressure() -> None:
     np.testing.assert_allclose(column.sigma, 2 * np.pi / 3 / side**2, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_displacement_under_the_load_is_the_endless_layers() -> None:
     """w(0) = F/(4πG) ∫ K(k) J(k) dk in units of h: K the layer's compliance, J the Hertz pressure's transform."""
     x, weight = np.polynomial.legendre.leggauss(400)

@@ -27,5 +27,5 @@ def test_the_papers_cylinder_converges() -> None:
 
 def test_only_the_shape_matters() -> None:
     assert stiffness_ratio(2.5, 4.0) == pytest.approx(stiffness_ratio(5.0, 8.0), rel=1e-9)
-    shapes = np.array([stiffness_ratio(height, 1.0) for height in (0.2, 0.5, 1.0, 3.0)])
+    shapes = np.array([stiffness_ratio(height, 1.0) for height in (0.5, 1.0, 3.0)])
     assert np.all(np.diff(shapes) < 0)

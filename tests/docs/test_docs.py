@@ -63,7 +63,7 @@ def test_parts_of_the_benchmark_that_are_said_to_be_on_a_page_are() -> None:
                 assert [part for part in parts if f"`python -m bench {part}`" not in validation] == [], page
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
     answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)

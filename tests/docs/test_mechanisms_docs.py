@@ -33,7 +33,7 @@ def test_each_mechanism_has_a_figure_of_an_effect() -> None:
             assert changed, (name, panel.axis)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_figures_come_out_the_same_every_time(tmp_path: Path) -> None:
     first, second = (
         [path.read_bytes() for path in draw(load_table(), tmp_path, ["ageing", "contact_resonance"])] for _ in range(2)

@@ -50,8 +50,9 @@ def test_parts_of_a_soak_are_of_the_commits_that_finished_them(tmp_path: Path, m
     monkeypatch.setattr(page, "RESULTS", tmp_path / "results.json")
     monkeypatch.setattr(page, "PAGE", tmp_path / "validation.md")
     kills, slowest = Figure("kills", 250, "", 250), Figure("slowest", 120.0, "ms", 300, "lower")
-    page.keep_soak({"cores": 2}, [kills, slowest], "a1")
-    page.keep_soak({"cores": 2}, [replace(kills, value=20), replace(slowest, value=400.0)], "b2")
+    first, later = ({"commit": name, "date": "2026-01-01", "machine": {"cores": 2}} for name in ("a1", "b2"))
+    page.keep_soak(first, [kills, slowest])
+    page.keep_soak(later, [replace(kills, value=20), replace(slowest, value=400.0)])
     page.write()
     rows = [line for line in page.PAGE.read_text().splitlines() if line.startswith(("| kills", "| slowest"))]
     assert rows == ["| kills | 250  | ≥ 250 | yes | a1 |", "| slowest | 400 ms | ≤ 300 | **no** | b2 |"]

@@ -21,7 +21,7 @@ def test_the_tour_is_up_to_date() -> None:
         assert (DOCS / "figures" / picture(number, step)).read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.server
 @pytest.mark.browser
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")

@@ -17,7 +17,7 @@ from underskin.physics import hertz
 from underskin.recordings.campaign import Campaign, FrfRecording, parse
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
-CAMPAIGNS = 3000 if os.environ.get("UNDERSKIN_SOAK") else 200
+CAMPAIGNS = 3000 if os.environ.get("UNDERSKIN_SOAK") else 150
 
 NEEDS_CAMPAIGNS = pytest.mark.skipif(
     "UNDERSKIN_CAMPAIGNS" not in os.environ, reason="UNDERSKIN_CAMPAIGNS does not name the folder of campaigns"
@@ -30,12 +30,13 @@ def table() -> SigmaTable:
 
 
 @pytest.mark.slow
-def test_intervals_cover_as_often_as_they_say(table: SigmaTable) -> None:
+def test_intervals_cover_as_often_as_they_say_and_usual_scatter_is_never_set_aside(table: SigmaTable) -> None:
     random = np.random.default_rng(1)
     arrays, sensors, cells = [], [], []
     for _ in range(CAMPAIGNS):
         rig, array = drawn(random)
         found = invert(simulate(table, rig, random), table)
+        assert found.left_out == ()
         assert found.campaign_d33 is not None
         arrays.append(covered(found.campaign_d33, np.array(array)))
         sensors.append(np.mean(covered(found.sensors, rig.d33)))

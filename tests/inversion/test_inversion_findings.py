@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.inversion.inverted_campaigns import covered, drawn, moved, scaled
+from tests.inversion.inverted_campaigns import covered, moved, scaled
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, invert
@@ -66,7 +66,7 @@ def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, ch
 def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
     random = np.random.default_rng(6)
     accused = 0
-    for _ in range(60):
+    for _ in range(40):
         d33 = 14 * (1 + 0.05 * random.normal(size=16))
         rig = Rig(d33=d33, preloads_n=(0.5, 1.0, 2.0, 3.0), gain=0.03, position_mm=0.1, largest_offset_mm=0.5)
         accused += bool(invert(simulate(table, rig, random), table).flags)
@@ -115,14 +115,6 @@ def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, facto
     assert covered(found.sensors, rig.d33).all()
     assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
     assert found.flags == ()
-
-
-@pytest.mark.slow
-def test_scatter_that_rigs_have_is_never_set_aside(table: SigmaTable) -> None:
-    random = np.random.default_rng(14)
-    for _ in range(60):
-        rig, _ = drawn(random)
-        assert invert(simulate(table, rig, random), table).left_out == ()
 
 
 def test_a_sensor_of_few_recordings_is_flagged_as_a_whole(table: SigmaTable) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.saving import document
@@ -83,15 +84,17 @@ def test_the_grammar_holds_several_hundred_laws_whose_shares_are_a_prior(grammar
     assert 0.05 * max(shares.values()) < 0.34 / len(CATALOGUE)
 
 
+@pytest.mark.slow
 def test_amplitudes_of_0_are_the_base_model(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
     base = predicted(FrfModel((), campaign, table, tuple(CATALOGUE.values())), ())
-    for law in of_each_combination(grammar):
+    for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
         model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
         assert predicted(model, coordinates(law, 0.0)) == pytest.approx(base, rel=1e-9), law.name
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences(grammar: Grammar, campaign: Campaign, table: SigmaTable) -> None:
-    for law in of_each_combination(grammar)[::3]:
+    for law in of_each_combination(grammar)[:: 1 if SOAK else 3]:
         model = FrfModel([law], campaign, table, tuple(CATALOGUE.values()))
         fit = point(model, coordinates(law, 0.31))
         exact = model.predict(fit).slopes
@@ -169,8 +172,9 @@ def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign:
     assert predicted(of_part, [0.3]) == pytest.approx(predicted(model, [0.3])[kept])
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
-    for law in grammar.laws:
+    for law in grammar.laws[:: 1 if SOAK else 4]:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.spoken.form == "free":
             continue
         values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}

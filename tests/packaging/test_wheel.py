@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.packaging.fresh_environment import Environment, build_wheel, new_environment, required
+from tests.support.cases import first
 from tests.support.repository import ROOT
 
 pytestmark = pytest.mark.slow  # they build the wheel and its environment
@@ -97,10 +98,6 @@ def test_every_module_is_imported_without_the_packages_of_the_server(fresh: Envi
     assert list(fresh.site_packages.glob(f"underskin/**/{COMPILED_THERE}.*.nbc"))
 
 
-def test_sigma(fresh: Environment, tmp_path: Path) -> None:
-    assert "0.93651" in printed(fresh, tmp_path, "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6")
-
-
 def test_the_frf_and_the_d33_that_explains_it(fresh: Environment, tmp_path: Path) -> None:
     frf = printed(fresh, tmp_path, "frf", *SKIN, "--d33-pc-per-n", "14", "--csv").splitlines()
     value = dict(zip(frf[0].split(","), frf[1].split(","), strict=True))["frf_pc_per_n"]
@@ -132,11 +129,14 @@ def test_the_help_says_where_the_other_commands_run(fresh: Environment, tmp_path
 
 @pytest.mark.parametrize(
     ("command", "where", "extra"),
-    [
-        ("serve", "a checkout or the image", "server"),
-        ("prove", "a checkout", "docs"),
-        ("rig", "a checkout or the image", ""),
-    ],
+    first(
+        1,
+        [
+            ("serve", "a checkout or the image", "server"),
+            ("prove", "a checkout", "docs"),
+            ("rig", "a checkout or the image", ""),
+        ],
+    ),
 )
 def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
     fresh: Environment, tmp_path: Path, command: str, where: str, extra: str
@@ -149,6 +149,7 @@ def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
     )
 
 
+@pytest.mark.soak
 def test_a_checkout_without_the_extra_says_what_to_install(tmp_path: Path) -> None:
     environment = new_environment(tmp_path / "venv", [*PROJECT["dependencies"], "hatchling", "editables"])
     environment.install("--editable", str(ROOT))

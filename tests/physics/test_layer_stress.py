@@ -17,7 +17,7 @@ UNIT = 1.5 / np.pi  # of the stresses here, for F = 1 N and h = 1 m
 def _rings(end: float, widest: float) -> tuple[Floats, Floats]:
     """Radii from 0 to `end` with the weights of ∫ … 2πr dr, fine up to `widest`."""
     x, w = np.polynomial.legendre.leggauss(20)
-    edges = np.concatenate([np.linspace(0.0, widest, 121), np.linspace(widest, end, 121)[1:]])
+    edges = np.concatenate([np.linspace(0.0, widest, 61), np.linspace(widest, end, 61)[1:]])
     half = np.diff(edges)[:, None] / 2
     r = (edges[:-1, None] + half * (1 + x)).ravel()
     return r, 2 * np.pi * r * (half * w).ravel()
@@ -26,7 +26,7 @@ def _rings(end: float, widest: float) -> tuple[Floats, Floats]:
 @pytest.mark.parametrize("poisson_ratio", RATIOS)
 def test_every_plane_bears_the_force(poisson_ratio: float) -> None:
     r, ring = _rings(40.0, 6.0)
-    depth = np.array([0.05, 0.25, 0.5, 0.75, 1.0])
+    depth = np.array([0.05, 0.5, 1.0])
     assert UNIT * layer_stress(poisson_ratio, A, r, depth) @ ring == pytest.approx(1.0, abs=1e-6)
 
 

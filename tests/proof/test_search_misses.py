@@ -29,7 +29,7 @@ AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, wh
 @pytest.mark.parametrize(
     "case",
     first(
-        3,
+        1,
         [
             FAINT,
             pytest.param(
@@ -62,7 +62,7 @@ def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> Non
     assert abs(entry["lost_own"]) < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_fit_that_was_stopped_as_hopeless_is_taken_up_where_scatter_shows_that_it_is_not() -> None:
     entry = compared(STOPPED)
     assert entry["found"] == entry["truth"] == ["sensor_relaxation"]

@@ -11,6 +11,7 @@ from proof.slips import of_one
 from proof.text_slips import slips
 from rig.draw import drawn, record
 from rig.recorded import RecordedLines, campaign
+from tests.support.cases import first
 from underskin.recordings.campaign import frf_recordings, from_dict
 
 
@@ -24,8 +25,8 @@ def recorded(effect: str, **values: Any) -> RecordedLines:
 
 @pytest.mark.slow
 def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
-    judged = [of_one(900810, number) for number in (7, 8)]
-    assert [entry["false"] for entry in judged] == [[], []]
+    judged = [of_one(900810, number) for number in first(1, (23, 7, 8))]
+    assert not any(entry["false"] for entry in judged)
     committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
     assert {slip for slip, _ in committed} <= set(SLIPS)
     assert all(one["over_rivals"] <= one["chi2"] + 1e-9 for _, one in committed)

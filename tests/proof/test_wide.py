@@ -18,7 +18,7 @@ from underskin.recordings.campaign import parse
 
 
 def test_wide_tails_go_beyond_the_usual_ones_and_have_arrays_of_two() -> None:
-    usual, wide = ([drawn(11, number, "none", tails) for number in range(120)] for tails in ("usual", WIDE))
+    usual, wide = ([drawn(11, number, "none", tails) for number in range(80)] for tails in ("usual", WIDE))
     assert max(one["noise"]["gain"] for one in usual) <= 0.05 < max(one["noise"]["gain"] for one in wide) <= 0.08
     assert max(one["noise"]["position_mm"] for one in wide) > 0.4
     arrays = [one["skin"]["array"] for one in wide]

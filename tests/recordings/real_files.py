@@ -1,5 +1,6 @@
 """Real instruments' files."""
 
+import functools
 import os
 from pathlib import Path
 
@@ -19,6 +20,7 @@ def real(pattern: str) -> list[Path]:
     return files
 
 
+@functools.cache
 def example_rig(name: str) -> RigDescription:
     file = EXAMPLES / "rigs" / f"{name}.yaml"
     return rig_description.parse(file.read_bytes(), file.name)

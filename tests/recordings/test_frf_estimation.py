@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from bench.soak import SOAK
 from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
@@ -105,12 +106,11 @@ def test_the_kind_of_excitation_is_recognised() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("overlap", [0.0, 0.5])
-@pytest.mark.parametrize("block", ["broadband", "stepped"])
-def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(overlap: float, block: str) -> None:
+@pytest.mark.parametrize(("block", "overlap"), [("broadband", 0.0), ("broadband", 0.5), ("stepped", 0.0)])
+def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(block: str, overlap: float) -> None:
     random = np.random.default_rng(4)
     errors, coherences, stated, variances = [], [], [], []
-    for _ in range(150):
+    for _ in range(150 if SOAK else 100):
         if block == "broadband":
             force = random.standard_normal(8192)
             charge = force + random.standard_normal(8192)
@@ -129,27 +129,6 @@ def test_the_stated_uncertainty_and_the_variance_of_coherence_are_those_seen(ove
     assert np.mean(stated) == pytest.approx(np.mean(np.var(errors, axis=0)), rel=0.25)
     if block == "broadband":  # a fixed tone has less scatter in γ² than the random signals that the formula is for
         assert np.mean(variances) == pytest.approx(np.mean(np.var(coherences, axis=0)), rel=0.25)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("noise_in_force", "noise_in_charge", "best"), [(0.0, 0.3, "H1"), (0.3, 0.0, "H2"), (0.3, 0.3, "Hv")]
-)
-def test_each_estimator_is_unbiased_for_the_noise_it_is_meant_for(
-    noise_in_force: float, noise_in_charge: float, best: str
-) -> None:
-    random = np.random.default_rng(5)
-    force = random.standard_normal(400_000)
-    seen_force = force + noise_in_force * random.standard_normal(len(force))
-    seen_charge = 1e-12 * (force + noise_in_charge * random.standard_normal(len(force)))
-    bias = {
-        name: abs(
-            np.mean(broadband(seen_force, seen_charge, RATE, block_samples=500, estimator=name).values) / 1e-12 - 1
-        )
-        for name in ("H1", "H2", "Hv")
-    }
-    assert bias[best] < 2e-3
-    assert all(value > 0.03 for name, value in bias.items() if name != best and best == "Hv")
 
 
 @pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])

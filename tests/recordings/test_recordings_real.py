@@ -13,6 +13,8 @@ from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
 from underskin.recordings.channels import Contents
 
+pytestmark = pytest.mark.slow  # each file is read in a process of its own
+
 
 def of_each_folder(count: int, files: list[Path]) -> list[Path]:
     """The first few files of each folder; in `make soak` all."""
@@ -22,7 +24,7 @@ def of_each_folder(count: int, files: list[Path]) -> list[Path]:
 
 def test_sphere_in_well_comes_out_positive_in_compression() -> None:
     wells = real("sphere-in-well/run_*/well_*.csv")
-    for file in of_each_folder(3, wells):
+    for file in of_each_folder(1, wells):
         (recording,) = read(file, "sphere-in-well").campaign.recordings
         assert isinstance(recording, IndentationRecording)
         assert recording.id == file.name.split("_")[1]
@@ -48,7 +50,7 @@ def test_a_rig_that_does_not_know_the_hidden_sign_is_refused() -> None:
 def test_silicone_compression() -> None:
     files = real("silicone-compression/*/*.csv")
     assert len(files) == 30
-    for file in of_each_folder(3, files):
+    for file in of_each_folder(1, files):
         (recording,) = read(file, "silicone-compression").campaign.recordings
         assert isinstance(recording, CompressionRecording)
         assert recording.displacement_mm.max() == pytest.approx(20, abs=0.01)  # mm, as the test was set up
@@ -86,7 +88,7 @@ def test_a_tip_radius_that_is_not_known_is_asked_for() -> None:
 
 
 def test_other_afm_files_are_refused_by_what_they_are() -> None:
-    for file in real("afm-hold/*.jpk-force"):
+    for file in first(1, real("afm-hold/*.jpk-force")):
         with pytest.raises(FileError, match="is a ZIP archive"):
             read_file(file, file.name, example_rig("afm-cantilever"))
 
@@ -114,7 +116,6 @@ def test_the_hammers_wrong_label_is_not_accepted_silently() -> None:
             read_file(file, file.name, rig_description.from_dict({**document, "channels": channels}))
 
 
-@pytest.mark.slow
 def test_the_same_sound_as_text_and_as_binary() -> None:
     (text,), (binary,) = real("uff-files/Sample_UFF58_ascii.uff"), real("uff-files/Sample_UFF58b_bin.uff")
     sounds = []

@@ -1,11 +1,14 @@
 """Rig descriptions: what they refuse, what they convert."""
 
+import copy
+import functools
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.recordings.real_files import example_rig
 from tests.support.instrument_files import CHARGE, COMMON, EXAMPLES, FORCE, matlab_5, rig, tdms
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, rig_description
@@ -16,6 +19,7 @@ from underskin.several_errors import SeveralInvalid
 RIGS = sorted((EXAMPLES / "rigs").glob("*.yaml"))
 
 
+@functools.cache
 def parsed(text: str) -> RigDescription:
     return rig_description.parse(text.encode(), "rig.yaml")
 
@@ -29,6 +33,9 @@ channels:
   displacement_mm: {channel: depth, unit: um}
   force_n: {channel: load, unit: V, sensitivity: 1e-2, sensitivity_unit: V/mN}
 """
+
+
+LOAD, DEPTH = ("channels", "force_n"), ("channels", "displacement_mm")
 
 
 def indented(force: str, rig_text: str = SMALL) -> IndentationRecording:
@@ -71,28 +78,32 @@ def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("part", "changes", "message"),
     [
-        ("rig/1", "rig/2", "schema = 'rig/2': must be rig/1"),
-        ("kind: indentation", "kind: tension", "kind = 'tension': must be one of frf, indentation, compression"),
-        ("skin: {poisson_ratio", "skin: {colour", r"skin\.colour = 0\.5: must be one of"),
-        ("recording: {indenter_radius_mm", "recording: {preload_n", r"recording\.preload_n = 2\.5: must be one of"),
-        ("force_n:", "charge_pc:", r"channels\.charge_pc .*must be one of"),
-        ("channel: load,", "", r"channels\.force_n\.channel = None: required"),
-        ("channel: load,", "channel: load, sign: 2,", r"channels\.force_n\.sign = 2: must be 1, -1 or auto"),
-        ("channel: load,", "channel: load, offset: 2,", r"channels\.force_n\.offset = 2: unknown field"),
-        ("sensitivity: 1e-2,", "", r"channels\.force_n\.sensitivity = None: needs a sensitivity_unit"),
-        ("unit: um", "labelled: um", r"channels\.displacement_mm\.unit = None: required where labelled"),
-        ("channel: load,", "channel: load, stiffness_n_per_mm: 1,", "is for displacement_mm"),
-        ("kind: indentation", "rig: 3", "rig = 3: unknown field"),
-        ("kind: indentation", "3: rig", "3 = 'rig': unknown field"),
-        ("radius_mm: 2.5", "radius_mm: 2.5, temperature: .nan", "recording.temperature = '.nan': "),
+        ((), {"schema": "rig/2"}, "schema = 'rig/2': must be rig/1"),
+        ((), {"kind": "tension"}, "kind = 'tension': must be one of frf, indentation, compression"),
+        ((), {"rig": 3}, "rig = 3: unknown field"),
+        (("skin",), {"colour": 0.5}, r"skin\.colour = 0\.5: must be one of"),
+        (("recording",), {"preload_n": 2.5}, r"recording\.preload_n = 2\.5: must be one of"),
+        (("channels",), {"charge_pc": {"channel": "load"}}, r"channels\.charge_pc .*must be one of"),
+        (LOAD, {"channel": None}, r"channels\.force_n\.channel = None: required"),
+        (LOAD, {"sign": 2}, r"channels\.force_n\.sign = 2: must be 1, -1 or auto"),
+        (LOAD, {"offset": 2}, r"channels\.force_n\.offset = 2: unknown field"),
+        (LOAD, {"sensitivity": None}, r"channels\.force_n\.sensitivity = None: needs a sensitivity_unit"),
+        (LOAD, {"stiffness_n_per_mm": 1}, "is for displacement_mm"),
+        (DEPTH, {"unit": None, "labelled": "um"}, r"channels\.displacement_mm\.unit = None: required where labelled"),
     ],
 )
-def test_a_wrong_rig_description_is_refused_by_field(old: str, new: str, message: str) -> None:
-    assert old in SMALL
+def test_a_wrong_rig_description_is_refused_by_field(
+    part: tuple[str, ...], changes: dict[str, Any], message: str
+) -> None:
+    described = copy.deepcopy(parsed(SMALL).document)
+    place = functools.reduce(lambda found, name: found[name], part, described)
+    place.update(changes)
+    for name in [name for name, value in changes.items() if value is None]:
+        del place[name]
     with pytest.raises(InvalidInput, match=message):
-        parsed(SMALL.replace(old, new, 1))
+        rig_description.from_dict(described)
 
 
 def test_all_that_is_wrong_is_told_at_once_and_nothing_that_hangs_on_it() -> None:
@@ -125,13 +136,19 @@ def test_what_is_no_rig_description_is_refused(text: str, message: str) -> None:
         parsed(text)
 
 
-@pytest.mark.parametrize(
-    "number", ["!!float .inf", "!!float .nan", "123456789012345678901", "!!binary aGk=", "!!set {a}"]
-)
-def test_what_json_has_not_is_no_number(number: str) -> None:
-    text = SMALL.replace("sensitivity: 1e-2", f"sensitivity: {number}")
-    with pytest.raises(InvalidInput, match=r"channels\.force_n\.sensitivity = .*must be"):
+def test_what_json_has_not_is_no_number() -> None:
+    text = SMALL.replace("radius_mm: 2.5", "radius_mm: 2.5, temperature: .nan").replace("1e-2", "!!float .inf")
+    text = text.replace("depth,", "depth, sign: !!set {a}, stiffness_n_per_mm: !!binary aGk=,")
+    with pytest.raises(SeveralInvalid) as raised:
         parsed(text)
+    assert sorted(f"{error.field} = {error.value}" for error in raised.value.errors) == [
+        "channels.displacement_mm.sign = {'a'}",
+        "channels.displacement_mm.stiffness_n_per_mm = b'hi'",
+        "channels.force_n.sensitivity = inf",
+        "recording.temperature = .nan",
+    ]
+    with pytest.raises(InvalidInput, match=r"channels\.force_n\.sensitivity = .*must be"):
+        parsed(SMALL.replace("1e-2", "123456789012345678901"))
 
 
 @pytest.mark.parametrize(
@@ -157,8 +174,8 @@ def test_what_json_has_not_is_no_number(number: str) -> None:
 )
 def test_a_channel_that_does_not_fit_is_refused(channel: dict[str, Any], message: str) -> None:
     channels = {"force_n": {"channel": "force"}, "charge_pc": channel}
-    with pytest.raises(FileError, match=rf"run\.tdms: .*{message}"):
-        read_file(tdms(1), "run.tdms", rig(channels=channels))
+    with pytest.raises(FileError, match=rf"run\.csv: .*{message}"):
+        read_file(b"force [mN];amplifier\n1000;0\n1100;-0.007\n900;0.007", "run.csv", rig(channels=channels))
 
 
 def test_a_property_that_the_file_does_not_state_is_refused() -> None:
@@ -203,7 +220,7 @@ def test_times_that_are_not_evenly_spaced_give_no_sample_rate() -> None:
 
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: file.stem)
 def test_the_example_rig_descriptions_are_valid(file: Path) -> None:
-    assert rig_description.parse(file.read_bytes(), file.name).channels
+    assert example_rig(file.stem).channels
 
 
 def test_a_channel_may_be_named_without_the_unit_in_brackets_behind_it() -> None:

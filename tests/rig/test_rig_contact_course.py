@@ -60,13 +60,14 @@ def test_both_branches_are_those_of_johnson_kendall_and_roberts_and_the_stage_is
 
 def last_force(stage_n_per_mm: float) -> float:
     """The force of the last sample in contact over π w_s R."""
-    *_, force = there_and_back(STICKY, 1 / stage_n_per_mm, 12000)
+    *_, force = there_and_back(STICKY, 1 / stage_n_per_mm, 6000)
     return float(force[np.flatnonzero(force)[-1]] / (np.pi * W_S * R))
 
 
+@pytest.mark.slow
 def test_pull_off_lies_between_the_limits_of_a_soft_and_a_stiff_stage() -> None:
     """−3/2 π w R under force control, −5/6 π w R under displacement control."""
-    limits = [last_force(stage) for stage in (1e-4, 3e-3, 3e-2, np.inf)]
+    limits = [last_force(stage) for stage in (1e-4, 3e-3, np.inf)]
     assert limits[0] == pytest.approx(-1.5, abs=2e-3)
     assert limits[-1] == pytest.approx(-5 / 6, abs=6e-2)  # the force rises steeply there
     assert (np.diff(limits) > 0).all()
@@ -76,7 +77,7 @@ def test_pull_off_lies_between_the_limits_of_a_soft_and_a_stiff_stage() -> None:
 @pytest.mark.parametrize(("stage_n_per_mm", "low", "high"), [(3e3, -1.34, -1.32), (3e-4, -0.2, -0.05)])
 def test_snap_in_happens_as_the_surfaces_meet(stage_n_per_mm: float, low: float, high: float) -> None:
     """To −(4/3) π w R under a stiff stage; a soft one springs in."""
-    _, travel, depth, force = there_and_back(STICKY, 1 / stage_n_per_mm, 12000)
+    _, travel, depth, force = there_and_back(STICKY, 1 / stage_n_per_mm, 6000)
     first = int(np.flatnonzero(force)[0])
     assert travel[first - 1] <= 0 < travel[first]
     assert low < force[first] / (np.pi * W * R) < high
@@ -93,7 +94,7 @@ def test_an_edge_at_rest_is_a_flat_punch() -> None:
 
 def test_the_cycle_dissipates_the_hysteresis() -> None:
     """Work over the cycle: (w_s − w) over the largest contact, and what snap-in and tear release at constant depth."""
-    _, travel, _, force = there_and_back(STICKY, 0.0, 20000)
+    _, travel, _, force = there_and_back(STICKY, 0.0, 8000)
     work = float(np.sum((force[1:] + force[:-1]) / 2 * np.diff(travel)))
 
     def released(branch: float, depth: float) -> float:

@@ -125,13 +125,12 @@ def test_parameters_that_exclude_each_other_are_rejected(values: dict[str, Any],
 
 def test_drawn_raw_curves_are_the_same_for_the_same_seed(tmp_path: Path) -> None:
     for name in ("a", "b"):
-        arguments = ["draw", "--output-dir", str(tmp_path / name), "--count", "2", "--seed", "3"]
+        arguments = ["draw", "--output-dir", str(tmp_path / name), "--count", "1", "--seed", "3"]
         answer = CliRunner().invoke(command, [*arguments, "--kind", "indentation", "--what", "single"])
         assert answer.exit_code == 0, answer.output
     first, again = (
         {path.name: path.read_bytes() for path in sorted((tmp_path / name).rglob("*.json"))} for name in ("a", "b")
     )
     assert first == again
-    assert set(first) == {"0000.json", "0001.json", "truth.json"}
-    for name in ("0000.json", "0001.json"):
-        campaigns.parse(json.loads(first[name]))
+    assert set(first) == {"0000.json", "truth.json"}
+    campaigns.parse(json.loads(first["0000.json"]))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from bench.soak import SOAK
 from rig.unlisted.bench import Companion, base_state, log_amplitude, measure, state
 from rig.unlisted.design import Design, draw_design
 from rig.unlisted.fits import Lines, base_chi2, fit_shapes, value
@@ -18,6 +19,7 @@ from rig.unlisted.listed_lines import lines_chi2
 from rig.unlisted.listed_static import Skin, static_chi2
 from rig.unlisted.observed import Observed, amplitudes
 from rig.unlisted.truth import IDENTIFIABLE, describe, observe
+from tests.support.cases import first
 
 CATALOGUE = {
     "modulus_error", "thickness_error", "compressible_layer", "interface_slip", "adhesion", "layered_contact",
@@ -45,6 +47,7 @@ def _quiet(design: Design, change: np.ndarray[Any, Any] | None = None) -> Observ
     return replace(observed, residual=np.zeros(design.count) if change is None else change)
 
 
+@pytest.mark.slow
 def test_every_mechanism_that_can_act_is_fitted() -> None:
     full = _design(4, "load_cycles", "dwell_s", "sensor")
     assert set(static_chi2(_quiet(full))) == CATALOGUE
@@ -53,7 +56,7 @@ def test_every_mechanism_that_can_act_is_fitted() -> None:
     assert CATALOGUE - set(static_chi2(_quiet(bare))) == {"ageing", "contact_creep", "sensor_spread", "crosstalk"}
 
 
-def test_mechanisms_reproduce_a_skin_with_another_parameter() -> None:
+def test_mechanisms_reproduce_a_skin_with_another_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
     """The base model of a skin with another E, h or position, made without the mechanism's own code."""
     design = _design(4, "sensor", "y_mm", gain=0.002)
     base = log_amplitude(design, base_state(design))
@@ -67,7 +70,9 @@ def test_mechanisms_reproduce_a_skin_with_another_parameter() -> None:
         "misalignment": log_amplitude(design, state(design, None, shift)) - base,
         "sensor_spread": member[design.sensor],
     }
+    every = Skin.forms
     for name, change in changes.items():
+        monkeypatch.setattr(Skin, "forms", lambda skin, name=name: {n: f for n, f in every(skin).items() if n == name})
         seen = _quiet(design, change)
         assert base_chi2(seen) > 10.0, name
         assert static_chi2(seen)[name] < 0.01, name
@@ -130,12 +135,16 @@ def test_crosstalk_adds_the_charge_of_near_sensors_only() -> None:
         np.testing.assert_allclose(change, np.log(factor), atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("companion", "name"),
-    [
-        (Companion("ageing", (0.06,)), "ageing"),
-        (Companion("preload_dependent_d33", (0.3,)), "preload_dependent_d33"),
-    ],
+    first(
+        1,
+        [
+            (Companion("ageing", (0.06,)), "ageing"),
+            (Companion("preload_dependent_d33", (0.3,)), "preload_dependent_d33"),
+        ],
+    ),
 )
 def test_static_mechanisms_of_the_bench_are_recognised(companion: Companion, name: str) -> None:
     design = _design(4, "load_cycles")
@@ -182,6 +191,7 @@ def test_pick_up_of_the_mains_is_recognised() -> None:
     assert found == pytest.approx(expected, abs=4.0 * np.sqrt(2.0 * freedom))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "needs", "names"),
     [
@@ -203,6 +213,7 @@ def test_a_law_that_is_a_listed_mechanism_is_not_identifiable(law: Law, needs: s
     assert not entry["identifiable"]
 
 
+@pytest.mark.soak
 def test_a_gain_along_an_axis_that_no_mechanism_knows_keeps_its_weight() -> None:
     for axis, law in (
         ("recorded_at", Law("gain", "time_of_day", "periodic", (24.0,), (0.1, 0.1))),
@@ -213,12 +224,14 @@ def test_a_gain_along_an_axis_that_no_mechanism_knows_keeps_its_weight() -> None
         assert entry["identifiable"]
 
 
+@pytest.mark.slow
 def test_a_companion_of_the_catalogue_does_not_hide_a_law() -> None:
     law = Law("gain", "temperature_c", "linear", (), (0.2,))
     entry = _entry(_design(4, "temperature_c"), law, Companion("preload_dependent_d33", (0.3,)))
     assert entry["chi2_gain_over_best_listed"] > 0.7 * entry["chi2_gain_over_base"] > 100.0
 
 
+@pytest.mark.slow
 def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others() -> None:
     design, companion = _design(4), Companion("preload_dependent_d33", (1.0,))
     data = measure(np.random.default_rng(2), design, None, companion)
@@ -229,6 +242,7 @@ def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others
     assert alone["crosstalk"] > found["crosstalk"] + 50.0
 
 
+@pytest.mark.soak
 def test_a_gain_along_y_is_spread_or_misalignment() -> None:
     """ln sigma is nearly quadratic in y, so that a shift changes it linearly; many sensors have a gain each."""
     law = Law("gain", "y_mm", "linear", (), (0.15,))
@@ -240,10 +254,11 @@ def test_a_gain_along_y_is_spread_or_misalignment() -> None:
         assert entry["chi2_gain_over_best_listed"] < 0.3 * entry["chi2_gain_over_base"]
 
 
+@pytest.mark.slow
 def test_the_base_model_is_within_reach_of_the_mechanisms() -> None:
     """Where there is no law, the best mechanism gains what a few parameters gain from noise, and never less than 0."""
     gains = []
-    for seed in range(5):
+    for seed in range(5 if SOAK else 2):
         design = _design(seed, gain=0.02)
         data = measure(np.random.default_rng(seed), design, None, None)
         seen = amplitudes(design, data, np.ones_like(data.frf), None, base_state(design))

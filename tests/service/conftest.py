@@ -50,7 +50,10 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
 def servers(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[str], Server]]:
-    """Servers by name, started when first asked for, since that takes longer than most tests; they run no diagnoses."""
+    """Servers by name, started when first asked for, since that takes longer than most tests.
+
+    One called `working` runs diagnoses, one at a time, the others none.
+    """
     started: dict[str, Server] = {}
     with ExitStack() as stack:
 
@@ -58,7 +61,9 @@ def servers(
             if name not in started:
                 folder = tmp_path_factory.mktemp(name)
                 url = request.getfixturevalue("cluster").new_database() if name == "postgresql" else ""
-                started[name] = stack.enter_context(running(Place(folder, url), UNDERSKIN_DIAGNOSIS_WORKERS="0"))
+                works = name == "working"
+                settings = {"UNDERSKIN_DIAGNOSIS_WORKERS": f"{works:d}", "UNDERSKIN_DIAGNOSIS_READY": str(works)}
+                started[name] = stack.enter_context(running(Place(folder, url), **settings))
             return started[name]
 
         yield server
@@ -68,6 +73,12 @@ def servers(
 def server(request: pytest.FixtureRequest, servers: Callable[[str], Server]) -> Server:
     """A running server, its store emptied."""
     return emptied(servers(request.param))
+
+
+@pytest.fixture
+def working(servers: Callable[[str], Server]) -> Server:
+    """A running server on SQLite that makes diagnoses, its store emptied."""
+    return emptied(servers("working"))
 
 
 @pytest.fixture

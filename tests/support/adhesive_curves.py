@@ -9,12 +9,8 @@ import plotly.graph_objects as go
 
 from rig.description import parse
 from rig.elastomer import campaign_of_curves, record_curves
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.reporting.curve_data import shown_curves
-from underskin.diagnosis.reporting.curve_figure import curve_figure
-from underskin.recordings import campaign as campaigns
-from underskin.surrogate.sigma_table import load_table
+from tests.support.lean_reports import beside
+from tests.support.report_pages import figures_in, written
 
 WORK_J_PER_M2, MODULUS_MPA, NOISE_N = 0.6, 0.5, 2e-4
 _DESCRIPTION: dict[str, Any] = {
@@ -48,11 +44,12 @@ def adhesive_curves(work_j_per_m2: float = WORK_J_PER_M2) -> tuple[dict[str, Any
 
 
 @cache
+def adhesive_page() -> tuple[dict[str, Any], str]:
+    """Their report, with Hertz's law before and adhesion after, and its page."""
+    return written([adhesive_curves()[0]], without=beside("adhesion", "instrument_compliance"))
+
+
+@cache
 def adhesive_figure() -> go.Figure:
-    """Of both, with Hertz's law before and adhesion after."""
-    campaign = campaigns.parse(adhesive_curves()[0])
-    problem = FittingProblem(curve_lines(campaign, "indentation"), load_table())
-    before, after = problem.explain([Request(()), Request(("adhesion",))])
-    assert before is not None
-    assert after is not None
-    return curve_figure(shown_curves(problem, campaign, before, after), "indentation", "Hertz's law", "adhesion")
+    """Of both curves."""
+    return figures_in(adhesive_page()[1])["curve"]

@@ -10,10 +10,9 @@ import numpy as np
 import orjson
 
 from service.store import database, diagnoses
-from tests.support.lean_reports import lean_fleet, lean_together
+from tests.support.lean_reports import BESIDE_SKINS, lean_fleet, lean_together
 from tests.support.store_server import Server
-from underskin import __version__
-from underskin.diagnosis.pipeline import diagnosis_report
+from underskin import __version__, diagnose
 from underskin.mechanisms import compose
 from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
 from underskin.recordings.conditions import Sensor, SkinDescription
@@ -84,6 +83,19 @@ def of_mechanisms(
     )
 
 
+@cache
+def small() -> dict[str, Any]:
+    """A campaign of the kind of `resonant` that takes little time to diagnose."""
+    return resonant("small", preloads=(1.0,), lines=6)
+
+
+@cache
+def small_report() -> dict[str, Any]:
+    """The report on `small` that a worker makes where it is `begun`."""
+    made = diagnose(parse(small()), table(), without=BESIDE_SKINS)
+    return dict(orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)))
+
+
 def sent(server: Server, document: dict[str, Any], skin: str = "palm") -> str:
     """The id of a campaign that was sent."""
     answer = server.http.post("/v1/campaigns", json=document, params={"skin": skin})
@@ -94,6 +106,14 @@ def sent(server: Server, document: dict[str, Any], skin: str = "palm") -> str:
 def asked(server: Server, campaign_id: str, **headers: str) -> str:
     """The id of a campaign's diagnosis."""
     answer = server.http.post(f"/v1/campaigns/{campaign_id}/diagnosis", headers=headers)
+    assert answer.status_code == 202, answer.text
+    return str(answer.json()["id"])
+
+
+def begun(server: Server, document: dict[str, Any], skin: str = "palm") -> str:
+    """The id of a diagnosis, of few mechanisms, of a campaign that was sent."""
+    campaign_id = sent(server, document, skin)
+    answer = server.http.post(f"/v1/campaigns/{campaign_id}/diagnosis", json={"without": BESIDE_SKINS})
     assert answer.status_code == 202, answer.text
     return str(answer.json()["id"])
 
@@ -121,14 +141,15 @@ def awaited(server: Server, diagnosis_id: str, *states: str) -> dict[str, Any]:
 @cache
 def report() -> dict[str, Any]:
     """The report on `resonant`, made here: what any worker makes of it."""
-    made = diagnosis_report(parse(resonant("array")), table())
-    return dict(orjson.loads(orjson.dumps(made, option=orjson.OPT_SERIALIZE_NUMPY)))
+    made = diagnose(parse(resonant("array")), table())
+    return dict(orjson.loads(orjson.dumps(made.document, option=orjson.OPT_SERIALIZE_NUMPY)))
 
 
 @cache
 def joint_reports() -> dict[str, dict[str, Any]]:
     """Reports on several campaigns like `resonant`, of a skin and of a fleet, by the kind of their diagnosis."""
-    one, two, three = (parse(resonant(name, seed=seed)) for seed, name in enumerate(("one", "two", "three")))
+    names = ("one", "two", "three")
+    one, two, three = (parse(resonant(name, preloads=(1.0,), lines=6, seed=seed)) for seed, name in enumerate(names))
     fleet = {"a": [one], "b": [two], "c": [three]}
     made = {
         "skin": lean_together([one, two], table(), "several"),

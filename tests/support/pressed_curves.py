@@ -1,14 +1,11 @@
-"""Indentation curves of a soft half space behind a stage that gives, by Hertz' law alone, and their explanations."""
+"""Indentation curves of a soft half space behind a stage that gives, by Hertz' law alone."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import brentq
 
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.recordings.campaign import Campaign, parse
-from underskin.surrogate.sigma_table import SigmaTable
 
 MODULUS, NOISE = 2.0, 5e-4  # MPa, and of the largest force
 
@@ -39,13 +36,3 @@ def pressed(stiffness: float, radii: Sequence[float], depth: float = 0.3) -> Cam
     return parse(
         {"schema": "campaign/1", "name": "pressed", "units_checked": True, "skin": skin, "recordings": recordings}
     )
-
-
-def explained(campaign: Campaign, names: tuple[str, ...], table: SigmaTable) -> tuple[Explanation, Explanation]:
-    """The explanation by these mechanisms, and the null hypothesis."""
-    problem = FittingProblem(curve_lines(campaign, "indentation"), table)
-    (null,) = problem.explain([Request(())])
-    assert null is not None
-    (found,) = problem.explain([Request(names, begin=null.point)])
-    assert found is not None
-    return found, null

@@ -1,22 +1,23 @@
-"""Campaigns with a slip of a lab, recording by recording, and what the screening names in them."""
+"""Campaigns with a slip of a lab, recording by recording, and what a report names in them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
+
+import pytest
 
 from tests.support.diagnosis_campaigns import Made
-from underskin.diagnosis.data.inspected import Inspected
-from underskin.findings.codes import FindingCode, Reason
+from tests.support.lean_reports import beside, whole_report
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
+from underskin.surrogate.sigma_table import SigmaTable
 
 MADE = Made(sensors=3, repeats=2, lines=20)
-SLIPS = {
-    *(FindingCode.CONJUGATED, FindingCode.SENSORS_EXCHANGED, FindingCode.GAIN_STEPS, FindingCode.WARM_UP),
-    *(FindingCode.WEAK, FindingCode.STRONG, FindingCode.SIGN_FLIPPED),
-}
+SLIPS = {"conjugated", "sensors_exchanged", "gain_steps", "warm_up", "weak", "strong", "sign_flipped"}
 Change = Callable[[FrfRecording, int], FrfRecording]
 
 
 def times(entry: FrfRecording, real: float, imaginary: float | None = None) -> FrfRecording:
+    """The recording with its lines times a factor, their imaginary parts times another one."""
     assert entry.frf_re_pc_per_n is not None
     assert entry.frf_im_pc_per_n is not None
     other = real if imaginary is None else imaginary
@@ -24,9 +25,34 @@ def times(entry: FrfRecording, real: float, imaginary: float | None = None) -> F
 
 
 def changed(made: Campaign, change: Change) -> Campaign:
+    """The campaign with each recording changed, by its number too."""
     entries = frf_recordings(made)
     return replace(made, recordings=tuple(change(entry, number) for number, entry in enumerate(entries)))
 
 
-def named(inspected: Inspected) -> list[Reason]:
-    return [entry.reason for entry in inspected.findings if entry.code in SLIPS]
+def looked_at(campaign: Campaign, table: SigmaTable, *known: str) -> dict[str, Any]:
+    """The report of a search among the known mechanisms alone: what is wrong with recordings is found before any."""
+    return whole_report(campaign, table, *beside(*known))
+
+
+def slips(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Code and statement of each slip that a report names."""
+    return [(entry["code"], entry["statement"]) for entry in report["findings"] if entry["code"] in SLIPS]
+
+
+def named(campaign: Campaign, table: SigmaTable, *known: str) -> list[str]:
+    """The codes of the slips that a report on the campaign names."""
+    return [code for code, _ in slips(looked_at(campaign, table, *known))]
+
+
+def put_right(report: Mapping[str, Any], good: Mapping[str, Any]) -> bool:
+    """Whether the report comes to the numbers of another one, as that on the same recordings without a slip."""
+    fit, expected = report["fit"]["before"], good["fit"]["before"]
+    return report["verdict"] == good["verdict"] and all(
+        ours == pytest.approx(theirs, rel=1e-6)
+        for ours, theirs in (
+            (report["d33"]["value"], good["d33"]["value"]),
+            (report["d33"]["high"], good["d33"]["high"]),
+            (fit["rmse_percent"], expected["rmse_percent"]),
+        )
+    )

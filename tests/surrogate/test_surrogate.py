@@ -48,13 +48,14 @@ def test_point_load_knows_no_finite_strain() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(50 if SOAK else 1))
-def test_fresh_solves_on_a_finer_mesh_agree_within_the_reported_error(number: int) -> None:
+def test_finer_solves_agree_within_the_reported_error(number: int) -> None:
     generator = np.random.default_rng([50, number])
     a = generator.uniform(0.02, 0.5) if number % 3 == 0 else generator.uniform(0, 3)
     rho, load = generator.uniform(0, 3), generator.uniform(0, 0.1)
     rho_nodes = np.array([0.0, rho])
-    nodes = Nodes(np.zeros(1), rho_nodes, np.cbrt([0.0, load / 4, load]), np.zeros(1))
-    fresh = linear_layer.sigma(a, rho_nodes) + solve_column(a, nodes, order=5, refinement=2).sigma_change[:, -1]
+    nodes = Nodes(np.zeros(1), rho_nodes, np.cbrt([0.0, load]), np.zeros(1))
+    order, refinement = (5, 2) if SOAK else (6, 1)
+    fresh = linear_layer.sigma(a, rho_nodes) + solve_column(a, nodes, order, refinement).sigma_change[:, -1]
     answer = TABLE.sigma(a, rho_nodes, load)
     assert (np.abs(answer.sigma / fresh - 1) <= answer.rel_error).all()
 

@@ -26,9 +26,9 @@ def nodes(*load_parameters: float) -> Nodes:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("a", [0.02, 0.3, 1.0, 3.0])
-def test_linear_limit_is_the_exact_layer_and_the_base_carries_the_force(a: float) -> None:
-    column = solve_column(a, nodes(1e-3), order=5)
+@pytest.mark.parametrize("a", [0.02, 1.0, 3.0])
+def test_linear_limit_is_the_exact_layer(a: float) -> None:
+    column = solve_column(a, nodes(), order=5)
     assert np.abs(column.linear_error / linear_layer.sigma(a, RHO)).max() < 3e-6
     assert column.force_error < 1e-6
 
@@ -49,12 +49,15 @@ def test_convergence_rate_of_the_stress_on_the_base(order: int) -> None:
 
 @pytest.mark.slow
 def test_finite_strain_reference_values() -> None:
-    """Computed independently: σ(L)/σ(0) at a/h 0.3, ρ 0.6 (Richardson, ± 5e-5)."""
+    """Computed independently: σ(L)/σ(0) at a/h 0.3, ρ 0.6 (Richardson, ± 5e-5); the base carries the force."""
     column = solve_column(0.3, nodes(1e-3, 1e-2, 3e-2, 1e-1), order=5)
+    assert np.abs(column.linear_error / linear_layer.sigma(0.3, RHO)).max() < 3e-6
+    assert column.force_error < 1e-6
     ratio = 1 + column.sigma_change[3] / linear_layer.sigma(0.3, 0.6)
     assert ratio == pytest.approx([1, 1.01293, 1.02966, 1.04522, 1.07489], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_volume_is_kept_and_the_path_of_loading_does_not_matter() -> None:
     layer = NonlinearLayer(discretise(layer_mesh(0.5), 4))
     load = hertz_load(layer.discretisation, 0.5)
@@ -78,6 +81,7 @@ def test_the_surface_sinks_under_the_contact_and_the_base_does_not_move() -> Non
     assert (state.displacement[2 * scalar[on_base] + 1] == 0).all()
 
 
+@pytest.mark.slow
 def test_the_rim_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     here = solve_column(1.0, nodes(0.1), order=4)
     monkeypatch.setattr(tablegen.mesh, "RIM", 16.0)

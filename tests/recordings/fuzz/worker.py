@@ -1,7 +1,8 @@
 """Reads damaged files for the fuzz test, many in one process, under the memory limit of the process for real ones.
 
-Standard input: for each file its length (8 bytes) and its bytes. Standard output: a line each: `read`, `refused`,
-`no memory`, or what the reader raised that it should not have. A file that takes more than SECONDS ends the process.
+Standard input: for each file its format (16 bytes), its length (8 bytes) and its bytes. Standard output: a line each:
+`read`, `refused`, `no memory`, or what the reader raised that it should not have. A file that takes more than SECONDS
+ends the process.
 """
 
 import contextlib
@@ -25,20 +26,22 @@ SECONDS = 10
 _MEMORY_BYTES = 1 << 30
 _FILE = "fuzz.dat"
 _RIG = rig()
+_HEAD = struct.Struct("<16sQ")
 
 
 def main() -> None:
-    kind = sys.argv[1]
-    importlib.import_module(f"underskin.recordings.readers.{formats.MODULES[kind]}")
+    for module in formats.MODULES.values():
+        importlib.import_module(f"underskin.recordings.readers.{module}")
     own = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (own + _MEMORY_BYTES, own + _MEMORY_BYTES))
-    while length := sys.stdin.buffer.read(8):
-        data = sys.stdin.buffer.read(struct.unpack("<Q", length)[0])
+    while head := sys.stdin.buffer.read(_HEAD.size):
+        kind, length = _HEAD.unpack(head)
+        data = sys.stdin.buffer.read(length)
         with os.fdopen(os.memfd_create("fuzz"), "w+b") as stream:
             stream.write(data)
             stream.flush()
             signal.alarm(SECONDS)
-            said = _read(kind, stream)
+            said = _read(kind.rstrip(b"\0").decode(), stream)
             signal.alarm(0)
         print(said.replace("\n", " "), flush=True)
 

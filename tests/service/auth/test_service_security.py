@@ -19,6 +19,7 @@ from tests.service.connections import BODIES
 from tests.service.requests import SIGMA, all_routes, problem_of
 from tests.support import preloaded
 from tests.support.server import Server, running
+from tests.support.store_server import campaign
 from underskin import InvalidInput
 
 OPEN = {"/health", "/ready"}
@@ -58,6 +59,7 @@ def status_within_a_second(url: str, headers: Mapping[str, str], expected: int) 
     while status != expected and asked < deadline:
         asked = time.monotonic()
         status = httpx.get(url + ONE_SIGMA, headers=headers).status_code
+        time.sleep(0.02)
     return status
 
 
@@ -170,6 +172,23 @@ def test_every_route_but_health_needs_a_key(keyed: Keyed, locked: httpx.Client) 
             assert answer.headers["www-authenticate"] == "Bearer"
 
 
+def test_a_change_needs_a_key_of_scope_write(keyed: Keyed, locked: httpx.Client) -> None:
+    """By every route that changes what is kept, and who has sent a campaign is told."""
+    computed = {*BODIES, "/v1/stress", "/v1/design"}
+    changes = [
+        (method, path)
+        for method, path in all_routes(locked, bearer(keyed.tokens["lab"]))
+        if method != "GET" and path not in computed and not path.startswith("/umbridge/")
+    ]
+    assert len(changes) > 15
+    for method, path in changes:
+        problem_of(locked.request(method, path, json={}, headers=bearer(keyed.tokens["lab"])), 403)
+        assert locked.request(method, path, json={}, headers=bearer(keyed.tokens["robot"])).status_code in (404, 422)
+    sent = locked.post("/v1/campaigns", json=campaign("sent"), headers=bearer(keyed.tokens["robot"])).raise_for_status()
+    kept = locked.get(f"/v1/campaigns/{sent.json()['id']}", headers=bearer(keyed.tokens["lab"]))
+    assert kept.json()["received_from"] == "robot"
+
+
 @pytest.mark.parametrize("name", ["lab", "robot"])
 def test_a_key_of_either_scope_may_compute(keyed: Keyed, locked: httpx.Client, name: str) -> None:
     headers = bearer(keyed.tokens[name])
@@ -272,12 +291,16 @@ def test_a_damaged_file_of_keys_opens_nothing(tmp_path: Path) -> None:
     assert "Traceback" not in started.log.read_text()
 
 
-@pytest.mark.parametrize("text", ["{}", "[]", '{"keys": [{"name": "a", "scope": "read", "created": "", "sha256": 5}]}'])
-def test_a_file_of_keys_of_another_shape_opens_nothing(tmp_path: Path, text: str) -> None:
+def test_a_file_of_keys_of_another_shape_opens_nothing(tmp_path: Path) -> None:
     token = keys_in(tmp_path).create("lab", "read")
+    kept = tmp_path / "data" / "keys.json"
+    good = kept.read_text()
     with running(tmp_path) as started:
-        (tmp_path / "data" / "keys.json").write_text(text)
-        assert status_within_a_second(started.url, bearer(token), 503) == 503
+        for text in ("{}", "[]", '{"keys": [{"name": "a", "scope": "read", "created": "", "sha256": 5}]}'):
+            kept.write_text(good)
+            assert status_within_a_second(started.url, bearer(token), 200) == 200
+            kept.write_text(text)
+            assert status_within_a_second(started.url, bearer(token), 503) == 503, text
 
 
 # Reached from other machines

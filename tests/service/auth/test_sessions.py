@@ -11,28 +11,37 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.auth.keys import Key
+from service.auth.keys import Key, KeyStore
 from service.auth.session import COOKIE, logged_in
 from service.auth.sessions import Sessions
 from service.pages.start.sessions import browser_name
-from service.store import open_store
+from service.store import database, open_store
 from service.store import sessions as noted
 from service.store.engine import SQLITE_FILE
+from service.store.tables import sessions as session_rows
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Place, Server, running
 
-BACKEND = "sqlite"
 LOGIN_FIRST = 303  # a page sends who is not logged in to the login
 
 Browser = Callable[..., httpx.Client]
 
 
-@pytest.fixture
-def keyed(place: Place) -> Iterator[tuple[Server, dict[str, str]]]:
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Server, dict[str, str]]]:
     """A server with two keys."""
-    keys = {name: place.command("key", "create", name).stdout.strip() for name in ("mara", "otto")}
+    place = Place(tmp_path_factory.mktemp("sessions") / "data")
+    keys = {name: KeyStore(place.folder).create(name, "write") for name in ("mara", "otto")}
     with running(place, key=keys["mara"], UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         yield server, keys
+
+
+@pytest.fixture
+def keyed(started: tuple[Server, dict[str, str]]) -> tuple[Server, dict[str, str]]:
+    """The same, without a session."""
+    with closing(database("", started[0].place.folder)) as store, store.writing() as connection:
+        connection.execute(session_rows.delete())
+    return started
 
 
 @pytest.fixture
@@ -187,23 +196,6 @@ def test_a_made_up_cookie_logs_nobody_in(keyed: tuple[Server, dict[str, str]]) -
             assert httpx.get(f"{address}{path}", headers=cookie).status_code == status, made_up[:20]
 
 
-def test_the_log_tells_nothing_of_a_key_where_the_store_fails(
-    keyed: tuple[Server, dict[str, str]], log_in: Browser
-) -> None:
-    """Whoever has a key's digest can sign cookies."""
-    server, keys = keyed
-    browser = log_in("mara", "at home")
-    token = token_of(browser.get("/sessions").text)
-    with closing(sqlite3.connect(server.place.folder / SQLITE_FILE)) as store, store:
-        store.execute("DROP TABLE sessions")
-    assert browser.get("/sessions").status_code == 503
-    assert browser.post("/logout", data={"form_token": token}).status_code == 303
-    time.sleep(0.5)  # the log is written a moment later
-    log = (server.place.folder.parent / f"{server.place.folder.name}.log").read_text()
-    assert "no such table" in log
-    assert sha256(keys["mara"].encode()).hexdigest() not in log
-
-
 def test_the_cookie_is_kept_nowhere(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
     server, _ = keyed
     cookie = log_in("mara", "at home").cookies[COOKIE]
@@ -232,3 +224,20 @@ def test_a_logout_during_a_look_is_kept(tmp_path: Path, monkeypatch: pytest.Monk
     logged_out.set()
     look.join(10)
     assert sessions.has_ended(cookie)
+
+
+def test_the_log_tells_nothing_of_a_key_where_the_store_fails(
+    keyed: tuple[Server, dict[str, str]], log_in: Browser
+) -> None:
+    """Whoever has a key's digest can sign cookies. The last test here, since the store is spoilt then."""
+    server, keys = keyed
+    browser = log_in("mara", "at home")
+    token = token_of(browser.get("/sessions").text)
+    with closing(sqlite3.connect(server.place.folder / SQLITE_FILE)) as store, store:
+        store.execute("DROP TABLE sessions")
+    assert browser.get("/sessions").status_code == 503
+    assert browser.post("/logout", data={"form_token": token}).status_code == 303
+    time.sleep(0.5)  # the log is written a moment later
+    log = (server.place.folder.parent / f"{server.place.folder.name}.log").read_text()
+    assert "no such table" in log
+    assert sha256(keys["mara"].encode()).hexdigest() not in log

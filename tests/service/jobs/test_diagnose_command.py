@@ -6,23 +6,21 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tests.support.diagnosed import report, resonant, sent
-from tests.support.store_server import Place, running
+from tests.support.diagnosed import sent, small, small_report
+from tests.support.lean_reports import BESIDE_SKINS
+from tests.support.store_server import Server
 from underskin.cli.app import app
 
 
-def test_reports_of_kept_campaigns_are_those_of_the_service(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
+def test_reports_of_kept_campaigns_are_those_of_the_service(working: Server, tmp_path: Path) -> None:
     reports = tmp_path / "reports"
-    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="1") as server:
-        kept = sent(server, resonant("array"))
-        given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(server.http.base_url)]
-        result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
+    kept, few = sent(working, small()), [word for name in BESIDE_SKINS for word in ("--without", name)]
+    given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(working.http.base_url), *few]
+    result = CliRunner().invoke(app, ["diagnose", *given, "--output-dir", str(reports), "--html"])
     assert result.exit_code == 2
     assert f"{kept}: explained" in result.stderr
     assert "nowhere: 404" in result.stderr
-    assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == report()
+    assert json.loads((reports / f"{kept}.json").read_text(encoding="utf-8")) == small_report()
     assert "contact resonance" in (reports / f"{kept}.html").read_text(encoding="utf-8")
     assert len(list(reports.iterdir())) == 2
 

@@ -2,22 +2,18 @@
 
 import threading
 from collections.abc import Iterator
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import pytest
 
-from bench.soak import SOAK
-from tests.service.backends import on
 from tests.service.requests import problem_of
-from tests.support.diagnosed import awaited, found, resonant, sent
+from tests.support.diagnosed import found, resonant, sent
 from tests.support.lean_reports import BESIDE_SKINS
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 from underskin import Client, ServiceError
 
 BACKEND = "postgresql"
-ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
-SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 
 
 @pytest.fixture
@@ -36,11 +32,11 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
     return problem_of(server.http.post(path, json=body), status)
 
 
-@on("sqlite")
-def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
-    with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant("array", seed=seed)) for seed in range(2)]
-        started = client.skins.diagnose("palm", name="palm since May")
+def test_campaigns_of_a_skin_are_diagnosed_together(working: Server) -> None:
+    with Client(str(working.http.base_url)) as client:
+        ids = [sent(working, resonant("array", preloads=(1.0,), lines=6, seed=seed)) for seed in range(2)]
+        asked = partial(client.skins.diagnose, "palm", name="palm since May", without=BESIDE_SKINS)
+        started = asked()
         done = client.diagnoses.wait(started["id"])
         assert (done["state"], done["kind"], done["name"]) == ("done", "skin", "palm since May")
         assert (done["campaign_ids"], done["campaign_id"], done["outdated"]) == (ids, ids[-1], None)
@@ -48,51 +44,28 @@ def test_campaigns_of_a_skin_are_diagnosed_together(place: Place) -> None:
         names = [f"array ({campaign_id})" for campaign_id in ids]
         assert (done["report"]["campaign"], done["report"]["campaigns"]) == ("palm since May", names)
         assert (done["verdict"], done["probability"]) == ("explained", done["report"]["probability"])
-        assert client.skins.diagnose("palm", name="palm since May") == {"id": started["id"], "state": "done"}
+        assert asked() == {"id": started["id"], "state": "done"}
         with pytest.raises(ServiceError, match="is of several campaigns"):
             client.skins.adopt("palm", started["id"])
         client.campaigns.exclude(ids[0], "r3", "cable loose")
-        again = client.diagnoses.wait(client.skins.diagnose("palm", name="palm since May")["id"])
+        again = client.diagnoses.wait(asked()["id"])
         assert (again["id"] != started["id"], again["excluded"]) == (True, 1)
         assert again["report"]["findings"][0]["statement"] == f"array ({ids[0]}): Left out: cable loose"
 
 
-@on("postgresql")
-def test_skins_of_a_fleet_are_diagnosed_together(place: Place) -> None:
-    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant("array", seed=number), f"palm-{number}") for number in range(3)]
-        skins, without = ["palm-2", "palm-0", "palm-1"], () if SOAK else BESIDE_SKINS
-        done = client.diagnoses.wait(client.fleets.diagnose(skins, "batch 7", without=without)["id"])
+def test_skins_of_a_fleet_are_diagnosed_together(working: Server) -> None:
+    with Client(str(working.http.base_url)) as client:
+        ids = [
+            sent(working, resonant("array", preloads=(1.0,), lines=6, seed=number), f"palm-{number}")
+            for number in range(3)
+        ]
+        skins = ["palm-2", "palm-0", "palm-1"]
+        done = client.diagnoses.wait(client.fleets.diagnose(skins, "batch 7", without=BESIDE_SKINS)["id"])
         assert (done["state"], done["kind"], done["campaign_ids"]) == ("done", "fleet", ids)
         assert (done["report"]["campaign"], len(done["report"]["campaigns"])) == ("batch 7", 3)
         assert isinstance(done["report"]["population"], list)
-        again = client.fleets.diagnose(sorted(skins), "batch 7", without=without)
+        again = client.fleets.diagnose(sorted(skins), "batch 7", without=BESIDE_SKINS)
         assert again == {"id": done["id"], "state": "done"}
-
-
-@on("postgresql")
-def test_a_killed_server_takes_up_a_diagnosis_of_several(place: Place) -> None:
-    with running(place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        ids = [sent(server, resonant(name, seed=seed)) for seed, name in enumerate(("array", "again"))]
-        diagnosis_id = client.skins.diagnose("palm")["id"]
-        awaited(server, diagnosis_id, "running")
-        server.kill()
-    with running(place, **ONE) as server:
-        done = awaited(server, diagnosis_id)
-        assert (done["state"], done["campaign_ids"], done["report"]["campaign"]) == ("done", ids, "palm")
-
-
-def test_one_of_several_that_needs_too_much_memory_fails(tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    with running(Place(folder), **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
-        preloads = [0.5 + 0.01 * step for step in range(100)]
-        for seed, name in enumerate(("one", "two")):
-            sent(server, resonant(name, preloads=preloads, lines=800, seed=seed))
-        answer = server.http.post("/v1/skins/palm/diagnosis")
-        failed = awaited(server, answer.json()["id"])
-        assert (failed["state"], failed["report"]) == ("failed", None)
-        assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
 
 
 def test_blocks_alone_are_refused_at_once_and_beside_one_campaign_of_frfs_are_not(server: Server) -> None:
@@ -222,64 +195,56 @@ def test_a_skin_with_too_few_campaigns_is_refused(server: Server, client: Client
     assert "all of its recordings are excluded" in emptied["detail"]
 
 
-@pytest.mark.parametrize(
-    ("body", "field", "index", "code"),
-    [
-        ({"campaigns": []}, "campaigns", None, "too_few"),
-        ({"campaigns": ["FIRST"]}, "campaigns", None, "too_few"),
-        ({"campaigns": ["FIRST", "FIRST"]}, "campaigns", 1, "not_unique"),
-        ({"campaigns": ["FIRST", "FOREIGN"]}, "campaigns", 1, "not_one_of"),
-        ({"campaigns": ["FIRST", "c-1"]}, "campaigns", 1, "not_one_of"),
-        ({"campaigns": ["FIRST", 7]}, "campaigns", 1, None),
-        ({"campaigns": "FIRST"}, "campaigns", None, None),
-        ({"name": ""}, "name", None, None),
-        ({"name": " \n"}, "name", None, "wrong_type"),
-        ({"name": 7}, "name", None, None),
-        ({"name": "x" * 201}, "name", None, None),
-        ({"without": ["nothing"]}, "without", None, "not_one_of"),
-        ({"skins": ["palm"]}, "skins", None, "unknown_field"),
-    ],
-)
-def test_a_wrong_request_of_a_skin_names_the_field(
-    server: Server, body: dict[str, Any], field: str, index: int | None, code: str | None
-) -> None:
+Wrong = list[tuple[dict[str, Any], str, int | None, str | None]]
+WRONG_OF_A_SKIN: Wrong = [
+    ({"campaigns": []}, "campaigns", None, "too_few"),
+    ({"campaigns": ["FIRST"]}, "campaigns", None, "too_few"),
+    ({"campaigns": ["FIRST", "FIRST"]}, "campaigns", 1, "not_unique"),
+    ({"campaigns": ["FIRST", "FOREIGN"]}, "campaigns", 1, "not_one_of"),
+    ({"campaigns": ["FIRST", "c-1"]}, "campaigns", 1, "not_one_of"),
+    ({"campaigns": ["FIRST", 7]}, "campaigns", 1, None),
+    ({"campaigns": "FIRST"}, "campaigns", None, None),
+    ({"name": ""}, "name", None, None),
+    ({"name": " \n"}, "name", None, "wrong_type"),
+    ({"name": 7}, "name", None, None),
+    ({"name": "x" * 201}, "name", None, None),
+    ({"without": ["nothing"]}, "without", None, "not_one_of"),
+    ({"skins": ["palm"]}, "skins", None, "unknown_field"),
+]
+WRONG_OF_A_FLEET: Wrong = [
+    ({"name": "fleet"}, "skins", None, "required"),
+    ({"skins": ["a", "b", "c"]}, "name", None, "required"),
+    ({"skins": [], "name": "fleet"}, "skins", None, "too_few"),
+    ({"skins": ["a", "b"], "name": "fleet"}, "skins", None, "too_few"),
+    ({"skins": ["a", "b", "a"], "name": "fleet"}, "skins", 2, "not_unique"),
+    ({"skins": ["a", "b", "joined"], "name": "fleet"}, "skins", 2, "not_unique"),
+    ({"skins": ["a", "nowhere", "c"], "name": "fleet"}, "skins", 1, "not_one_of"),
+    ({"skins": ["a", "b", 3], "name": "fleet"}, "skins", 2, None),
+    ({"skins": {"a": 1}, "name": "fleet"}, "skins", None, None),
+    ({"skins": ["a", "b", "c"], "name": "\t"}, "name", None, "wrong_type"),
+    ({"skins": ["a", "b", "c"], "name": "fleet", "without": ["x"]}, "without", None, "not_one_of"),
+    ({"skins": ["a", "b", "c"], "name": "fleet", "campaigns": []}, "campaigns", None, "unknown_field"),
+]
+
+
+def test_a_wrong_request_names_the_field(server: Server, client: Client) -> None:
     first, _ = sent_to(server, "palm", 2)
     (foreign,) = sent_to(server, "finger", 1)
     named = {"FIRST": first, "FOREIGN": foreign}
-    if isinstance(body.get("campaigns"), list):
-        body = {"campaigns": [named.get(one, one) for one in body["campaigns"]]}
-    (error,) = refused(server, "/v1/skins/palm/diagnosis", body, 422)["errors"]
-    assert (error["field"], error["index"]) == (field, index)
-    assert code in (None, error["code"])
-    assert code != "too_few" or error["allowed"] == "must have at least 2 entries"
-
-
-@pytest.mark.parametrize(
-    ("body", "field", "index", "code"),
-    [
-        ({"name": "fleet"}, "skins", None, "required"),
-        ({"skins": ["a", "b", "c"]}, "name", None, "required"),
-        ({"skins": [], "name": "fleet"}, "skins", None, "too_few"),
-        ({"skins": ["a", "b"], "name": "fleet"}, "skins", None, "too_few"),
-        ({"skins": ["a", "b", "a"], "name": "fleet"}, "skins", 2, "not_unique"),
-        ({"skins": ["a", "b", "joined"], "name": "fleet"}, "skins", 2, "not_unique"),
-        ({"skins": ["a", "nowhere", "c"], "name": "fleet"}, "skins", 1, "not_one_of"),
-        ({"skins": ["a", "b", 3], "name": "fleet"}, "skins", 2, None),
-        ({"skins": {"a": 1}, "name": "fleet"}, "skins", None, None),
-        ({"skins": ["a", "b", "c"], "name": "\t"}, "name", None, "wrong_type"),
-        ({"skins": ["a", "b", "c"], "name": "fleet", "without": ["x"]}, "without", None, "not_one_of"),
-        ({"skins": ["a", "b", "c"], "name": "fleet", "campaigns": []}, "campaigns", None, "unknown_field"),
-    ],
-)
-def test_a_wrong_request_of_a_fleet_names_the_field(
-    server: Server, client: Client, body: dict[str, Any], field: str, index: int | None, code: str | None
-) -> None:
+    for body, field, index, code in WRONG_OF_A_SKIN:
+        if isinstance(body.get("campaigns"), list):
+            body = {"campaigns": [named.get(one, one) for one in body["campaigns"]]}
+        (error,) = refused(server, "/v1/skins/palm/diagnosis", body, 422)["errors"]
+        assert (error["field"], error["index"]) == (field, index), body
+        assert code in (None, error["code"]), body
+        assert code != "too_few" or error["allowed"] == "must have at least 2 entries"
     for skin in ("a", "b", "c", "joined"):
         sent_to(server, skin, 1)
     client.skins.join("a", "joined", "one skin, two labels")
-    (error,) = refused(server, "/v1/fleets/diagnosis", body, 422)["errors"]
-    assert (error["field"], error["index"]) == (field, index)
-    assert code in (None, error["code"])
+    for body, field, index, code in WRONG_OF_A_FLEET:
+        (error,) = refused(server, "/v1/fleets/diagnosis", body, 422)["errors"]
+        assert (error["field"], error["index"]) == (field, index), body
+        assert code in (None, error["code"]), body
 
 
 def test_a_skin_of_a_fleet_without_a_campaign_in_use_is_named(server: Server, client: Client) -> None:

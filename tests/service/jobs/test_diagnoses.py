@@ -5,14 +5,17 @@ import signal
 import threading
 import time
 from contextlib import closing, suppress
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from service.store import database, diagnoses
 from service.store.tables import diagnoses as table_of_diagnoses
 from tests.service.backends import on
-from tests.support.diagnosed import asked, awaited, found, report, resonant, sent, table
+from tests.support.diagnosed import asked, awaited, begun, found, report, resonant, sent, small, small_report, table
+from tests.support.lean_reports import BESIDE_SKINS
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError, __version__
 
@@ -21,12 +24,10 @@ ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
 SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
 
 
-@pytest.fixture
-def file_place(tmp_path: Path) -> Place:
-    """An empty SQLite store, for what workers do whatever the store is."""
-    folder = tmp_path / "data"
-    folder.mkdir()
-    return Place(folder)
+@cache
+def long() -> dict[str, Any]:
+    """A campaign whose diagnosis ends by no means before something ends it."""
+    return resonant("long", preloads=[0.5 + 0.1 * step for step in range(20)], lines=60)
 
 
 def workers_of(server: Server, name: str = "underskin-works") -> list[int]:
@@ -69,21 +70,21 @@ def is_gone(pid: int) -> bool:
     return False
 
 
-def test_a_campaign_is_diagnosed_once(file_place: Place) -> None:
-    with running(file_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        campaign_id = sent(server, resonant("array"))
-        started = client.diagnoses.start(campaign_id)
+def test_a_campaign_is_diagnosed_once(working: Server) -> None:
+    with Client(str(working.http.base_url)) as client:
+        campaign_id = sent(working, small())
+        started = client.diagnoses.start(campaign_id, without=BESIDE_SKINS)
         shares: list[float] = []
         done = client.diagnoses.wait(started["id"], progress=shares.append)
         assert (done["state"], done["verdict"], done["progress"]) == ("done", "explained", 1.0)
         assert shares == sorted(shares)
-        assert done["report"] == report()
-        assert client.diagnoses.start(campaign_id) == {"id": started["id"], "state": "done"}
+        assert done["report"] == small_report()
+        assert client.diagnoses.start(campaign_id, without=BESIDE_SKINS) == {"id": started["id"], "state": "done"}
         with pytest.raises(ServiceError, match="cannot be cancelled"):
             client.diagnoses.cancel(started["id"])
         client.campaigns.exclude(campaign_id, "r3", "cable loose")
         assert client.diagnoses.get(started["id"])["outdated"].startswith("changed")
-        second = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
+        second = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=BESIDE_SKINS)["id"])
         assert (second["excluded"], second["outdated"]) == (1, None)
         assert second["report"]["findings"][0] == {
             "code": "excluded",
@@ -98,125 +99,121 @@ def test_a_campaign_is_diagnosed_once(file_place: Place) -> None:
 
 
 @on("sqlite")
-def test_a_killed_server_takes_up_what_it_was_at(place: Place) -> None:
-    with running(place, **ONE) as server:
-        first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
+def test_a_killed_server_leaves_no_process_and_takes_up_what_it_was_at(place: Place) -> None:
+    """Diagnoses of a campaign and of several."""
+    with running(place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
+        first, second = (begun(server, small(), name) for name in ("a", "b"))
+        client.campaigns.post(resonant("another", preloads=(1.0,), lines=6, seed=3), skin="b")
+        both = client.skins.diagnose("b", without=BESIDE_SKINS)["id"]
         awaited(server, first, "running")
-        (worker,) = await_workers(server, 1)
+        (ready,), (worker,) = await_workers(server, 1, "underskin-ready"), await_workers(server, 1)
         server.kill()
         assert is_gone(worker)
+        assert is_gone(ready)
     with running(place, **SEVERAL) as server:
         for diagnosis_id in (first, second):
             diagnosis = awaited(server, diagnosis_id)
-            assert (diagnosis["state"], diagnosis["report"]) == ("done", report())
+            assert (diagnosis["state"], diagnosis["report"]) == ("done", small_report())
+        together = awaited(server, both)
+        assert (together["state"], len(together["campaign_ids"])) == ("done", 2)
+        assert together["report"]["campaign"] == "b"
 
 
 @on("postgresql")
 def test_a_server_that_ends_puts_back_what_it_was_at(place: Place) -> None:
     with running(place, **ONE) as server:
-        diagnosis_id = asked(server, sent(server, resonant("array")))
+        diagnosis_id = asked(server, sent(server, long()))
         (worker,) = await_workers(server, 1)
         server.process.send_signal(signal.SIGTERM)
-        server.process.wait(30)
+        server.process.wait(120)
         assert is_gone(worker)
     with running(place, **NONE) as server:
         assert found(server, diagnosis_id)["state"] == "queued"
 
 
-def test_cancelled_while_it_runs_and_while_it_waits(file_place: Place) -> None:
-    with running(file_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        first, second = (asked(server, sent(server, resonant("array"), name)) for name in ("a", "b"))
-        (worker,) = await_workers(server, 1)
+def test_cancelled_while_it_runs_and_while_it_waits(working: Server) -> None:
+    with Client(str(working.http.base_url)) as client:
+        first, second = (asked(working, sent(working, long(), name)) for name in ("a", "b"))
+        (worker,) = await_workers(working, 1)
         assert client.diagnoses.cancel(second)["state"] == "cancelled"
         assert client.diagnoses.cancel(first)["state"] == "cancelled"
         assert client.diagnoses.cancel(first)["state"] == "cancelled"
         assert is_gone(worker)
-        assert workers_of(server) == []
-        again = client.diagnoses.start(found(server, first)["campaign_id"])
+        assert workers_of(working) == []
+        again = client.diagnoses.start(found(working, first)["campaign_id"])
         assert again["id"] != first
-        assert client.diagnoses.wait(again["id"])["report"] == report()
-        assert found(server, first)["state"] == found(server, second)["state"] == "cancelled"
+        assert client.diagnoses.cancel(again["id"])["state"] == "cancelled"
+        assert awaited(working, begun(working, small()))["report"] == small_report()
+        assert found(working, first)["state"] == found(working, second)["state"] == "cancelled"
 
 
-def test_a_fork_server_is_kept_ready_for_the_next_job(file_place: Place) -> None:
-    with running(file_place, **SEVERAL) as server:
-        (ready,) = await_workers(server, 1, "underskin-ready")
-        diagnosis_id = asked(server, sent(server, resonant("array")))
-        (worker,) = await_workers(server, 1)
-        assert _parent(str(worker))[0] == ready
-        assert awaited(server, diagnosis_id)["state"] == "done"
-        assert is_gone(worker)
-        assert await_workers(server, 1, "underskin-ready") == [ready]
-        os.kill(ready, signal.SIGKILL)
-        assert is_gone(ready)
-        again = asked(server, sent(server, campaign("again", sensors=1)))
-        assert awaited(server, again)["state"] == "done"
-        (last,) = await_workers(server, 1, "underskin-ready")
-    assert is_gone(last)
+def test_a_fork_server_is_kept_ready_and_replaced_when_it_is_killed(working: Server) -> None:
+    """A worker that it has forked goes on without it."""
+    (ready,) = await_workers(working, 1, "underskin-ready")
+    diagnosis_id = begun(working, small())
+    (worker,) = await_workers(working, 1)
+    assert _parent(str(worker))[0] == ready
+    assert awaited(working, diagnosis_id)["state"] == "done"
+    assert is_gone(worker)
+    assert await_workers(working, 1, "underskin-ready") == [ready]
+    diagnosis_id = begun(working, small(), "finger")
+    await_workers(working, 1)
+    os.kill(ready, signal.SIGKILL)
+    assert is_gone(ready)
+    done = awaited(working, diagnosis_id)
+    assert (done["state"], done["report"]) == ("done", small_report())
+    again = asked(working, sent(working, campaign("again", sensors=1)))
+    assert awaited(working, again)["state"] == "done"
+    assert await_workers(working, 1, "underskin-ready") != [ready]
 
 
-def test_a_worker_whose_fork_server_is_killed_goes_on(file_place: Place) -> None:
-    with running(file_place, **ONE) as server:
-        diagnosis_id = asked(server, sent(server, resonant("array")))
-        (worker,) = await_workers(server, 1)
-        os.kill(_parent(str(worker))[0], signal.SIGKILL)
-        done = awaited(server, diagnosis_id)
-        assert (done["state"], done["report"]) == ("done", report())
+def test_a_worker_that_dies_is_told(working: Server) -> None:
+    campaign_id = sent(working, long())
+    diagnosis_id = asked(working, campaign_id)
+    (worker,) = await_workers(working, 1)
+    os.kill(worker, signal.SIGKILL)
+    died = awaited(working, diagnosis_id)
+    assert (died["state"], died["report"]) == ("failed", None)
+    assert "killed by signal 9" in died["reason"]
+    assert working.http.get("/ready").status_code == 200
+    again = asked(working, campaign_id)
+    assert again != diagnosis_id
+    assert awaited(working, again, "running")["state"] == "running"
+    assert working.http.delete(f"/v1/diagnoses/{again}").json()["state"] == "cancelled"
 
 
-def test_a_killed_server_leaves_no_process(file_place: Place) -> None:
-    with running(file_place, **SEVERAL) as server:
-        (ready,) = await_workers(server, 1, "underskin-ready")
-        asked(server, sent(server, resonant("array")))
-        (worker,) = await_workers(server, 1)
-        server.kill()
-        assert is_gone(worker)
-        assert is_gone(ready)
+def test_diagnoses_that_need_more_memory_than_they_may_have_fail(tmp_path: Path) -> None:
+    """Of a campaign, and of several."""
+    (tmp_path / "data").mkdir()
+    with running(Place(tmp_path / "data"), **SEVERAL, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
+        large = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
+        alone = begun(server, large)
+        sent(server, small())
+        together = server.http.post("/v1/skins/palm/diagnosis").json()["id"]
+        for diagnosis_id in (alone, together):
+            failed = awaited(server, diagnosis_id)
+            assert (failed["state"], failed["report"]) == ("failed", None)
+            assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
 
 
-def test_a_worker_that_dies_is_told(file_place: Place) -> None:
-    with running(file_place, **SEVERAL) as server:
-        campaign_id = sent(server, resonant("array"))
-        diagnosis_id = asked(server, campaign_id)
-        (worker,) = await_workers(server, 1)
-        os.kill(worker, signal.SIGKILL)
-        died = awaited(server, diagnosis_id)
-        assert (died["state"], died["report"]) == ("failed", None)
-        assert "killed by signal 9" in died["reason"]
-        assert server.http.get("/ready").status_code == 200
-        again = asked(server, campaign_id)
-        assert again != diagnosis_id
-        assert awaited(server, again)["state"] == "done"
-
-
-def test_a_diagnosis_that_needs_more_memory_than_it_may_have_fails(file_place: Place) -> None:
-    document = resonant("large", preloads=[0.5 + 0.01 * step for step in range(100)], lines=800)
-    with running(file_place, **ONE, UNDERSKIN_DIAGNOSIS_MEMORY_MB="100") as server:
-        failed = awaited(server, asked(server, sent(server, document)))
-        assert failed["state"] == "failed"
-        assert "UNDERSKIN_DIAGNOSIS_MEMORY_MB" in failed["reason"]
-
-
-def test_a_campaign_that_cannot_be_diagnosed_says_why(file_place: Place) -> None:
+def test_a_campaign_that_cannot_be_diagnosed_says_why(working: Server) -> None:
     document = campaign("cylinder")
     document["skin"] = {"poisson_ratio": 0.5}
     curve = {"displacement_mm": [0.0, 0.0, 0.0], "force_n": [0.0, 0.0, 0.0]}
     document["recordings"] = [
         {"id": "c1", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 20.0, **curve}
     ]
-    with running(file_place, **ONE) as server:
-        diagnosis = awaited(server, asked(server, sent(server, document)))
-        assert (diagnosis["verdict"] == "insufficient_data") or diagnosis["reason"], diagnosis
+    diagnosis = awaited(working, asked(working, sent(working, document)))
+    assert (diagnosis["verdict"] == "insufficient_data") or diagnosis["reason"], diagnosis
 
 
-def test_servers_that_claim_at_once_get_different_ones(place: Place) -> None:
-    with running(place, **NONE) as server:
-        ids = [asked(server, sent(server, campaign(str(number), sensors=1))) for number in range(20)]
+def test_servers_that_claim_at_once_get_different_ones(server: Server) -> None:
+    ids = [asked(server, sent(server, campaign(str(number), sensors=1))) for number in range(12)]
     claimed: list[str] = []
     together = threading.Barrier(4)
 
     def claim(name: str) -> None:
-        with closing(database(place.database_url, place.folder)) as own:
+        with closing(database(server.place.database_url, server.place.folder)) as own:
             together.wait()
             mine: list[str] = []
             while len(mine) < len(ids) // 4:
@@ -233,10 +230,9 @@ def test_servers_that_claim_at_once_get_different_ones(place: Place) -> None:
     assert sorted(claimed) == sorted(ids)
 
 
-def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) -> None:
-    with running(place, **NONE) as server:
-        asked(server, sent(server, campaign("array")))
-    store = database(place.database_url, place.folder)
+def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(server: Server) -> None:
+    asked(server, sent(server, campaign("array")))
+    store = database(server.place.database_url, server.place.folder)
     with closing(store), store.writing() as connection:
         row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
         assert row is not None
@@ -256,28 +252,19 @@ def test_a_silent_server_loses_what_it_was_at_and_cannot_end_it(place: Place) ->
         assert diagnoses.find(connection, row.id).state == "done"
 
 
-def test_a_server_whose_clock_is_wrong_takes_nothing_over(place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
-    with running(place, **NONE) as server:
-        asked(server, sent(server, campaign("array")))
-    true = time.time()
-    store = database(place.database_url, place.folder)
+def test_no_clock_that_is_wrong_takes_a_diagnosis_over(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that runs an hour ahead takes nothing; where the clock was set back, a killed server is told in time."""
+    asked(server, sent(server, campaign("array")))
+    true, alive_at = time.time(), table_of_diagnoses.c.alive_at
+    store = database(server.place.database_url, server.place.folder)
     with closing(store), store.writing() as connection:
         row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
         assert row is not None
-        monkeypatch.setattr(time, "time", lambda: true + 3600)
-        assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
-        assert diagnoses.keep_alive(connection, row.number, "first", 0.5)
+        with monkeypatch.context() as ahead:
+            ahead.setattr(time, "time", lambda: true + 3600)
+            assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
+            assert diagnoses.keep_alive(connection, row.number, "first", 0.5)
         assert abs(diagnoses.find(connection, row.id).alive_at - true) < 60
-
-
-def test_a_killed_server_is_taken_for_dead_in_time_where_the_clock_was_set_back(place: Place) -> None:
-    with running(place, **NONE) as server:
-        asked(server, sent(server, campaign("array")))
-    store = database(place.database_url, place.folder)
-    alive_at = table_of_diagnoses.c.alive_at
-    with closing(store), store.writing() as connection:
-        row = diagnoses.claim(connection, "first", diagnoses.Basis("table", "1"))
-        assert row is not None
         connection.execute(table_of_diagnoses.update().values(alive_at=alive_at + 3600))
         assert diagnoses.claim(connection, "second", diagnoses.Basis("table", "1")) is None
         assert diagnoses.keep_alive(connection, row.number, "first", 0.5), "a server that runs goes on"
@@ -288,13 +275,3 @@ def test_a_killed_server_is_taken_for_dead_in_time_where_the_clock_was_set_back(
         taken = diagnoses.claim(connection, "second", diagnoses.Basis("table", "1"))
         assert taken is not None
         assert taken.id == row.id
-
-
-def test_changes_need_a_key_of_scope_write(file_place: Place) -> None:
-    done = file_place.command("key", "create", "reader", "--scope", "read")
-    assert done.returncode == 0, done.stderr
-    with running(file_place, key=done.stdout.split()[-1], **NONE) as server:
-        assert server.http.get("/v1/diagnoses").status_code == 200
-        assert server.http.post("/v1/campaigns/c-1/diagnosis").status_code == 403
-        assert server.http.delete("/v1/diagnoses/d-1").status_code == 403
-        assert server.http.post("/v1/skins/palm/model", json={"diagnosis_id": "d-1"}).status_code == 403

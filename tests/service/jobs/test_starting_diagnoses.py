@@ -15,7 +15,7 @@ from service.store import campaigns, database, diagnoses, open_store
 from service.store.tables import AnyRow
 from service.store.tables import diagnoses as table_of_diagnoses
 from tests.service.jobs.test_diagnoses import SEVERAL, await_workers
-from tests.support.diagnosed import asked, awaited, report, resonant, sent, table
+from tests.support.diagnosed import awaited, begun, small, small_report, table
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import __version__
 from underskin.recordings.campaign import parse
@@ -41,34 +41,27 @@ def row_of(place: Place, diagnosis_id: str) -> AnyRow:
         return store.read(diagnoses.find, diagnosis_id)
 
 
-def test_a_diagnosis_whose_worker_is_slow_to_start_is_kept_alive(place: Place) -> None:
-    with running(place, **SEVERAL) as server:
+def test_a_diagnosis_whose_worker_is_slow_to_start_is_kept_alive_and_never_run_twice_at_once(place: Place) -> None:
+    with running(place, **TWO) as server:
         with no_worker_starts(server):
-            diagnosis_id = asked(server, sent(server, resonant("array")))
+            diagnosis_id = begun(server, small())
             awaited(server, diagnosis_id, "running")
             claimed_at = row_of(place, diagnosis_id).alive_at
             ends = time.monotonic() + diagnoses.HEARTBEAT_TIMEOUT_S
             while row_of(place, diagnosis_id).alive_at < claimed_at + 2:
                 assert time.monotonic() < ends, "no sign of life"
                 time.sleep(0.1)
-        assert awaited(server, diagnosis_id)["report"] == report()
-
-
-def test_what_another_server_took_over_is_not_run_twice_at_once(place: Place) -> None:
-    with running(place, **TWO) as server:
-        with no_worker_starts(server):
-            diagnosis_id = asked(server, sent(server, resonant("array")))
-            awaited(server, diagnosis_id, "running")
             with closing(database(place.database_url, place.folder)) as store, store.writing() as connection:
                 killed = {"claimed_by": "a server that was killed", "alive_at": 0.0}
                 connection.execute(table_of_diagnoses.update().values(**killed))
-            other = asked(server, sent(server, campaign("other", sensors=1), "finger"))
+            other = begun(server, campaign("other", sensors=1), "finger")
             assert awaited(server, other, "running")["state"] == "running"
             assert row_of(place, diagnosis_id).claimed_by == killed["claimed_by"]
-        assert awaited(server, diagnosis_id)["report"] == report()
+        assert awaited(server, diagnosis_id)["report"] == small_report()
         assert awaited(server, other)["state"] == "done"
 
 
+@pytest.mark.soak
 def test_a_diagnosis_for_which_no_thread_starts_is_put_back_and_done_later(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

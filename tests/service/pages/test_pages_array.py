@@ -6,6 +6,7 @@ import pytest
 from playwright.sync_api import Locator
 
 from tests.service.pages.conftest import EXAMPLE, Visit
+from tests.support.cases import first
 from tests.support.diagnosed import sent, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.store_server import Server
@@ -14,10 +15,10 @@ from underskin.recordings.campaign import to_dict
 WIDTHS = [1180, 390]
 
 
-@pytest.fixture(params=WIDTHS)
-def lab(reader: Visit, request: pytest.FixtureRequest) -> Visit:
+@pytest.fixture(params=first(1, WIDTHS))
+def lab(visitor: Visit, request: pytest.FixtureRequest) -> Visit:
     """Somebody on the example's page, in a window of this width."""
-    reader.page.set_viewport_size({"width": request.param, "height": 800})
+    visitor.page.set_viewport_size({"width": request.param, "height": 800})
     newcomer: Visit = request.getfixturevalue("newcomer")
     newcomer.drawn(2)
     return newcomer
@@ -100,12 +101,12 @@ def test_every_page_says_that_its_bars_are_95_percent(lab: Visit) -> None:
         assert "95 %" in page.locator(f"#figure-{name} .plot").evaluate(title)
 
 
-def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit, idle: Server) -> None:
+def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(visitor: Visit, server: Server) -> None:
     made = Made(sensors=14, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6)
-    sent(idle, to_dict(campaign(made, table())), "many")
-    page = reader.page
-    reader.go("/skins/many")
-    reader.drawn(2)
+    sent(server, to_dict(campaign(made, table())), "many")
+    page = visitor.page
+    visitor.go("/skins/many")
+    visitor.drawn(2)
     history = page.locator("#figure-history .plot")
     assert history.evaluate("plot => plot.layout.showlegend") is False
     pointed = "document.querySelector('#figure-history .plot').data.find((one) => one.name === 'pointed at')"
@@ -116,7 +117,7 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(reader: Visit,
 
 
 def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_in_the_dark(
-    reader: Visit, idle: Server
+    visitor: Visit, server: Server
 ) -> None:
     document = to_dict(campaign(Made(sensors=40, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6), table()))
     for number, sensor in enumerate(document["skin"]["sensors"]):  # in two rows
@@ -125,13 +126,13 @@ def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_i
         one.pop("position_mm", None)
         if one["sensor"] == "s7":
             one["frf_re_pc_per_n"] = [0.7 * value for value in one["frf_re_pc_per_n"]]
-    sent(idle, document, "forty")
-    page = reader.page
+    sent(server, document, "forty")
+    page = visitor.page
     page.emulate_media(color_scheme="dark")
-    for width in (1180, 390):
+    for width in first(1, (390, 1180)):
         page.set_viewport_size({"width": width, "height": 800})
-        reader.go("/skins/forty")
-        reader.drawn(2)
+        visitor.go("/skins/forty")
+        visitor.drawn(2)
         ids = [text for text in page.locator("#figure-map .textpoint").all_text_contents() if text]
         differing = page.locator("#figure-map .plot").evaluate(
             "plot => plot.data.find((one) => one.name === 'd33').ids"
@@ -142,6 +143,6 @@ def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_i
         grey, coloured = discs[0], discs[7]
         assert max(map(int, re.findall(r"\d+", grey["fillcolor"]))) < 100  # near the ground
         assert min(map(int, re.findall(r"\d+", coloured["line"]["color"]))) > 200  # ringed, however dark it is
-        reader.require_accessible()
+        visitor.require_accessible()
     page.emulate_media(color_scheme="light")
     page.wait_for_function("() => document.querySelector('#figure-map .plot').layout.shapes[0].fillcolor === '#cfd4d9'")

@@ -38,26 +38,26 @@ def weakened(made: Campaign, sensor: str, factor: float) -> Campaign:
     return replace(made, name="after", recordings=tuple(entries))
 
 
-def compared(reader: Visit, skin: str, width: int, figures: int) -> Page:
+def compared(visitor: Visit, skin: str, width: int, figures: int) -> Page:
     """The page that a skin's page leads to, once so many figures are drawn."""
-    page = reader.page
+    page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
-    reader.go(f"/skins/{skin}")
+    visitor.go(f"/skins/{skin}")
     page.get_by_role("link", name="Compare").click()
     page.wait_for_url("**/compare?skin=*")
-    reader.drawn(figures)
-    reader.require_accessible()
+    visitor.drawn(figures)
+    visitor.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     return page
 
 
-@pytest.mark.parametrize("width", [1180, 390])
-def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle: Server, width: int) -> None:
+@pytest.mark.parametrize("width", first(1, [390, 1180]))
+def test_a_skin_before_and_after_and_the_sensor_that_changed(visitor: Visit, server: Server, width: int) -> None:
     skin = f"aged{width}"
-    first = sent(idle, to_dict(campaign(BEFORE, table())), skin)
-    second = sent(idle, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
-    page = compared(reader, skin, width, 3)
-    assert page.get_by_label("First", exact=True).input_value() == first
+    before = sent(server, to_dict(campaign(BEFORE, table())), skin)
+    second = sent(server, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
+    page = compared(visitor, skin, width, 3)
+    assert page.get_by_label("First", exact=True).input_value() == before
     ends = [
         page.locator(f"#figure-map-{name} .plot").evaluate(
             "plot => [plot.data[0].marker.cmin, plot.data[0].marker.cmax]"
@@ -88,33 +88,33 @@ def test_a_skin_before_and_after_and_the_sensor_that_changed(reader: Visit, idle
     )
     assert changed == ["s2"]
     page.get_by_label("First", exact=True).select_option(second)
-    page.get_by_label("Second", exact=True).select_option(first)
+    page.get_by_label("Second", exact=True).select_option(before)
     page.get_by_role("button", name="Compare").click()
     page.wait_for_url(f"**first={second}*")
     rows = csv.DictReader(
-        idle.http.get("/compare/difference.csv", params={"first": second, "second": first}).text.splitlines()
+        server.http.get("/compare/difference.csv", params={"first": second, "second": before}).text.splitlines()
     )
     gaps = {row["sensor"]: float(row["difference_pc_per_n"]) for row in rows}
     assert gaps["s2"] == pytest.approx(0.3 * BEFORE.d33_pc_per_n, abs=0.5)
     assert max(abs(gap) for sensor, gap in gaps.items() if sensor != "s2") < 0.05
 
 
-def test_nothing_to_compare_is_said(idle: Server) -> None:
-    assert idle.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
+def test_nothing_to_compare_is_said(server: Server) -> None:
+    assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
 
 
-def test_first_is_the_one_recorded_first_however_late_it_arrives(idle: Server) -> None:
+def test_first_is_the_one_recorded_first_however_late_it_arrives(server: Server) -> None:
     ids = {}
     for year in (2020, 2017):
         made = campaign(BEFORE, table())
         entries = tuple(replace(entry, recorded_at=f"{year}-05-03T09:00:00Z") for entry in made.recordings)
-        ids[year] = sent(idle, to_dict(replace(made, name=str(year), recordings=entries)), "by-time")
-    text = idle.http.get("/compare?skin=by-time", headers=BROWSING).text
+        ids[year] = sent(server, to_dict(replace(made, name=str(year), recordings=entries)), "by-time")
+    text = server.http.get("/compare?skin=by-time", headers=BROWSING).text
     chosen = re.findall(r'value="([^"]*)" selected', text)
     assert chosen == [ids[2017], ids[2020]]
 
 
-def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_elsewhere_are_named(idle: Server) -> None:
+def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_elsewhere_are_named(server: Server) -> None:
     def of_year(year: int, skin: str, shift_mm: float = 0.0) -> str:
         made = campaign(replace(BEFORE, sensors=2), table())
         dated = tuple(replace(one, recorded_at=f"{year}-05-03T09:00:00Z") for one in made.recordings)
@@ -122,51 +122,52 @@ def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_else
         document["skin"]["sensors"][1]["y_mm"] += shift_mm
         for one in document["recordings"]:
             one.pop("position_mm", None)
-        return sent(idle, document, skin)
+        return sent(server, document, skin)
 
     alone = of_year(2042, "by itself")
     ids = [of_year(year, "thrice") for year in (2039, 2040, 2041)]
-    text = idle.http.get("/compare", headers=BROWSING).text
+    text = server.http.get("/compare", headers=BROWSING).text
     assert re.findall(r'value="([^"]*)" selected', text) == ids[1:]
     assert re.search(r"data-day=\"2041-05-03\">2041-05-03, thrice: 2041<", text)
     assert "lie elsewhere" not in text
-    of_one = idle.http.get(f"/compare?first={ids[0]}", headers=BROWSING).text
+    of_one = server.http.get(f"/compare?first={ids[0]}", headers=BROWSING).text
     assert re.findall(r'value="([^"]*)" selected', of_one) == [ids[0], ids[2]]
     bent = of_year(2043, "bent", 6.0)
-    warned = idle.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
+    warned = server.http.get("/compare", params={"first": alone, "second": bent}, headers=BROWSING).text
     (said,) = re.findall(r"Sensors of the same id lie elsewhere in the two campaigns: (.*?)\. Their", warned)
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
 
 
-def test_two_skins_without_a_sensor_in_common_say_so_and_how_sensors_are_matched(idle: Server) -> None:
+def test_two_skins_without_a_sensor_in_common_say_so_and_how_sensors_are_matched(server: Server) -> None:
     first = store_server.campaign("left", sensors=2, lines=3)
     second = store_server.campaign("right", sensors=9, lines=3)
     for one in [*second["skin"]["sensors"], *second["recordings"]]:
         name = "id" if "x_mm" in one else "sensor"
         one[name] = one[name].replace("s", "finger ")
-    ids = {name: sent(idle, document, name) for name, document in (("left", first), ("right", second))}
-    text = idle.http.get("/compare", params={"first": ids["left"], "second": ids["right"]}, headers=BROWSING).text
+    ids = {name: sent(server, document, name) for name, document in (("left", first), ("right", second))}
+    text = server.http.get("/compare", params={"first": ids["left"], "second": ids["right"]}, headers=BROWSING).text
     (said,) = re.findall(r"No sensor is in both campaigns: (.*?\.)", text)
     named = ", ".join(f"finger {number}" for number in range(6))
     assert said == f"sensors are matched by their ids, and the first has s0, s1, the second {named} and 3 more."
-    alike = idle.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
+    alike = server.http.get("/compare", params={"first": ids["left"], "second": ids["left"]}, headers=BROWSING).text
     assert "No sensor is in both" not in alike
 
 
-def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_pages(idle: Server) -> None:
+@pytest.mark.soak
+def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_pages(server: Server) -> None:
     many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
     for number, document in enumerate(many):
         (recorded, _) = document["recordings"]
         recorded["recorded_at"] = f"20{number // 12:02d}-{number % 12 + 1:02d}-03T09:00:00Z"
         document["recordings"] = [recorded]
-    kept = idle.http.post("/v1/campaigns?skin=long", json=many).raise_for_status().json()["campaigns"]
-    text = idle.http.get("/compare?skin=long", headers=BROWSING).text
+    kept = server.http.post("/v1/campaigns?skin=long", json=many).raise_for_status().json()["campaigns"]
+    text = server.http.get("/compare?skin=long", headers=BROWSING).text
     assert "The 200 campaigns recorded last of this skin are offered" in text
     second = kept[1]["id"]
     assert second not in text
-    page = idle.http.get(f"/campaigns/{second}", headers=BROWSING).text
+    page = server.http.get(f"/campaigns/{second}", headers=BROWSING).text
     (place,) = re.findall(r'href="(/compare[^"]*)"', page)
-    chosen = idle.http.get(html.unescape(place), headers=BROWSING).text
+    chosen = server.http.get(html.unescape(place), headers=BROWSING).text
     assert re.findall(r'value="([^"]*)" selected', chosen) == [second, kept[-1]["id"]]
 
 
@@ -182,14 +183,14 @@ def one_sensor(number: int) -> dict[str, object]:
     return to_dict(replace(made, name=f"single {number}", recordings=undated))
 
 
-def test_only_what_has_frfs_is_offered_and_none_with_itself(idle: Server) -> None:
-    first = sent(idle, one_sensor(1), "mixed")
-    sent(idle, block("a block", recorded_at="2031-01-01T00:00:00Z"), "mixed")
-    text = idle.http.get("/compare?skin=mixed", headers=BROWSING).text
+def test_only_what_has_frfs_is_offered_and_none_with_itself(server: Server) -> None:
+    first = sent(server, one_sensor(1), "mixed")
+    sent(server, block("a block", recorded_at="2031-01-01T00:00:00Z"), "mixed")
+    text = server.http.get("/compare?skin=mixed", headers=BROWSING).text
     assert text.count("<option ") == 2
     assert "a block" not in text
-    sent(idle, one_sensor(5), "another")
-    both = re.findall(r'value="([^"]*)" selected', idle.http.get(f"/compare?first={first}", headers=BROWSING).text)
+    sent(server, one_sensor(5), "another")
+    both = re.findall(r'value="([^"]*)" selected', server.http.get(f"/compare?first={first}", headers=BROWSING).text)
     assert both[0] == first != both[1]
     assert f"{first}" in text
     assert "There is one campaign with FRFs of this skin: nothing to compare it with." in text
@@ -206,11 +207,11 @@ def pressed(name: str, moduli_mpa: Sequence[float], year: int) -> dict[str, obje
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(reader: Visit, idle: Server, width: int) -> None:
+def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(visitor: Visit, server: Server, width: int) -> None:
     skin = f"pressed{width}"
-    ids = [sent(idle, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
-    ids.append(sent(idle, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
-    page = compared(reader, skin, width, 2)
+    ids = [sent(server, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
+    ids.append(sent(server, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
+    page = compared(visitor, skin, width, 2)
     assert page.get_by_label("First", exact=True).input_value() == ids[0]
     told = page.get_by_role("region", name="Young's modulus of the curves").inner_text()
     assert re.search(r"First\s+3\s+2\.000", told)
@@ -225,15 +226,15 @@ def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(reader: Visi
     )
     assert legend == ["first", "second"]
     query = {"first": ids[0], "second": ids[1], "kind": "compression"}
-    rows = list(csv.DictReader(idle.http.get("/compare/moduli.csv", params=query).text.splitlines()))
+    rows = list(csv.DictReader(server.http.get("/compare/moduli.csv", params=query).text.splitlines()))
     assert [row["which"] for row in rows] == ["first"] * 3 + ["second"] * 3
     assert float(rows[3]["youngs_modulus_mpa"]) == pytest.approx(1.5, rel=1e-6)
 
 
-def test_single_curves_have_a_difference_without_an_interval(idle: Server) -> None:
+def test_single_curves_have_a_difference_without_an_interval(server: Server) -> None:
     for name, modulus, year in (("soft", 2.0, 2030), ("hard", 3.0, 2031)):
-        sent(idle, pressed(name, [modulus], year), "single")
-    text = idle.http.get("/compare?skin=single", headers=BROWSING).text
+        sent(server, pressed(name, [modulus], year), "single")
+    text = server.http.get("/compare?skin=single", headers=BROWSING).text
     assert "it cannot be told how far curves scatter" in text
     row = re.search(r"<tr><th scope=.row.>Difference</th>.*?</tr>", text, re.DOTALL)
     assert row is not None
@@ -242,41 +243,41 @@ def test_single_curves_have_a_difference_without_an_interval(idle: Server) -> No
     assert (cells[0], cells[2]) == ("–", "–")
 
 
-def test_kinds_of_which_there_are_campaigns_are_offered(idle: Server) -> None:
-    sent(idle, one_sensor(6), "kinds")
-    first = sent(idle, block("alone", recorded_at="2031-01-01T00:00:00Z"), "kinds")
-    text = idle.http.get("/compare?skin=kinds", headers=BROWSING).text
+def test_kinds_of_which_there_are_campaigns_are_offered(server: Server) -> None:
+    sent(server, one_sensor(6), "kinds")
+    first = sent(server, block("alone", recorded_at="2031-01-01T00:00:00Z"), "kinds")
+    text = server.http.get("/compare?skin=kinds", headers=BROWSING).text
     assert "<strong>FRFs</strong>" in text
     assert "/compare?kind=compression&amp;skin=kinds" in text
-    text = idle.http.get("/compare?skin=kinds&kind=compression", headers=BROWSING).text
+    text = server.http.get("/compare?skin=kinds&kind=compression", headers=BROWSING).text
     assert "There is one campaign with compressions of this skin" in text
-    chosen = idle.http.get(f"/compare?skin=kinds&first={first}", headers=BROWSING).text
+    chosen = server.http.get(f"/compare?skin=kinds&first={first}", headers=BROWSING).text
     assert "<strong>compressions</strong>" in chosen
-    assert idle.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
+    assert server.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
 
 
-def test_a_map_is_grey_where_that_of_its_campaign_is(idle: Server) -> None:
-    ids = [sent(idle, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
-    own = idle.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
-    beside = idle.http.get("/compare?skin=alike", headers=BROWSING).text
+def test_a_map_is_grey_where_that_of_its_campaign_is(server: Server) -> None:
+    ids = [sent(server, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
+    own = server.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
+    beside = server.http.get("/compare?skin=alike", headers=BROWSING).text
     told = re.search(r"[^.<]*differ from the others beyond chance[^.<]*", own)
     assert told is not None
     captions = re.findall(r"<figcaption.*?</figcaption>", beside, re.DOTALL)
     assert [told[0] in caption for caption in captions] == [True, True, False]
 
 
-def test_a_discarded_campaign_is_not_counted_at_the_start(idle: Server) -> None:
-    kept = [sent(idle, one_sensor(number), "counted") for number in (2, 3)]
+def test_a_discarded_campaign_is_not_counted_at_the_start(server: Server) -> None:
+    kept = [sent(server, one_sensor(number), "counted") for number in (2, 3)]
     reason = {"reason": "a mere trial"}
     for one, count in zip(kept, (1, 0), strict=True):
-        assert idle.http.post(f"/v1/campaigns/{one}/discard", json=reason).status_code == 200
-        start = idle.http.get("/?find=counted", headers=BROWSING).text
+        assert server.http.post(f"/v1/campaigns/{one}/discard", json=reason).status_code == 200
+        start = server.http.get("/?find=counted", headers=BROWSING).text
         assert f'<td class="figures" data-label="Campaigns">{count}</td>' in start
     assert "none in use" in start
 
 
-def test_the_start_tells_a_time_of_arrival_from_one_of_recording(idle: Server) -> None:
-    sent(idle, one_sensor(4), "arrived")
-    sent(idle, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
-    assert '<span class="quiet">received <time' in idle.http.get("/?find=arrived", headers=BROWSING).text
-    assert '<span class="quiet"><time' in idle.http.get("/?find=recorded", headers=BROWSING).text
+def test_the_start_tells_a_time_of_arrival_from_one_of_recording(server: Server) -> None:
+    sent(server, one_sensor(4), "arrived")
+    sent(server, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
+    assert '<span class="quiet">received <time' in server.http.get("/?find=arrived", headers=BROWSING).text
+    assert '<span class="quiet"><time' in server.http.get("/?find=recorded", headers=BROWSING).text

@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
+from tests.support.cases import first
 from tests.support.store_server import Server
 from underskin.figures.design_region import design_region
 
@@ -16,19 +17,19 @@ def cell(visitor: Visit, name: str, column: str) -> str:
 
 
 def fits_and_is_accessible(visitor: Visit) -> None:
-    for width in (390, 1280):
+    for width in first(1, (390, 1280)):
         visitor.page.set_viewport_size({"width": width, "height": 900})
         assert visitor.page.evaluate("document.documentElement.scrollWidth") <= width
         visitor.require_accessible()
 
 
-def test_a_design_is_pinned_and_the_other_one_moves_beside_it(reader: Visit) -> None:
-    page = reader.page
-    reader.go("/design")
-    reader.drawn(2)
+def test_a_design_is_pinned_and_the_other_one_moves_beside_it(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/design")
+    visitor.drawn(2)
     page.get_by_role("button", name="Pin this as A").press("Enter")
     page.get_by_role("heading", name="A, pinned, and B, as the sliders stand").wait_for()
-    assert cell(reader, "thickness_mm", "change") == "same"
+    assert cell(visitor, "thickness_mm", "change") == "same"
     assert page.get_by_role("columnheader", name="Change from A to B").is_visible()
     slider = page.get_by_label("thickness h, slider")
     assert slider.is_visible()
@@ -39,18 +40,18 @@ def test_a_design_is_pinned_and_the_other_one_moves_beside_it(reader: Visit) -> 
         page.locator("section[aria-labelledby=beside]").evaluate("one => getComputedStyle(one).breakInside") == "avoid"
     )
     page.emulate_media(media="screen")
-    fits_and_is_accessible(reader)
+    fits_and_is_accessible(visitor)
     with page.expect_response("**/design/answer?*"):
         page.locator("#thickness_mm").fill("1.25")
     expect(page.locator("[data-compared=thickness_mm] [data-stands]")).to_have_text("1.25 mm")
-    assert cell(reader, "thickness_mm", "change") == "−50 %"
+    assert cell(visitor, "thickness_mm", "change") == "−50 %"
     # Of half the thickness σ is less, for the stress is under a smaller part of the sensor, and the charge is more.
-    assert cell(reader, "told-sigma", "change").startswith("−")
-    assert cell(reader, "told-frf", "change").startswith("+")
+    assert cell(visitor, "told-sigma", "change").startswith("−")
+    assert cell(visitor, "told-frf", "change").startswith("+")
     page.reload()  # the address has both
-    assert cell(reader, "thickness_mm", "stands") == "1.25 mm"
+    assert cell(visitor, "thickness_mm", "stands") == "1.25 mm"
     assert "2.5 mm" in page.locator("[data-compared=thickness_mm]").inner_text()
-    reader.drawn(2)
+    visitor.drawn(2)
     expect(page.locator("#figure-row").get_by_text("A, pinned")).to_be_visible()
     page.get_by_role("button", name="Unpin A").click()
     page.wait_for_url(lambda address: "pin" not in address)
@@ -72,13 +73,13 @@ def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     assert "pitch of the array [mm]: x – must be a number" in answer.text
 
 
-def test_a_material_gives_its_number_and_leaves_the_others(reader: Visit) -> None:
-    page = reader.page
-    reader.go("/design?thickness_mm=3")
+def test_a_material_gives_its_number_and_leaves_the_others(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/design?thickness_mm=3")
     page.get_by_text("Materials, with their sources").press("Enter")
     row = page.get_by_role("row", name=re.compile("^Sylgard 184, 10 : 1"))
     assert "10.1002/app.41050" in row.inner_text()
-    fits_and_is_accessible(reader)
+    fits_and_is_accessible(visitor)
     page.get_by_role("button", name="Take Sylgard 184, 10 : 1").click()
     page.wait_for_url("**youngs_modulus_mpa=2&**")
     assert page.locator("#thickness_mm").input_value() == "3"
@@ -99,12 +100,12 @@ def test_an_unknown_material_is_refused(server: Server) -> None:
     assert "material" in answer.text
 
 
-def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(reader: Visit) -> None:
-    page = reader.page
-    reader.go("/design")
+def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/design")
     page.get_by_role("link", name="which skins resolve what you ask").press("Enter")
-    reader.drawn(1)
-    fits_and_is_accessible(reader)
+    visitor.drawn(1)
+    fits_and_is_accessible(visitor)
     page.get_by_label("two-point separation, at most").fill("3,5")
     page.get_by_label("two-point separation, at most").press("Enter")
     page.wait_for_url("**resolution_mm=3%2C5**")
@@ -118,13 +119,13 @@ def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(reade
     assert float(page.locator("#pitch_mm").input_value()) == pitch
 
 
-def test_where_no_skin_does_the_limit_is_named(reader: Visit) -> None:
-    page = reader.page
-    reader.go("/design/search?thinnest_mm=3")
+def test_where_no_skin_does_the_limit_is_named(visitor: Visit) -> None:
+    page = visitor.page
+    visitor.go("/design/search?thinnest_mm=3")
     expect(page.get_by_role("heading", name="that were tried meets it")).to_be_visible()
     expect(page.get_by_text("The thinnest layer that can be made: none of them that does the rest")).to_be_visible()
-    reader.drawn(1)
-    fits_and_is_accessible(reader)
+    visitor.drawn(1)
+    fits_and_is_accessible(visitor)
     page.get_by_label("thinnest layer").fill("thick")
     page.get_by_role("button", name="Search").click()
     expect(page.get_by_role("alert")).to_contain_text("thinnest layer that can be made [mm]: thick – must be a number")

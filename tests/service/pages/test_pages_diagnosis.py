@@ -10,14 +10,13 @@ import pytest
 from playwright.sync_api import Locator
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.finished import Made, keep, made_of
+from tests.service.pages.finished import LINES, Made, finish, keep, made
 from tests.service.pages.forms import BROWSING, HOSTILE, token_of
 from tests.support.adhesive_curves import adhesive_figure
 from tests.support.cases import first
 from tests.support.diagnosed import asked, resonant, sent
 from tests.support.store_server import Server
 
-LINES = 30
 SECTIONS = [
     "Where the model and the recordings differ", "What the model lacks, and the values found",
     "How well the models describe the recordings", "Adopt",
@@ -25,18 +24,18 @@ SECTIONS = [
 
 
 @pytest.fixture(scope="module")
-def made() -> Made:
-    return made_of(resonant("array", lines=LINES))
+def place(server: Server) -> str:
+    """The page of a diagnosis that nothing changes."""
+    return keep(server, "kept", made())
 
 
 def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server) -> None:
-    campaign_id = sent(server, resonant("array", lines=LINES), "resonating")
     page = visitor.page
-    visitor.go(f"/campaigns/{campaign_id}")
+    visitor.go(f"/campaigns/{sent(server, resonant('array', lines=LINES), 'resonating')}")
     page.get_by_role("button", name="Diagnose").click()
     page.wait_for_url("**/diagnoses/*")
-    page.get_by_role("heading", name=SECTIONS[0]).wait_for(timeout=240_000)  # without reloading by hand
-    visitor.drawn(4)
+    finish(server, made())
+    page.get_by_role("heading", name=SECTIONS[0]).wait_for()  # without reloading by hand
     visitor.require_accessible()
     headings = page.get_by_role("heading", level=2).all_inner_texts()
     sections = [name for name in headings if name in SECTIONS]
@@ -52,9 +51,20 @@ def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server)
     assert page.get_by_role("button", name="Adopt this model").count() == 0
 
 
-def test_the_saved_file_needs_nothing_else(reader: Visit, idle: Server, made: Made, downloads: Path) -> None:
-    page = reader.page
-    reader.go(f"/diagnoses/{keep(idle, resonant('saved', lines=LINES), made, 'saved')}")
+def test_on_paper_there_is_the_report_and_nothing_to_press_and_the_saved_file_needs_nothing_else(
+    visitor: Visit, place: str, downloads: Path
+) -> None:
+    page = visitor.page
+    visitor.go(place)
+    visitor.drawn(4)
+    assert page.get_by_role("button", name="Print or save as PDF").is_visible()
+    page.emulate_media(media="print")
+    assert [button for button in page.locator("button, .button").all() if button.is_visible()] == []
+    sections = [heading for heading in page.get_by_role("heading", level=2).all() if heading.is_visible()]
+    assert {*SECTIONS[:3], "What to measure next"} <= {one.inner_text() for one in sections}
+    for plot in page.locator(".plot:not(#array .plot)").all():
+        assert plot.is_visible()
+    page.emulate_media(media="screen")
     with page.expect_download() as saving:
         page.get_by_role("link", name="Save as one HTML file").click()
     file = downloads / "report.html"
@@ -64,37 +74,23 @@ def test_the_saved_file_needs_nothing_else(reader: Visit, idle: Server, made: Ma
     page.goto(file.as_uri())
     page.wait_for_function("() => document.querySelectorAll('.main-svg').length >= 4")
     assert asked_for == [file.as_uri()]
-    reader.wrong.clear()  # the file itself is not of the server
+    visitor.wrong.clear()  # the file itself is not of the server
 
 
-def test_on_paper_there_is_the_report_and_nothing_to_press(reader: Visit, idle: Server, made: Made) -> None:
-    page = reader.page
-    reader.go(f"/diagnoses/{keep(idle, resonant('printed', lines=LINES), made, 'printed')}")
-    reader.drawn(4)
-    assert page.get_by_role("button", name="Print or save as PDF").is_visible()
-    page.emulate_media(media="print")
-    assert [button for button in page.locator("button, .button").all() if button.is_visible()] == []
-    sections = [heading for heading in page.get_by_role("heading", level=2).all() if heading.is_visible()]
-    assert {*SECTIONS[:3], "What to measure next"} <= {one.inner_text() for one in sections}
-    for plot in page.locator(".plot:not(#array .plot)").all():
-        assert plot.is_visible()
-
-
-def test_a_figure_s_numbers_are_those_of_the_report(idle: Server, made: Made) -> None:
-    place = f"/diagnoses/{keep(idle, resonant('numbers', lines=LINES), made, 'numbers')}"
+def test_a_figure_s_numbers_are_those_of_the_report(server: Server, place: str) -> None:
     tables = {
-        name: list(csv.DictReader(idle.http.get(f"{place}/{name}.csv").text.splitlines()))
+        name: list(csv.DictReader(server.http.get(f"{place}/{name}.csv").text.splitlines()))
         for name in ("where", "before_after", "explanations", "parameters")
     }
-    mass = made.report["mechanisms"][0]["parameters"][0]
+    mass = made().report["mechanisms"][0]["parameters"][0]
     told = tables["parameters"][0]
     assert (told["parameter"], float(told["value"])) == (mass["name"], mass["value"])
-    assert float(tables["explanations"][0]["probability"]) == made.report["probability"]
+    assert float(tables["explanations"][0]["probability"]) == made().report["probability"]
     shown = {(row["model"], row["recording"]) for row in tables["before_after"]}
     assert shown == {(model, f"r{number}") for model in ("before", "after") for number in range(12)}
     lines = sum(int(row["points"]) for row in tables["where"])
     assert lines == len(tables["before_after"]) / 2  # each point is in one cell
-    assert idle.http.get(f"{place}/nothing.csv").status_code == 404
+    assert server.http.get(f"{place}/nothing.csv").status_code == 404
 
 
 def require_whole(figure: Locator, width: int) -> None:
@@ -106,14 +102,15 @@ def require_whole(figure: Locator, width: int) -> None:
     assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
 
 
-def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) -> None:
+def test_a_curve_is_chosen_with_keys(visitor: Visit, server: Server) -> None:
     figure = adhesive_figure()
-    whole = Made(made.report, {**made.figures, "curve": figure.to_json()})
-    place = f"/diagnoses/{keep(idle, resonant('curve', lines=LINES), whole, 'curve')}"
-    page = reader.page
-    reader.go(place)
-    reader.drawn(5)
-    reader.require_accessible()
+    place = keep(server, "curve", Made(made().report, {**made().figures, "curve": figure.to_json()}))
+    page = visitor.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    visitor.go(place)
+    visitor.drawn(5)
+    visitor.require_accessible()
+    require_whole(page.locator("#figure-curve"), 390)
     names = [button.name for button in figure.layout.updatemenus[0].buttons]
     listed = page.locator("#figure-curve").get_by_role("combobox", name="Recording")
     assert listed.locator("option").all_inner_texts() == names
@@ -127,32 +124,27 @@ def test_a_curve_is_chosen_with_keys(reader: Visit, idle: Server, made: Made) ->
         seen.append(set(page.evaluate(of_plot)))
     assert seen == [{name.partition(":")[0]} for name in names]
     assert "the fitted contact point" in page.locator(".report").inner_text()
-    rows = list(csv.DictReader(idle.http.get(f"{place}/curve.csv").text.splitlines()))
+    rows = list(csv.DictReader(server.http.get(f"{place}/curve.csv").text.splitlines()))
     (mark,) = [row for row in rows if (row["recording"], row["shows"]) == ("c01", "pull-off")]
     (trace,) = [one for one in figure.data if (one.meta["recording"], one.meta["shows"]) == ("c01", "pull-off")]
     assert float(mark["depth_mm"]) == pytest.approx(float(trace.x[0]) * trace.meta["mm"], rel=1e-5)
     assert float(mark["force_n"]) == pytest.approx(float(trace.y[0]) * trace.meta["n"], rel=1e-5)
-    page.set_viewport_size({"width": 390, "height": 844})
-    page.reload()
-    reader.drawn(5)
-    require_whole(page.locator("#figure-curve"), 390)
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
 def test_the_models_are_laid_over_one_frf_after_another_with_keys(
-    reader: Visit, idle: Server, made: Made, width: int
+    visitor: Visit, server: Server, place: str, width: int
 ) -> None:
-    page = reader.page
+    page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
-    place = f"/diagnoses/{keep(idle, resonant(f'frf{width}', lines=LINES), made, f'frf{width}')}"
-    reader.go(place)
-    reader.drawn(5)
-    reader.require_accessible()
+    visitor.go(place)
+    visitor.drawn(5)
+    visitor.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     figure = page.locator("#figure-frf")
     assert "95 % of the noise" in figure.inner_text()
     require_whole(figure, width)
-    rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
+    rows = list(csv.DictReader(server.http.get(f"{place}/frf.csv").text.splitlines()))
     names = list(dict.fromkeys(row["recording"] for row in rows))
     assert len(names) == 12
     assert len(rows) == 12 * LINES
@@ -174,11 +166,11 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
     assert on.is_disabled()
 
 
-def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    reader.go(f"/diagnoses/{asked(idle, sent(idle, resonant('waits'), 'waits'))}")
+def test_one_that_waits_is_cancelled_and_asked_for_again(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    visitor.go(f"/diagnoses/{asked(server, sent(server, resonant('waits'), 'waits'))}")
     assert "waits for its turn" in page.get_by_role("status").inner_text()
-    reader.require_accessible()
+    visitor.require_accessible()
     page.get_by_role("button", name="Cancel").click()
     page.get_by_text("It was cancelled").wait_for()
     page.get_by_role("button", name="Diagnose it again").click()
@@ -187,53 +179,49 @@ def test_one_that_waits_is_cancelled_and_asked_for_again(reader: Visit, idle: Se
     page.get_by_text("It was cancelled").wait_for()
 
 
-def test_a_law_that_no_expression_says_is_refused_in_one_sentence(idle: Server, made: Made) -> None:
-    free = Made(deepcopy(made.report), made.figures)
+def test_a_law_that_no_expression_says_is_refused_in_one_sentence(server: Server) -> None:
+    free = Made(deepcopy(made().report), made().figures)
     law = {"acts_on": "thickness", "axis": "sensor", "form": "step", "expression": "h = h0·(1 + 0.2·[sensor = s1])"}
     seen = {"parameters": [], "probability": 1.0, "rivals": [], "range": {"sensor": ["s1", "s2"]}}
     free.report["unnamed"] = law | seen
     free.report["provenance"]["unnamed"] = {"law": "unnamed_thickness__sensor__step__s1", "parameters": {}}
-    place = f"/diagnoses/{keep(idle, resonant('free', lines=LINES), free, 'free')}"
-    text = idle.http.get(place, headers=BROWSING).text
+    text = server.http.get(keep(server, "free", free), headers=BROWSING).text
     assert "<p>It cannot be kept: a smooth course, or one of words, is no expression.</p>" in text
 
 
-def test_hostile_names_in_a_report_stay_text(reader: Visit, idle: Server, made: Made) -> None:
-    hostile = Made(deepcopy(made.report), made.figures)
+def test_hostile_names_in_a_report_stay_text(visitor: Visit, server: Server) -> None:
+    hostile = Made(deepcopy(made().report), made().figures)
     hostile.report["statement"] = f"{HOSTILE}. {HOSTILE}"
     hostile.report["location"]["statement"] = HOSTILE
     hostile.report["findings"] = [{"code": HOSTILE, "recording": HOSTILE, "field": HOSTILE, "statement": HOSTILE}]
     hostile.report["alternatives"][0]["why_not"] = HOSTILE
-    document = resonant("hostile", lines=LINES)
-    document["name"] = HOSTILE
-    reader.page.on("dialog", lambda dialog: reader.wrong.append(dialog.message))
-    reader.go(f"/diagnoses/{keep(idle, document, hostile, 'hostile')}")
-    reader.drawn(4)
-    assert reader.page.locator("img[src=x]").count() == 0
-    assert HOSTILE.split(".")[0] in reader.page.locator(".first").inner_text()
+    visitor.page.on("dialog", lambda dialog: visitor.wrong.append(dialog.message))
+    visitor.go(keep(server, "hostile", hostile, HOSTILE))
+    visitor.drawn(4)
+    assert visitor.page.locator("img[src=x]").count() == 0
+    assert HOSTILE.split(".")[0] in visitor.page.locator(".first").inner_text()
 
 
-def test_a_report_without_its_figures_says_so(idle: Server, made: Made) -> None:
-    place = f"/diagnoses/{keep(idle, resonant('bare', lines=LINES), Made(made.report, {}), 'bare')}"
-    shown = idle.http.get(place, headers=BROWSING).text
+def test_a_report_without_its_figures_says_so(server: Server) -> None:
+    place = keep(server, "bare", Made(made().report, {}))
+    shown = server.http.get(place, headers=BROWSING).text
     assert "were not kept" in shown
     assert shown.count('class="plot"') == 1  # how probable each explanation is: of the report itself
-    assert idle.http.get(f"{place}/where.csv", headers=BROWSING).status_code == 422
-    assert idle.http.get(f"{place}/parameters.csv").status_code == 200
+    assert server.http.get(f"{place}/where.csv", headers=BROWSING).status_code == 422
+    assert server.http.get(f"{place}/parameters.csv").status_code == 200
 
 
-def test_an_imported_report_of_odd_shape_is_said_to_be_one(idle: Server, made: Made) -> None:
-    odd = Made({**made.report, "location": None}, {})
-    place = f"/diagnoses/{keep(idle, resonant('odd', lines=LINES), odd, 'odd')}"
+def test_an_imported_report_of_odd_shape_is_said_to_be_one(server: Server) -> None:
+    place = keep(server, "odd", Made({**made().report, "location": None}, {}))
     for path in (place, f"{place}/report.html"):
-        answer = idle.http.get(path, headers=BROWSING)
+        answer = server.http.get(path, headers=BROWSING)
         assert answer.status_code == 422
         assert "lacks what a page shows" in answer.text
 
 
-def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made: Made) -> None:
-    diagnosis_id = keep(idle, resonant("forms", lines=LINES), made, "forms")
-    campaign_id = idle.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
+def test_what_changes_something_needs_the_session_s_own_form(server: Server) -> None:
+    diagnosis_id = keep(server, "forms", made()).rpartition("/")[2]
+    campaign_id = server.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
     for path in (
         f"/campaigns/{campaign_id}/diagnosis",
         "/skins/forms/diagnosis",
@@ -243,8 +231,8 @@ def test_what_changes_something_needs_the_session_s_own_form(idle: Server, made:
         f"/diagnoses/{diagnosis_id}/adopt",
         "/skins/forms/model/withdraw",
     ):
-        assert idle.http.post(path, data={"form_token": "x"}, headers=BROWSING).status_code == 403
-    assert idle.http.get("/v1/skins/forms/model").status_code == 404
+        assert server.http.post(path, data={"form_token": "x"}, headers=BROWSING).status_code == 403
+    assert server.http.get("/v1/skins/forms/model").status_code == 404
 
 
 def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
@@ -270,21 +258,20 @@ def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Serv
             assert "scope read" in answer.text
 
 
-def test_the_map_s_words_follow_what_it_draws(idle: Server, made: Made) -> None:
-    place = f"/diagnoses/{keep(idle, resonant('region', lines=LINES), made, 'region')}"
-    said = idle.http.get(place, headers=BROWSING).text
+def test_the_map_s_words_follow_what_it_draws(server: Server, place: str) -> None:
+    said = server.http.get(place, headers=BROWSING).text
     assert "Steps of frequency are even in its logarithm. The outlined region holds most" in said
     assert "the colours reach twice as far" in said
-    where = json.loads(made.figures["where"])
+    where = json.loads(made().figures["where"])
     where["layout"]["xaxis"]["title"]["text"] = "displacement as recorded [µm]"
     where["layout"].pop("shapes")
-    figures = {**made.figures, "where": json.dumps(where), "curve": adhesive_figure().to_json()}
-    place = f"/diagnoses/{keep(idle, resonant('travel', lines=LINES), Made(made.report, figures), 'travel')}"
-    said = idle.http.get(place, headers=BROWSING).text
+    figures = {**made().figures, "where": json.dumps(where), "curve": adhesive_figure().to_json()}
+    place = keep(server, "travel", Made(made().report, figures))
+    said = server.http.get(place, headers=BROWSING).text
     assert "The displacement is that of the file" in said
     assert "logarithm" not in said
     assert "outlined" not in said
     assert "Within the limits of your rig" not in said  # of curves none is planned
-    refused = idle.http.get(f"{place}/plan", headers=BROWSING)
+    refused = server.http.get(f"{place}/plan", headers=BROWSING)
     assert refused.status_code == 404
     assert "only recordings of FRFs are planned" in refused.text

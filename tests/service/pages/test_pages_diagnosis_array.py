@@ -1,45 +1,35 @@
 """The array on a diagnosis' page: a sensor that is clicked gets FRFs with both models, a table and its history."""
 
 import csv
-from copy import deepcopy
 
 import orjson
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.finished import Made, keep, made_of
+from tests.service.pages.finished import Made, keep, made
 from tests.service.pages.forms import BROWSING
 from tests.service.pages.test_pages_array import WIDTHS, place_of
-from tests.support.diagnosed import resonant
+from tests.support.cases import first
 from tests.support.store_server import Server
 
-LINES = 12
 _OF_PLOT = "document.querySelector('#figure-frf-of-sensor .plot').data"
 
 
-@pytest.fixture(scope="module")
-def made() -> Made:
-    return made_of(resonant("array", lines=LINES))
-
-
-@pytest.mark.parametrize("width", WIDTHS)
-def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(
-    reader: Visit, idle: Server, made: Made, width: int
-) -> None:
-    page = reader.page
+@pytest.mark.parametrize("width", first(1, WIDTHS))
+def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(visitor: Visit, server: Server, width: int) -> None:
+    page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
-    skin = f"sensors{width}"
-    place = f"/diagnoses/{keep(idle, resonant(skin, lines=LINES), made, skin)}"
-    reader.go(place)
+    place = keep(server, f"sensors{width}", made())
+    visitor.go(place)
     page.locator("#figure-map .plot").scroll_into_view_if_needed()
     page.locator("#figure-map .main-svg").first.wait_for()
     page.mouse.click(*place_of(page.locator("#figure-map"), "s2"))
     page.wait_for_url("**sensor=s2*")
-    reader.drawn(8)
-    reader.require_accessible()
+    visitor.drawn(8)
+    visitor.require_accessible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert page.get_by_label("Sensor", exact=True).input_value() == "s2"
-    rows = list(csv.DictReader(idle.http.get(f"{place}/frf.csv").text.splitlines()))
+    rows = list(csv.DictReader(server.http.get(f"{place}/frf.csv").text.splitlines()))
     own = list(dict.fromkeys(row["recording"] for row in rows if row["sensor"] == "s2"))
     assert len(own) == 6
     table = page.get_by_role("region", name="Recordings of the sensor")
@@ -62,15 +52,15 @@ def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(
     assert not page.locator("#array").is_visible()
 
 
-def test_figures_of_older_versions_tell_the_recordings_by_name(idle: Server, made: Made) -> None:
-    figures = dict(made.figures)
+def test_figures_of_older_versions_tell_the_recordings_by_name(server: Server) -> None:
+    figures = dict(made().figures)
     older = orjson.loads(figures["frf"])
     for name in ("indenters_mm", "preloads_n", "left_percent"):
         del older["layout"]["meta"][name]
     figures["frf"] = orjson.dumps(older).decode()
-    place = f"/diagnoses/{keep(idle, resonant('older', lines=LINES), Made(deepcopy(made.report), figures), 'older')}"
-    shown = idle.http.get(f"{place}?sensor=s1", headers=BROWSING)
+    place = keep(server, "older", Made(made().report, figures))
+    shown = server.http.get(f"{place}?sensor=s1", headers=BROWSING)
     assert shown.status_code == 200
     assert shown.text.count('<th scope="row">r') == 6
     assert "Recordings of s1" in shown.text
-    assert "Recordings of" not in idle.http.get(f"{place}?sensor=nothing", headers=BROWSING).text
+    assert "Recordings of" not in server.http.get(f"{place}?sensor=nothing", headers=BROWSING).text

@@ -4,10 +4,10 @@ from tests.service.pages.forms import BROWSING
 from tests.support.store_server import Server, campaign
 
 
-def test_a_discarded_campaign_says_once_what_it_is_and_why(idle: Server) -> None:
-    one = idle.http.post("/v1/campaigns?skin=discarded", json=campaign("tried", sensors=1)).json()["id"]
-    assert idle.http.post(f"/v1/campaigns/{one}/discard", json={"reason": "a mere trial"}).status_code == 200
-    page = idle.http.get(f"/campaigns/{one}", headers=BROWSING).text
+def test_a_discarded_campaign_says_once_what_it_is_and_why(server: Server) -> None:
+    one = server.http.post("/v1/campaigns?skin=discarded", json=campaign("tried", sensors=1)).json()["id"]
+    assert server.http.post(f"/v1/campaigns/{one}/discard", json={"reason": "a mere trial"}).status_code == 200
+    page = server.http.get(f"/campaigns/{one}", headers=BROWSING).text
     assert "It is in no list, and no figure uses it. That can be undone below." in page
     assert page.count("a mere trial") == 2  # above, and among what was changed
     assert "Withdrawn" not in page

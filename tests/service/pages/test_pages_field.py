@@ -35,22 +35,22 @@ def trace(visitor: Visit, figure: str, name: str | None = None) -> dict[str, Any
 
 
 @pytest.fixture
-def calm(browser: Browser, idle: Server) -> Iterator[Visit]:
+def calm(browser: Browser, server: Server) -> Iterator[Visit]:
     """Somebody whose system asks for less motion."""
-    for visitor in visit(browser, idle):
+    for visitor in visit(browser, server):
         visitor.page.emulate_media(reduced_motion="reduce")
         yield visitor
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_section_and_base_are_what_the_interface_serves(reader: Visit, width: int) -> None:
-    reader.page.set_viewport_size({"width": width, "height": 844})
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    reader.require_accessible()
-    assert reader.page.evaluate("document.documentElement.scrollWidth") <= width
-    served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY}&r_points=73&depth_points=21").json()
-    section, base = trace(reader, "section"), trace(reader, "base")
+@pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
+def test_section_and_base_are_what_the_interface_serves(visitor: Visit, width: int) -> None:
+    visitor.page.set_viewport_size({"width": width, "height": 844})
+    visitor.go(f"/field?{QUERY}")
+    visitor.drawn(2)
+    visitor.require_accessible()
+    assert visitor.page.evaluate("document.documentElement.scrollWidth") <= width
+    served = visitor.page.request.get(f"{visitor.address}/v1/field?{QUERY}&r_points=73&depth_points=21").json()
+    section, base = trace(visitor, "section"), trace(visitor, "base")
     assert section["y"] == pytest.approx(served["depth_mm"])
     middle = section["x"].index(0.0)
     on_axis = [-row[0] for row in served["sigma_zz_mpa"]]  # compression is positive on pages
@@ -59,22 +59,15 @@ def test_section_and_base_are_what_the_interface_serves(reader: Visit, width: in
     assert base["z"][20][20] == pytest.approx(on_axis[-1], abs=2e-4)
     assert (section["zmin"], base["zmin"]) == (0, 0)
     assert (section["zmax"], base["zmax"]) == pytest.approx((on_axis[0], on_axis[-1]))
-    assert "compression is positive" in reader.page.locator("#figure-section figcaption").inner_text()
+    assert "compression is positive" in visitor.page.locator("#figure-section figcaption").inner_text()
     a = served["contact_radius_mm"]
-    assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(a, rel=1e-3)
-    assert max(trace(reader, "base", "contact")["y"]) == pytest.approx(a, rel=1e-3)
-    assert max(trace(reader, "base", "sensor")["x"]) == pytest.approx(1.5, rel=1e-3)
-    assert trace(reader, "section", "sensor")["y"] == [2.5, 2.5]
-    assert told(reader) == ["3 N", "0.75 mm", "2.55 MPa", "0.339 MPa", "0.221 MPa", "52.2 %"]
-
-
-@pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_a_millimetre_is_as_long_along_both_axes(reader: Visit, width: int) -> None:
-    reader.page.set_viewport_size({"width": width, "height": 844})
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    for figure in ("section", "base"):
-        lengths = reader.page.locator(f"#figure-{figure} .plot").evaluate(
+    assert max(trace(visitor, "section", "contact")["x"]) == pytest.approx(a, rel=1e-3)
+    assert max(trace(visitor, "base", "contact")["y"]) == pytest.approx(a, rel=1e-3)
+    assert max(trace(visitor, "base", "sensor")["x"]) == pytest.approx(1.5, rel=1e-3)
+    assert trace(visitor, "section", "sensor")["y"] == [2.5, 2.5]
+    assert told(visitor) == ["3 N", "0.75 mm", "2.55 MPa", "0.339 MPa", "0.221 MPa", "52.2 %"]
+    for figure in ("section", "base"):  # a millimetre is as long along both axes
+        lengths = visitor.page.locator(f"#figure-{figure} .plot").evaluate(
             "plot => ['xaxis', 'yaxis'].map(name => { const axis = plot._fullLayout[name];"
             " return axis._length / Math.abs(axis.range[1] - axis.range[0]); })"
         )
@@ -82,78 +75,71 @@ def test_a_millimetre_is_as_long_along_both_axes(reader: Visit, width: int) -> N
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_the_slider_moves_the_load_by_keys(reader: Visit, width: int) -> None:
-    reader.page.set_viewport_size({"width": width, "height": 844})
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    full = trace(reader, "base")
-    slider = reader.page.get_by_label(LOAD)
+def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
+    visitor.page.set_viewport_size({"width": width, "height": 844})
+    visitor.go(f"/field?{QUERY}")
+    visitor.drawn(2)
+    full = trace(visitor, "base")
+    slider = visitor.page.get_by_label(LOAD)
     slider.focus()
     for _ in range(10):
         slider.press("ArrowLeft")
-    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '1.5 N'")
-    reader.page.wait_for_function(
+    visitor.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '1.5 N'")
+    visitor.page.wait_for_function(
         "() => document.querySelector('#figure-base .plot')._fullData[0].z[20][20] < 0.2"  # half of the stress or so
     )
-    half = trace(reader, "base")
-    served = reader.page.request.get(f"{reader.address}/v1/field?{QUERY.replace('_n=3', '_n=1.5')}").json()
+    half = trace(visitor, "base")
+    served = visitor.page.request.get(f"{visitor.address}/v1/field?{QUERY.replace('_n=3', '_n=1.5')}").json()
     assert half["z"][20][20] == pytest.approx(-served["sigma_zz_mpa"][-1][0], abs=3e-4)
     assert half["zmax"] == full["zmax"]  # one scale of colours for all loads
-    assert max(trace(reader, "section", "contact")["x"]) == pytest.approx(served["contact_radius_mm"], rel=1e-3)
+    assert max(trace(visitor, "section", "contact")["x"]) == pytest.approx(served["contact_radius_mm"], rel=1e-3)
     assert slider.get_attribute("aria-valuetext") == "1.5 N"
     slider.press("End")
-    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '3 N'")
-
-
-def test_what_is_saved_is_the_load_in_sight(reader: Visit) -> None:
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    reader.page.get_by_label(LOAD).press("Home")
-    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '0.15 N'")
-    figure = reader.page.locator("#figure-base")
+    visitor.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '3 N'")
+    slider.press("Home")  # what is saved is the load in sight
+    visitor.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '0.15 N'")
     peak = "JSON.parse(document.querySelector('#figure-base script').textContent).data[0].z[20][20]"
-    reader.page.wait_for_function(f"() => {peak} > -0.03")
-    with reader.page.expect_download():
-        figure.get_by_role("button", name="SVG").click()
+    visitor.page.wait_for_function(f"() => {peak} > -0.03")
+    with visitor.page.expect_download():
+        visitor.page.locator("#figure-base").get_by_role("button", name="SVG").click()
 
 
-def test_the_load_plays_to_its_end_and_pauses_by_key(reader: Visit) -> None:
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    button = reader.page.get_by_role("button", name="Play")
+def test_the_load_plays_to_its_end_and_pauses_by_key(visitor: Visit) -> None:
+    visitor.go(f"/field?{QUERY}")
+    visitor.drawn(2)
+    button = visitor.page.get_by_role("button", name="Play")
     button.focus()
-    reader.page.keyboard.press("Enter")
-    reader.page.wait_for_function(
+    visitor.page.keyboard.press("Enter")
+    visitor.page.wait_for_function(
         "() => (n => n > 2 && n < 18)(Number(document.getElementById('load').value))"
         " && document.getElementById('play').textContent === 'Pause'"
     )
-    reader.page.keyboard.press("Enter")
-    reader.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
-    reader.page.wait_for_timeout(400)
-    stopped = reader.page.get_by_label(LOAD).input_value()
-    reader.page.wait_for_timeout(400)
-    assert reader.page.get_by_label(LOAD).input_value() == stopped
-    reader.page.keyboard.press("Enter")
-    reader.page.wait_for_function(
+    visitor.page.keyboard.press("Enter")
+    visitor.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
+    stopped = visitor.page.get_by_label(LOAD).input_value()
+    visitor.page.wait_for_timeout(400)
+    assert visitor.page.get_by_label(LOAD).input_value() == stopped
+    visitor.page.keyboard.press("Enter")
+    visitor.page.wait_for_function(
         "() => document.getElementById('load').value === '20' && document.getElementById('play').textContent === 'Play'"
     )
-    assert told(reader)[0] == "3 N"
+    assert told(visitor)[0] == "3 N"
 
 
-def test_frames_that_did_not_come_are_asked_for_again(reader: Visit) -> None:
-    reader.go(f"/field?{QUERY}")
-    reader.drawn(2)
-    reader.page.route("**/field/frames?*", lambda route: route.fulfill(status=503, body="busy"), times=2)
-    with reader.page.expect_response("**/field/frames?*"):
-        reader.page.get_by_label(LOAD).press("ArrowLeft")
-    with reader.page.expect_response("**/field/frames?*"):
-        reader.page.get_by_role("button", name="Play").click()
-    reader.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
-    assert told(reader)[0] == "3 N"
-    reader.page.get_by_label(LOAD).press("ArrowLeft")
-    reader.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.7 N'")
-    assert all("503" in said for said in reader.wrong)
-    reader.wrong.clear()
+def test_frames_that_did_not_come_are_asked_for_again(visitor: Visit) -> None:
+    visitor.go(f"/field?{QUERY}")
+    visitor.drawn(2)
+    visitor.page.route("**/field/frames?*", lambda route: route.fulfill(status=503, body="busy"), times=2)
+    with visitor.page.expect_response("**/field/frames?*"):
+        visitor.page.get_by_label(LOAD).press("ArrowLeft")
+    with visitor.page.expect_response("**/field/frames?*"):
+        visitor.page.get_by_role("button", name="Play").click()
+    visitor.page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
+    assert told(visitor)[0] == "3 N"
+    visitor.page.get_by_label(LOAD).press("ArrowLeft")
+    visitor.page.wait_for_function("() => document.querySelector('[data-told]').textContent === '2.7 N'")
+    assert all("503" in said for said in visitor.wrong)
+    visitor.wrong.clear()
 
 
 def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
@@ -166,93 +152,93 @@ def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
     calm.require_accessible()
 
 
-def test_the_request_that_does_the_same_accepts_what_the_page_accepts(idle: Server) -> None:
+def test_the_request_that_does_the_same_accepts_what_the_page_accepts(server: Server) -> None:
     small = QUERY.replace("indenter_radius_mm=4", "indenter_radius_mm=0.007").replace(
         "preload_n=3", "preload_n=0.00001"
     )
     for query, units_checked in ((QUERY, False), (f"{small}&units_checked=yes", True)):
-        text = html.unescape(idle.http.get(f"/field?{query}", headers=BROWSING).raise_for_status().text)
+        text = html.unescape(server.http.get(f"/field?{query}", headers=BROWSING).raise_for_status().text)
         path, call = re.search(r"/v1/field\?[^'\s<]+", text), re.search(r"client\.field\(([^)]*)\)", text)
         assert path is not None
         assert call is not None
         assert ("units_checked=True" in call[1]) == units_checked
-        assert idle.http.get(path[0]).raise_for_status().json()["status"] == "ok"
+        assert server.http.get(path[0]).raise_for_status().json()["status"] == "ok"
         fields = dict(part.split("=") for part in call[1].split(", "))
-        assert idle.http.get("/v1/field", params=fields).raise_for_status().json()["status"] == "ok"
+        assert server.http.get("/v1/field", params=fields).raise_for_status().json()["status"] == "ok"
 
 
-def test_what_is_exact_and_what_is_not_is_said(reader: Visit) -> None:
-    reader.go(f"/field?{QUERY}")
-    reader.page.get_by_text("What is exact here").click()
-    said = reader.page.get_by_role("main").inner_text()
+def test_what_is_exact_and_what_is_not_is_said(server: Server) -> None:
+    said = html.unescape(server.http.get(f"/field?{QUERY}", headers=BROWSING).text)
+    assert "What is exact here" in said
     assert "in proportion to the depth" in said
     assert "up to 17 % of the largest stress at that depth" in said  # 0.6 L^(1/3) + 2.6 L at L = 0.0117
-    reader.go(f"/field?{QUERY}&poisson_ratio=0.45")
-    reader.page.get_by_text("What is exact here").click()
-    assert "finite strain is left out" in reader.page.get_by_role("main").inner_text()
+    said = server.http.get(f"/field?{QUERY}&poisson_ratio=0.45", headers=BROWSING).text
+    assert "finite strain is left out" in said
 
 
-def test_errors_stand_in_the_form_and_the_limit_is_named(reader: Visit) -> None:
-    reader.go("/field?thickness_mm=0.0025")
-    assert "thickness h [mm]" in reader.page.get_by_role("alert").inner_text()
-    assert reader.page.get_by_label("thickness h").input_value() == "0.0025"
-    reader.require_accessible()
-    reader.page.get_by_label("thickness h").fill("2,5")
-    reader.page.get_by_label("force F").fill("100")
-    reader.page.get_by_role("button", name="Compute").click()
-    reader.page.get_by_text("L = 0.391 exceeds 0.1: at most 25.6 N").wait_for()
-    assert reader.page.locator(".plot").count() == 0
-    reader.require_accessible()
+def test_errors_stand_in_the_form_and_the_limit_is_named(visitor: Visit) -> None:
+    visitor.go("/field?thickness_mm=0.0025")
+    assert "thickness h [mm]" in visitor.page.get_by_role("alert").inner_text()
+    assert visitor.page.get_by_label("thickness h").input_value() == "0.0025"
+    visitor.require_accessible()
+    visitor.page.get_by_label("thickness h").fill("2,5")
+    visitor.page.get_by_label("force F").fill("100")
+    visitor.page.get_by_role("button", name="Compute").click()
+    visitor.page.get_by_text("L = 0.391 exceeds 0.1: at most 25.6 N").wait_for()
+    assert visitor.page.locator(".plot").count() == 0
+    visitor.require_accessible()
 
 
-def test_design_leads_there_with_its_sliders(reader: Visit) -> None:
-    reader.go("/design")
-    reader.drawn(2)
-    with reader.page.expect_response("**/design/answer?*"):
-        reader.page.locator("#preload_n").fill("2")
-    reader.page.wait_for_function("() => document.querySelector('[data-query]').search.includes('preload_n=2&')")
-    reader.page.get_by_role("link", name="The stress under this sphere").click()
-    reader.drawn(2)
-    assert told(reader)[0] == "2 N"
-    assert reader.page.get_by_label("sphere radius R").input_value() == "4"
+@pytest.mark.soak
+def test_design_leads_there_with_its_sliders(visitor: Visit) -> None:
+    visitor.go("/design")
+    visitor.drawn(2)
+    with visitor.page.expect_response("**/design/answer?*"):
+        visitor.page.locator("#preload_n").fill("2")
+    visitor.page.wait_for_function("() => document.querySelector('[data-query]').search.includes('preload_n=2&')")
+    visitor.page.get_by_role("link", name="The stress under this sphere").click()
+    visitor.drawn(2)
+    assert told(visitor)[0] == "2 N"
+    assert visitor.page.get_by_label("sphere radius R").input_value() == "4"
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-def test_loads_show_the_base_and_lead_to_each_sphere(reader: Visit, width: int) -> None:
-    reader.page.set_viewport_size({"width": width, "height": 844})
-    reader.go("/loads?loads=0 0 4 1%0A%0A12 8 10 2")
-    reader.drawn(2)
-    reader.require_accessible()
-    assert reader.page.evaluate("document.documentElement.scrollWidth") <= width
-    figure = reader.page.locator("#figure-base")
-    shown = trace(reader, "base")
-    numbers = reader.page.request.get(
-        reader.address + str(figure.get_by_role("link", name="CSV").get_attribute("href"))
+@pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
+def test_loads_show_the_base_and_lead_to_each_sphere(visitor: Visit, width: int) -> None:
+    visitor.page.set_viewport_size({"width": width, "height": 844})
+    visitor.go("/loads?loads=0 0 4 1%0A%0A12 8 10 2")
+    visitor.drawn(2)
+    visitor.require_accessible()
+    assert visitor.page.evaluate("document.documentElement.scrollWidth") <= width
+    figure = visitor.page.locator("#figure-base")
+    shown = trace(visitor, "base")
+    numbers = visitor.page.request.get(
+        visitor.address + str(figure.get_by_role("link", name="CSV").get_attribute("href"))
     )
     rows = list(csv.DictReader(numbers.text().splitlines()))
     lowest = min(rows, key=lambda row: float(row["sigma_zz_mpa"]))
     assert -float(lowest["sigma_zz_mpa"]) == pytest.approx(max(map(max, shown["z"])))
     assert (float(lowest["x_mm"]), float(lowest["y_mm"])) == pytest.approx((12.0, 8.0), abs=0.6)
     assert shown["zmin"] == 0  # nothing pulls
-    reader.page.get_by_role("link", name="load in line 3").click()
-    reader.drawn(2)
-    assert told(reader)[0] == "2 N"
-    assert reader.page.get_by_label("sphere radius R").input_value() == "10.0"
+    visitor.page.get_by_role("link", name="load in line 3").click()
+    visitor.drawn(2)
+    assert told(visitor)[0] == "2 N"
+    assert visitor.page.get_by_label("sphere radius R").input_value() == "10.0"
 
 
-def test_shear_pulls_and_gets_colours_with_0_in_the_middle(reader: Visit) -> None:
-    reader.go("/loads?loads=8 8 4 1 0.8 0")
-    reader.drawn(2)
-    shown = trace(reader, "base")
+@pytest.mark.soak
+def test_shear_pulls_and_gets_colours_with_0_in_the_middle(visitor: Visit) -> None:
+    visitor.go("/loads?loads=8 8 4 1 0.8 0")
+    visitor.drawn(2)
+    shown = trace(visitor, "base")
     assert shown["zmax"] == -shown["zmin"] > 0
     assert -min(map(min, shown["z"])) > 0.01 * shown["zmax"]
 
 
-def test_too_many_loads_are_not_drawn_on_the_base(reader: Visit) -> None:
+def test_too_many_loads_are_not_drawn_on_the_base(visitor: Visit) -> None:
     loads = "%0A".join(f"{8 * place} 0 4 0.1" for place in range(7))
-    reader.go(f"/loads?loads={loads}")
-    reader.drawn(1)
-    assert reader.page.locator("#figure-base").count() == 0
-    answer = reader.page.request.get(f"{reader.address}/loads/base.csv?loads={loads}")
+    visitor.go(f"/loads?loads={loads}")
+    visitor.drawn(1)
+    assert visitor.page.locator("#figure-base").count() == 0
+    answer = visitor.page.request.get(f"{visitor.address}/loads/base.csv?loads={loads}")
     assert answer.status == 422
     assert "at most 6" in answer.text()

@@ -2,17 +2,17 @@
 
 import csv
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.service.conftest import emptied
 from tests.service.pages.conftest import Visit
-from tests.service.pages.forms import BROWSING
+from tests.service.pages.forms import BROWSING, said
 from tests.service.pages.test_pages_array import place_of
 from tests.support.blocks import block
 from tests.support.diagnosed import diagnosed, report, resonant, sent
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 SKIN = "aged"
 
@@ -24,71 +24,49 @@ def recorded(document: dict[str, Any], day: str) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def aged(idle: Server) -> Server:
+def aged(server: Server) -> Server:
     """A skin whose campaigns arrived in another order than they were recorded, the last one of a block alone."""
     for document in (
         recorded(campaign("in September", sensors=4, thickness_mm=3.0), "2024-09-02"),
         recorded(campaign("in May", sensors=2), "2024-05-02"),
         block("the block", recorded_at="2024-11-02T09:00:00Z"),
     ):
-        idle.http.post(f"/v1/campaigns?skin={SKIN}", json=document).raise_for_status()
-    return idle
+        server.http.post(f"/v1/campaigns?skin={SKIN}", json=document).raise_for_status()
+    return server
 
 
 @pytest.mark.usefixtures("aged")
-def test_campaigns_are_in_the_order_of_recording(reader: Visit) -> None:
-    reader.go(f"/skins/{SKIN}")
-    names = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+def test_campaigns_are_in_the_order_of_recording(visitor: Visit) -> None:
+    visitor.go(f"/skins/{SKIN}")
+    names = visitor.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
     assert names == ["the block", "in September", "in May"]
-    reader.go("/")
-    assert "the block" in reader.page.get_by_role("row", name=SKIN).inner_text()
-
-
-def test_skins_are_in_the_order_of_recording_from_page_to_page(tmp_path: Path) -> None:
-    """Whatever the order they arrived in; a campaign over several days says so."""
-    with running(Place(tmp_path)) as server:
-        for number in range(30):
-            day = f"2022-{1 + 7 * number % 30 // 3:02d}-{1 + 7 * number % 30 % 3:02d}"
-            document = recorded(campaign(f"day {day}", sensors=1, lines=3), day)
-            server.http.post(f"/v1/campaigns?skin=skin-{day}", json=document).raise_for_status()
-        first = server.http.get("/", headers=BROWSING).text
-        link = re.search(r'href="(/\?find=[^"]*before=\d+)"', first)
-        assert link is not None
-        second = server.http.get(link[1].replace("&amp;", "&"), headers=BROWSING).text
-        seen = [re.findall(r'href="/skins/skin-(2022-[0-9-]+)"', page) for page in (first, second)]
-        days = [*dict.fromkeys(seen[0]), *dict.fromkeys(seen[1])]
-        assert [len(dict.fromkeys(one)) for one in seen] == [25, 5]
-        assert days == sorted(days, reverse=True)
-        document = recorded(campaign("two days", sensors=1, lines=3), "2022-05-03")
-        document["recordings"][1]["recorded_at"] = "2022-06-04T09:00:00Z"
-        kept = server.http.post("/v1/campaigns?skin=skin-2022-01-01", json=document).raise_for_status().json()
-        facts = server.http.get(f"/campaigns/{kept['id']}", headers=BROWSING).text.split('class="facts"')[1]
-        assert re.search(r"2022-05-03</time> to <time[^>]*>2022-06-04", facts)
+    visitor.go("/")
+    assert "the block" in visitor.page.get_by_role("row", name=SKIN).inner_text()
 
 
 @pytest.mark.usefixtures("aged")
-def test_a_block_leaves_the_skin_its_geometry_and_its_map(reader: Visit) -> None:
-    reader.go(f"/skins/{SKIN}")
-    reader.drawn(2)
-    facts = reader.page.locator(".facts").inner_text()
+def test_a_block_leaves_the_skin_its_geometry_and_its_map(visitor: Visit) -> None:
+    visitor.go(f"/skins/{SKIN}")
+    visitor.drawn(2)
+    facts = visitor.page.locator(".facts").inner_text()
     assert "3\xa0mm" in facts
     assert "16\xa0MPa" in facts
     assert facts.split("sensors")[1].split()[0] == "4"
-    assert "in September" in reader.page.locator("#figure-map figcaption").inner_text()
-    reader.require_accessible()
-    reader.page.get_by_role("link", name="Loads").last.click()
-    assert reader.page.get_by_label("thickness h").input_value() == "3"
-    reader.drawn(1)
-    assert reader.page.get_by_role("alert").count() == 0
+    assert "in September" in visitor.page.locator("#figure-map figcaption").inner_text()
+    visitor.require_accessible()
+    visitor.page.get_by_role("link", name="Loads").last.click()
+    assert visitor.page.get_by_label("thickness h").input_value() == "3"
+    visitor.drawn(1)
+    assert visitor.page.get_by_role("alert").count() == 0
 
 
-def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(idle: Server, reader: Visit) -> None:
+def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(server: Server, visitor: Visit) -> None:
     of_one = recorded(campaign("in October", sensors=1), "2026-10-01")
     for document in (recorded(campaign("in May", sensors=3), "2026-05-03"), of_one):
-        idle.http.post("/v1/campaigns?skin=parts", json=document).raise_for_status()
-    page = reader.page
-    reader.go("/skins/parts")
-    reader.drawn(2)
+        server.http.post("/v1/campaigns?skin=parts", json=document).raise_for_status()
+    page = visitor.page
+    visitor.go("/skins/parts")
+    visitor.drawn(2)
     assert "from 1 of 3 sensors" in page.locator(".facts").inner_text()
     about = page.locator("#figure-map figcaption").inner_text()
     assert "It tells of 1 of the 3 sensors. The hollow ones stand at their last value" in about
@@ -98,36 +76,56 @@ def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(idle: Server, rea
     page.mouse.click(*place_of(page.locator("#figure-map"), "s2"))
     page.wait_for_url("**sensor=s2*")
     assert "FRF of s2 in in May" in page.locator("#figure-frf figcaption").inner_text()
-    rows = list(csv.DictReader(idle.http.get("/skins/parts/map.csv", headers=BROWSING).text.splitlines()))
+    rows = list(csv.DictReader(server.http.get("/skins/parts/map.csv", headers=BROWSING).text.splitlines()))
     assert [row["absent"] for row in rows] == ["", old, old]
 
 
-def test_older_campaigns_are_on_the_pages_behind(idle: Server, reader: Visit) -> None:
+def test_older_campaigns_are_on_the_pages_behind(server: Server, visitor: Visit) -> None:
     for number in range(52):
         month, day = 1 + number // 28, 1 + number % 28
         document = recorded(campaign(f"n{number:02d}", sensors=1, lines=3), f"2023-{month:02d}-{day:02d}")
-        idle.http.post("/v1/campaigns?skin=many", json=document).raise_for_status()
-    reader.go("/skins/many?sensor=s0&show=trend")
-    first = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text()
-    seen = reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
-    reader.page.get_by_role("link", name="Earlier campaigns").click()
-    reader.page.wait_for_url("**before=*")
-    seen += reader.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+        server.http.post("/v1/campaigns?skin=many", json=document).raise_for_status()
+    visitor.go("/skins/many?sensor=s0&show=trend")
+    first = visitor.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text()
+    seen = visitor.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
+    visitor.page.get_by_role("link", name="Earlier campaigns").click()
+    visitor.page.wait_for_url("**before=*")
+    seen += visitor.page.get_by_role("region", name="Campaigns").locator("tbody th").all_inner_texts()
     assert seen == [f"n{number:02d}" for number in reversed(range(52))]
-    reader.page.get_by_role("link", name="Latest campaigns").click()
-    reader.page.wait_for_url(lambda address: "before=" not in address)
-    assert reader.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text() == first
-    assert reader.page.get_by_label("Sensor", exact=True).input_value() == "s0"
-    assert reader.page.get_by_label("Colour by").input_value() == "trend"
+    visitor.page.get_by_role("link", name="Latest campaigns").click()
+    visitor.page.wait_for_url(lambda address: "before=" not in address)
+    assert visitor.page.get_by_role("region", name="Campaigns").locator("tbody th").first.inner_text() == first
+    assert visitor.page.get_by_label("Sensor", exact=True).input_value() == "s0"
+    assert visitor.page.get_by_label("Colour by").input_value() == "trend"
 
 
-def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(idle: Server, reader: Visit) -> None:
+def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(server: Server) -> None:
     earlier, last = (resonant(name) for name in ("May", "September"))
-    diagnosed(idle, earlier, report(), skin="half")
-    reader.go("/?find=half")
-    row = reader.page.get_by_role("row").filter(has_text="half")
-    assert "not diagnosed" not in row.inner_text()
-    sent(idle, last, "half")
-    reader.go("/?find=half")
-    assert "contact resonance" in row.inner_text()
-    assert "of May; the last campaign is not diagnosed" in row.inner_text()
+    diagnosed(server, earlier, report(), skin="half")
+    assert "not diagnosed" not in said(server, "/?find=half", "half")
+    sent(server, last, "half")
+    row = said(server, "/?find=half", "half")
+    assert "contact resonance" in row
+    assert "of May; the last campaign is not diagnosed" in row
+
+
+def test_skins_are_in_the_order_of_recording_from_page_to_page(server: Server) -> None:
+    """Whatever the order they arrived in; a campaign over several days says so."""
+    emptied(server)
+    for number in range(30):
+        day = f"2022-{1 + 7 * number % 30 // 3:02d}-{1 + 7 * number % 30 % 3:02d}"
+        document = recorded(campaign(f"day {day}", sensors=1, lines=3), day)
+        server.http.post(f"/v1/campaigns?skin=skin-{day}", json=document).raise_for_status()
+    first = server.http.get("/", headers=BROWSING).text
+    link = re.search(r'href="(/\?find=[^"]*before=\d+)"', first)
+    assert link is not None
+    second = server.http.get(link[1].replace("&amp;", "&"), headers=BROWSING).text
+    seen = [re.findall(r'href="/skins/skin-(2022-[0-9-]+)"', page) for page in (first, second)]
+    days = [*dict.fromkeys(seen[0]), *dict.fromkeys(seen[1])]
+    assert [len(dict.fromkeys(one)) for one in seen] == [25, 5]
+    assert days == sorted(days, reverse=True)
+    document = recorded(campaign("two days", sensors=1, lines=3), "2022-05-03")
+    document["recordings"][1]["recorded_at"] = "2022-06-04T09:00:00Z"
+    kept = server.http.post("/v1/campaigns?skin=skin-2022-01-01", json=document).raise_for_status().json()
+    facts = server.http.get(f"/campaigns/{kept['id']}", headers=BROWSING).text.split('class="facts"')[1]
+    assert re.search(r"2022-05-03</time> to <time[^>]*>2022-06-04", facts)

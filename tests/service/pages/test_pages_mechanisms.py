@@ -1,70 +1,72 @@
 """The catalogue on its page: pictures, twins, where each law was found; the lab's own, kept, left out, discarded."""
 
 import re
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 
+import underskin
 from service.store import database, diagnosed_together, diagnoses
 from service.usecases.mechanism_findings import findings
-from tests.service.pages.conftest import Visit, visit
-from tests.service.routes.test_mechanisms import SEVERAL, WARM, warmed
+from tests.service.pages.conftest import Visit
+from tests.service.routes.test_mechanisms import WARM, warmed
+from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, resonant, sent, table
-from tests.support.store_server import Place, Server, running
+from tests.support.lean_reports import beside
+from tests.support.store_server import Server
 from underskin import __version__
 from underskin.mechanisms.registry import built_in
+from underskin.recordings.campaign import parse
 
 
 def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_without_it(
-    browser: Browser, tmp_path: Path
+    visitor: Visit, server: Server
 ) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    with running(Place(folder), **SEVERAL) as server:
-        campaign_id = sent(server, warmed())
-        for visitor in visit(browser, server):
-            page = visitor.page
-            visitor.go(f"/campaigns/{campaign_id}")
-            page.get_by_role("button", name="Diagnose").click()
-            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=240_000)
-            page.get_by_label("Name", exact=False).first.fill("Warm Amplifier")
-            page.get_by_role("button", name="Keep it").click()  # which the browser refuses: capitals and a blank
-            page.get_by_label("Name", exact=False).first.fill("warm_amplifier")
-            page.get_by_label("What it is").fill("The gain follows the temperature.")
-            page.get_by_role("button", name="Keep it").click()
-            page.wait_for_url("**/mechanisms")
-            own = page.get_by_role("region", name="The lab's own")
-            expect(own.get_by_role("heading", name="Warm amplifier")).to_be_visible()
-            expect(own.get_by_text("The gain follows the temperature.", exact=True)).to_be_visible()
-            expect(page.get_by_role("row", name="adhesion")).to_be_visible()
-            _require_accessible_at_both_widths(visitor)
+    page = visitor.page
+    found = underskin.diagnose(parse(warmed()), table(), without=beside())
+    _, diagnosis_id = diagnosed(server, warmed(), found.document, "warmed")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
+    page.get_by_role("heading", name="Keep this law under a name").wait_for()
+    page.get_by_label("Name", exact=False).first.fill("Warm Amplifier")
+    page.get_by_role("button", name="Keep it").click()  # which the browser refuses: capitals and a blank
+    page.get_by_label("Name", exact=False).first.fill("warm_amplifier")
+    page.get_by_label("What it is").fill("The gain follows the temperature.")
+    page.get_by_role("button", name="Keep it").click()
+    page.wait_for_url("**/mechanisms")
+    own = page.get_by_role("region", name="The lab's own")
+    expect(own.get_by_role("heading", name="Warm amplifier")).to_be_visible()
+    expect(own.get_by_text("The gain follows the temperature.", exact=True)).to_be_visible()
+    expect(page.get_by_role("row", name="adhesion")).to_be_visible()
+    _require_accessible_at_both_widths(visitor)
 
-            visitor.go(f"/campaigns/{campaign_id}")
-            page.get_by_role("button", name="Diagnose").first.click()
-            page.get_by_role("heading", name="Suppose that it is not").wait_for(timeout=240_000)
-            _require_accessible_at_both_widths(visitor)
-            page.get_by_role("button", name="Without warm amplifier").click()
-            page.get_by_text("Supposed that it is not warm amplifier").wait_for()
-            page.get_by_role("heading", name="Keep this law under a name").wait_for(timeout=240_000)
+    own_law = {**report()["mechanisms"][0], "name": "warm_amplifier"}
+    named = {**report(), "mechanisms": [own_law]}
+    _, diagnosis_id = diagnosed(server, {**warmed(), "name": "again"}, named, "warmed")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
+    page.get_by_role("heading", name="Suppose that it is not").wait_for()
+    _require_accessible_at_both_widths(visitor)
+    page.get_by_role("button", name="Without warm amplifier").click()
+    page.get_by_text("Supposed that it is not warm amplifier").wait_for()
+    page.get_by_role("button", name="Cancel").click()
+    page.get_by_text("It was cancelled").wait_for()
 
-            page.get_by_role("link", name="Mechanisms", exact=True).click()
-            page.get_by_role("button", name="Discard warm amplifier").click()
-            expect(page.get_by_text("There is none yet.")).to_be_visible()
+    page.get_by_role("link", name="Mechanisms", exact=True).click()
+    page.get_by_role("button", name="Discard warm amplifier").click()
+    expect(page.get_by_text("There is none yet.")).to_be_visible()
 
 
 def _require_accessible_at_both_widths(visitor: Visit) -> None:
-    for width in (390, 1280):
+    for width in first(1, (390, 1280)):
         visitor.page.set_viewport_size({"width": width, "height": 900})
         assert visitor.page.evaluate("document.documentElement.scrollWidth") <= width
         visitor.require_accessible()
 
 
-def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server, reader: Visit) -> None:
-    campaign_id, diagnosis_id = diagnosed(idle, resonant("swinging"), report(), skin="found")
-    page = reader.page
-    reader.go("/mechanisms")
+def test_each_law_has_its_picture_its_twins_and_where_it_was_found(server: Server, visitor: Visit) -> None:
+    campaign_id, diagnosis_id = diagnosed(server, resonant("swinging"), report(), skin="found")
+    page = visitor.page
+    visitor.go("/mechanisms")
     law = page.locator("#contact_resonance")
     expect(law.get_by_text(re.compile("Found in 1 of "))).to_be_visible()
     expect(law.get_by_role("link", name="swinging", exact=True)).to_have_attribute("href", f"/campaigns/{campaign_id}")
@@ -80,7 +82,7 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server,
         image.scroll_into_view_if_needed()
     page.wait_for_function("() => [...document.images].every(one => one.complete && one.naturalWidth > 0)")
     assert page.locator("img.picture").count() == len(built_in())
-    _require_accessible_at_both_widths(reader)
+    _require_accessible_at_both_widths(visitor)
     page.get_by_role("row", name="ageing").get_by_role("link").press("Enter")  # the table leads to each by keyboard
     page.wait_for_url("**/mechanisms#ageing")
     expect(page.locator("#ageing")).to_be_in_viewport()
@@ -88,9 +90,9 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(idle: Server,
     page.wait_for_url(f"**/diagnoses/{diagnosis_id}")
 
 
-@pytest.mark.parametrize("verdict", ["ambiguous", "unexplained"])
+@pytest.mark.parametrize("verdict", first(1, ["ambiguous", "unexplained"]))
 def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(
-    idle: Server, reader: Visit, verdict: str
+    server: Server, visitor: Visit, verdict: str
 ) -> None:
     counted = []
     for probability in (None, 0.9, 0.55):
@@ -98,29 +100,29 @@ def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(
             stated = [{**one, "probability": probability} for one in report()["mechanisms"]]
             made = {**report(), "verdict": verdict, "mechanisms": stated}
             name = f"{verdict} {probability}"
-            diagnosed(idle, resonant(name), made, skin=verdict)
-        found, _, possible = _row_of(reader, "Contact resonance").partition(", possible in ")
+            diagnosed(server, resonant(name), made, skin=verdict)
+        found, _, possible = _row_of(visitor, "Contact resonance").partition(", possible in ")
         counted.append((int(found), int(possible or 0)))
     (was_found, was_possible), *after = counted
     assert after == [(was_found + 1, was_possible), (was_found + 1, was_possible + 1)]
     more = f"Possible in {was_possible + 1} more, with less than 80 %"
-    expect(reader.page.locator("#contact_resonance").get_by_text(more)).to_be_visible()
+    expect(visitor.page.locator("#contact_resonance").get_by_text(more)).to_be_visible()
 
 
-def _row_of(reader: Visit, name: str) -> str:
+def _row_of(visitor: Visit, name: str) -> str:
     """In how many diagnoses the table says that it was found."""
-    reader.go("/mechanisms")
-    return reader.page.get_by_role("row", name=name).locator("td").last.inner_text()
+    visitor.go("/mechanisms")
+    return visitor.page.get_by_role("row", name=name).locator("td").last.inner_text()
 
 
-def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(idle: Server) -> None:
-    campaign_id, _ = diagnosed(idle, resonant("taken back"), report(), skin="back")
-    rows = idle.http.get("/mechanisms/contact_resonance/found.csv").text.splitlines()
+def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(server: Server) -> None:
+    campaign_id, _ = diagnosed(server, resonant("taken back"), report(), skin="back")
+    rows = server.http.get("/mechanisms/contact_resonance/found.csv").text.splitlines()
     assert rows[0] == "diagnosis,campaign,skin,name,ended_at,verdict,probability"
     assert [row.split(",")[1] for row in rows[1:]].count(campaign_id) == 1
-    answer = idle.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "another rig"})
+    answer = server.http.post(f"/v1/campaigns/{campaign_id}/withdraw", json={"reason": "another rig"})
     assert answer.status_code == 200, answer.text
-    left = idle.http.get("/mechanisms/contact_resonance/found.csv").text
+    left = server.http.get("/mechanisms/contact_resonance/found.csv").text
     assert campaign_id not in left
 
 
@@ -140,9 +142,7 @@ def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> 
         assert server.http.get(f"/mechanisms/cheese/{path}").status_code == 404
 
 
-def test_the_lab_s_own_stand_beside_with_their_files(browser: Browser, tmp_path: Path) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir()
+def test_the_lab_s_own_stand_beside_with_their_files(visitor: Visit, server: Server) -> None:
     damped = (
         WARM.replace("warm_amplifier", "long_cable")
         .replace("acts_on: gain", "acts_on: frequency_response")
@@ -150,27 +150,27 @@ def test_the_lab_s_own_stand_beside_with_their_files(browser: Browser, tmp_path:
         .replace("1 + rise * (temperature_c - 23)", "1 / (1 + i * rise * frequency_hz)")
         .replace("low: -0.1", "low: 0")
     )
-    with running(Place(folder), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        for document in (WARM, damped):
-            answer = server.http.post("/v1/mechanisms", content=document, headers={"Content-Type": "application/yaml"})
-            assert answer.status_code == 201, answer.text
-        for visitor in visit(browser, server):
-            page = visitor.page
-            visitor.go("/mechanisms")
-            own = page.get_by_role("region", name="The lab's own")
-            warm, cable = own.locator("#warm_amplifier"), own.locator("#long_cable")
-            expect(warm.get_by_text("No picture on the reference rig: not every recording has")).to_be_visible()
-            expect(cable.locator("img.picture")).to_be_visible()
-            warm.get_by_text("Its file").press("Enter")
-            assert warm.locator("pre").inner_text().strip() == WARM.strip()
-            _require_accessible_at_both_widths(visitor)
-        assert server.http.get("/mechanisms/warm_amplifier/picture.svg").status_code == 404
+    for document in (WARM, damped):
+        answer = server.http.post("/v1/mechanisms", content=document, headers={"Content-Type": "application/yaml"})
+        assert answer.status_code == 201, answer.text
+    page = visitor.page
+    visitor.go("/mechanisms")
+    own = page.get_by_role("region", name="The lab's own")
+    warm, cable = own.locator("#warm_amplifier"), own.locator("#long_cable")
+    expect(warm.get_by_text("No picture on the reference rig: not every recording has")).to_be_visible()
+    expect(cable.locator("img.picture")).to_be_visible()
+    warm.get_by_text("Its file").press("Enter")
+    assert warm.locator("pre").inner_text().strip() == WARM.strip()
+    _require_accessible_at_both_widths(visitor)
+    assert server.http.get("/mechanisms/warm_amplifier/picture.svg").status_code == 404
+    for name in ("warm_amplifier", "long_cable"):
+        server.http.delete(f"/v1/mechanisms/{name}").raise_for_status()
 
 
-def test_campaigns_diagnosed_together_count_once(idle: Server) -> None:
+def test_campaigns_diagnosed_together_count_once(server: Server) -> None:
     """A diagnosis of two of three, then of all three, then of two of them again."""
-    sent_ids = [sent(idle, resonant(f"counted {number}"), "counted") for number in range(3)]
-    store = database(idle.place.database_url, idle.place.folder)
+    sent_ids = [sent(server, resonant(f"counted {number}"), "counted") for number in range(3)]
+    store = database(server.place.database_url, server.place.folder)
     with store.writing() as connection:
         members = diagnosed_together.usable(connection, "counted")
         assert [one.campaign_id for one in members] == sent_ids

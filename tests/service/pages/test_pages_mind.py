@@ -9,11 +9,11 @@ from tests.support.diagnosed import asked, diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
 
 
-def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    kept = idle.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
-    before = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
-    reader.go(f"/campaigns/{kept['id']}")
+def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    kept = server.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
+    before = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
+    visitor.go(f"/campaigns/{kept['id']}")
     page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("s1-2N")
@@ -25,10 +25,10 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     assert "excluded by Maria <i>B</i>: cable <b>loose</b>" in row.inner_text()
     page.get_by_text("What was changed here").click()
     assert "by Maria <i>B</i>" in page.locator(".changes").inner_text()
-    after = idle.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
+    after = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
     assert after != before
     assert f"{after:.3g}" in page.locator(".result").inner_text()
-    reader.require_accessible()
+    visitor.require_accessible()
     page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     withdraw = page.locator("form", has=page.get_by_role("button", name="Withdraw the campaign"))
     withdraw.get_by_label("Reason").fill("wrong sphere")
@@ -36,11 +36,11 @@ def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(reader: Vi
     page.get_by_text("Withdrawn").first.wait_for()
     assert "wrong sphere. Figures do not use it" in page.get_by_role("status").inner_text()
     assert page.get_by_role("button", name="Diagnose").count() == 0
-    reader.require_accessible()
-    reader.go("/skins/mind")
+    visitor.require_accessible()
+    visitor.go("/skins/mind")
     assert "withdrawn: wrong sphere" in page.get_by_role("row", name="a loose cable").inner_text()
-    reader.require_accessible()
-    reader.go("/")
+    visitor.require_accessible()
+    visitor.go("/")
     assert "none in use" in page.get_by_role("row", name="mind").inner_text()
 
 
@@ -58,10 +58,10 @@ def test_a_key_tells_who_it_is_whatever_is_typed(locked: tuple[Server, dict[str,
     assert server.http.get(f"/v1/campaigns/{kept}").json()["withdrawn_from"] == "the writeer"
 
 
-def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    kept = idle.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
-    reader.go(f"/campaigns/{kept['id']}")
+def test_a_recording_that_is_not_there_is_said_so(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    kept = server.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
+    visitor.go(f"/campaigns/{kept['id']}")
     page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("s9")
@@ -71,18 +71,18 @@ def test_a_recording_that_is_not_there_is_said_so(reader: Visit, idle: Server) -
     assert "s9" in said.inner_text()
     expect(said).to_be_focused()  # far below the top of the page
     expect(said).to_be_in_viewport()
-    reader.require_accessible()
-    reader.wrong.clear()  # the browser says so of every 404
+    visitor.require_accessible()
+    visitor.wrong.clear()  # the browser says so of every 404
     page.go_back()
     assert "in use" in page.get_by_role("row", name="s0-1N").inner_text()
 
 
-def test_who_undoes_is_asked_without_keys(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    kept = idle.http.post("/v1/campaigns?skin=hasty", json=campaign("hasty")).raise_for_status().json()
+def test_who_undoes_is_asked_without_keys(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    kept = server.http.post("/v1/campaigns?skin=hasty", json=campaign("hasty")).raise_for_status().json()
     place = f"/campaigns/{kept['id']}"
-    idle.http.post(f"/v1{place}/exclusions", json={"recording": "s0-1N", "reason": "cable"}).raise_for_status()
-    reader.go(place)
+    server.http.post(f"/v1{place}/exclusions", json={"recording": "s0-1N", "reason": "cable"}).raise_for_status()
+    visitor.go(place)
     page.get_by_text("What was changed here: 1").click()
     changes = page.locator(".changes")
     name = changes.get_by_label("Your name")
@@ -92,64 +92,64 @@ def test_who_undoes_is_asked_without_keys(reader: Visit, idle: Server) -> None:
     changes.get_by_role("button", name="Undo").click()
     page.get_by_text("What was changed here: 2").click()
     expect(changes.get_by_text("by Mara")).to_be_visible()
-    assert idle.http.get(f"/v1{place}").json()["excluded"] == 0
+    assert server.http.get(f"/v1{place}").json()["excluded"] == 0
 
 
-def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(idle: Server) -> None:
-    kept = idle.http.post("/v1/campaigns?skin=bare", json=campaign("bare", sensors=1)).json()
+def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(server: Server) -> None:
+    kept = server.http.post("/v1/campaigns?skin=bare", json=campaign("bare", sensors=1)).json()
     place = f"/campaigns/{kept['id']}"
 
     def page_after(path: str, **sent: str) -> str:
-        idle.http.post(f"/v1{path}", json=sent).raise_for_status()
-        return idle.http.get(place, headers=BROWSING).text
+        server.http.post(f"/v1{path}", json=sent).raise_for_status()
+        return server.http.get(place, headers=BROWSING).text
 
     assert "Where there is no Undo" not in page_after(f"{place}/exclusions", recording="s0-1N", reason="cable")
     both = page_after(f"{place}/exclusions", recording="s0-2N", reason="cable")
     assert "No d33 and no modulus: all its recordings are excluded." in both
     assert "Where there is no Undo, something builds on it: a later change" in both
     assert "An excluded recording comes back with a corrected version" in both
-    latest, _ = idle.http.get(f"/v1{place}/changes").json()["changes"]
+    latest, _ = server.http.get(f"/v1{place}/changes").json()["changes"]
     one = page_after(f"/changes/{latest['id']}/undo")
     assert "are excluded" not in one
     assert "Where there is no Undo" not in one
-    waiting = asked(idle, kept["id"])
-    assert "Where there is no Undo" in idle.http.get(place, headers=BROWSING).text
-    idle.http.delete(f"/v1/diagnoses/{waiting}").raise_for_status()  # so that no other test here claims it
+    waiting = asked(server, kept["id"])
+    assert "Where there is no Undo" in server.http.get(place, headers=BROWSING).text
+    server.http.delete(f"/v1/diagnoses/{waiting}").raise_for_status()  # so that no other test here claims it
 
 
-def test_an_excluded_recording_takes_the_model_out_of_force(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    campaign_id, diagnosis_id = diagnosed(idle, resonant("explained"), report(), "adopts")
-    reader.go(f"/diagnoses/{diagnosis_id}")
+def test_an_excluded_recording_takes_the_model_out_of_force(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    campaign_id, diagnosis_id = diagnosed(server, resonant("explained"), report(), "adopts")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
     page.get_by_role("link", name="Adopt", exact=True).click()
     page.get_by_role("button", name="Adopt this model").click()
     page.wait_for_url("**/skins/adopts?model=adopted")
     assert "In force: contact resonance" in page.get_by_role("region", name="Adopted model").inner_text()
-    reader.go(f"/campaigns/{campaign_id}")
+    visitor.go(f"/campaigns/{campaign_id}")
     page.get_by_text("Exclude a recording, or correct or withdraw the campaign").click()
     exclude = page.locator("form", has=page.get_by_role("button", name="Exclude", exact=True))
     exclude.get_by_label("Recording").fill("r0")
     exclude.get_by_label("Reason").fill("cable loose")
     exclude.get_by_role("button", name="Exclude").click()
     page.get_by_text("1 excluded").wait_for()
-    reader.go("/skins/adopts?model=adopted")
+    visitor.go("/skins/adopts?model=adopted")
     assert "is outdated and serves no figures" in page.get_by_role("status").inner_text()
     assert "by the paper's model" in page.locator("#figure-history figcaption").inner_text()
-    reader.go(f"/diagnoses/{diagnosis_id}")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
     assert "recordings were excluded since" in page.get_by_role("status").first.inner_text()
     assert page.get_by_role("button", name="Adopt this model").count() == 0
 
 
-def test_an_ambiguous_diagnosis_names_its_rivals_and_what_would_settle_it(reader: Visit, idle: Server) -> None:
-    page = reader.page
+def test_an_ambiguous_diagnosis_names_its_rivals_and_what_would_settle_it(visitor: Visit, server: Server) -> None:
+    page = visitor.page
     rivals = [
         {"mechanisms": ["timing_delay"], "probability": 0.41, "why_not": "the recordings hardly tell it apart"},
         {"mechanisms": ["none_of_these"], "probability": 0.03, "why_not": "a smooth discrepancy explains less"},
     ]
     said = "Best explained by contact_resonance (56 %), but these rivals remain: timing delay (41 %)."
     found = {**report(), "verdict": "ambiguous", "probability": 0.56, "alternatives": rivals, "statement": said}
-    _, diagnosis_id = diagnosed(idle, resonant("two ways"), found, "ambiguous")
-    reader.go(f"/diagnoses/{diagnosis_id}")
+    _, diagnosis_id = diagnosed(server, resonant("two ways"), found, "ambiguous")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
     assert "Best explained by contact resonance (56 %)" in page.locator(".first").inner_text()
     assert "several explanations remain · probability 56 %" in page.locator(".verdict").inner_text()
     page.get_by_role("heading", name="What the model lacks, and").click()  # which is folded below the summary
@@ -159,6 +159,6 @@ def test_an_ambiguous_diagnosis_names_its_rivals_and_what_would_settle_it(reader
     assert (
         "It cannot be adopted as the skin's model: several explanations remain" in page.get_by_role("main").inner_text()
     )
-    reader.require_accessible()
-    answer = idle.http.post("/v1/skins/ambiguous/model", json={"diagnosis_id": diagnosis_id})
+    visitor.require_accessible()
+    answer = server.http.post("/v1/skins/ambiguous/model", json={"diagnosis_id": diagnosis_id})
     assert (answer.status_code, "several explanations remain" in answer.json()["detail"]) == (422, True)

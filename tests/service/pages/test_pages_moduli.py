@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import said
 from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, sent
 from tests.support.pressed_curves import pressed
@@ -32,21 +33,21 @@ def declared(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_the_modulus_under_the_answer_is_the_first_to_quote(reader: Visit, idle: Server, width: int) -> None:
-    page = reader.page
+def test_the_modulus_under_the_answer_is_the_first_to_quote(visitor: Visit, server: Server, width: int) -> None:
+    page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
     skin = f"moduli{width}"
-    campaign_id, diagnosis_id = diagnosed(idle, declared(skin), of_curves("explained"), skin)
-    reader.go(f"/campaigns/{campaign_id}")
-    said = page.locator("main").inner_text()
-    assert "Young's modulus, declared" in said
-    first = said.index("Quote this one first: 1.75 MPa (95 %: 1.65 to 1.85), under the answer of the latest diagnosis")
-    assert first < said.index("Each recording alone, by least squares of the plain law")
-    assert "The declared 2.5 MPa is what was entered with the skin; it was not measured here." in said.replace(
+    campaign_id, diagnosis_id = diagnosed(server, declared(skin), of_curves("explained"), skin)
+    visitor.go(f"/campaigns/{campaign_id}")
+    told = page.locator("main").inner_text()
+    assert "Young's modulus, declared" in told
+    quoted = told.index("Quote this one first: 1.75 MPa (95 %: 1.65 to 1.85), under the answer of the latest diagnosis")
+    assert quoted < told.index("Each recording alone, by least squares of the plain law")
+    assert "The declared 2.5 MPa is what was entered with the skin; it was not measured here." in told.replace(
         "\xa0", " "
     )
-    reader.require_accessible()
-    reader.go(f"/diagnoses/{diagnosis_id}")
+    visitor.require_accessible()
+    visitor.go(f"/diagnoses/{diagnosis_id}")
     assert "Young's modulus under this answer 1.75 MPa" in page.locator(".summary").inner_text()
     page.get_by_text("How well the models describe").click()
     rows = page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr").all_inner_texts()
@@ -56,30 +57,26 @@ def test_the_modulus_under_the_answer_is_the_first_to_quote(reader: Visit, idle:
     ]  # fmt: skip
     assert [row.split("\t")[1] for row in rows] == ["1.75", "2.25", "2.375"]
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    reader.require_accessible()
+    visitor.require_accessible()
 
 
-def test_no_modulus_is_quoted_before_an_answer_is_settled(reader: Visit, idle: Server) -> None:
-    campaign_id, diagnosis_id = diagnosed(idle, declared("open"), of_curves("ambiguous"), "open")
-    bare = sent(idle, declared("bare"), "bare")
+def test_no_modulus_is_quoted_before_an_answer_is_settled(server: Server) -> None:
+    campaign_id, diagnosis_id = diagnosed(server, declared("open"), of_curves("ambiguous"), "open")
+    bare = sent(server, declared("bare"), "bare")
     for one in (campaign_id, bare):
-        reader.go(f"/campaigns/{one}")
-        assert "Quote none of these yet" in reader.page.locator("main").inner_text()
-    reader.go(f"/diagnoses/{diagnosis_id}")
-    assert "No Young's modulus yet" in reader.page.locator(".summary").inner_text()
-    reader.page.get_by_text("How well the models describe").click()
-    rows = reader.page.locator("table", has_text="Young's modulus [MPa]").locator("tbody tr")
-    assert rows.first.inner_text().startswith("Do not quote it yet")
+        assert "Quote none of these yet" in said(server, f"/campaigns/{one}")
+    page = said(server, f"/diagnoses/{diagnosis_id}")
+    assert "No Young's modulus yet" in page
+    assert "Do not quote it yet" in page
 
 
-def test_a_modulus_of_recordings_that_are_no_longer_in_use_is_not_quoted(reader: Visit, idle: Server) -> None:
+def test_a_modulus_of_recordings_that_are_no_longer_in_use_is_not_quoted(server: Server) -> None:
     document = to_dict(pressed(1e5, [2.0, 3.0]))
     document = {**document, "name": "changed", "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
-    campaign_id, _ = diagnosed(idle, document, of_curves("explained"), "changed")
+    campaign_id, _ = diagnosed(server, document, of_curves("explained"), "changed")
     left_out = {"recording": document["recordings"][0]["id"], "reason": "the sample slid"}
-    idle.http.post(f"/v1/campaigns/{campaign_id}/exclusions", json=left_out).raise_for_status()
-    reader.go(f"/campaigns/{campaign_id}")
-    said = reader.page.locator("main").inner_text()
-    assert "mismatch explained" in said
-    assert "(outdated)" in said
-    assert "Quote none of these yet" in said
+    server.http.post(f"/v1/campaigns/{campaign_id}/exclusions", json=left_out).raise_for_status()
+    page = said(server, f"/campaigns/{campaign_id}")
+    assert "mismatch explained" in page
+    assert "(outdated)" in page
+    assert "Quote none of these yet" in page

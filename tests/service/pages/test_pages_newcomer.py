@@ -8,21 +8,21 @@ from tests.support.store_server import Server
 SKIN = "my-first"
 
 
-def test_from_the_start_to_a_history_by_the_adopted_model(visitor: Visit, server: Server) -> None:
-    page = visitor.page
-    visitor.go("/")
+def test_from_the_start_to_a_history_by_the_adopted_model(patient: Visit, diagnosing: Server) -> None:
+    page = patient.page
+    patient.go("/")
     page.get_by_role("button", name="Load the example skin").click()
     page.wait_for_url("**/skins/example")
 
     page.get_by_role("link", name="Upload").first.click()
-    visitor.require_accessible()
+    patient.require_accessible()
     page.get_by_label("Files").set_input_files(
         {"name": "broken.tdms", "mimeType": "", "buffer": frf_tdms(resonant("x"))[:400]}
     )
     page.get_by_role("button", name="Look at them").click()
     page.get_by_text("No recording understood yet").wait_for()
     assert "cannot be read" in page.get_by_role("main").inner_text()
-    visitor.require_accessible()
+    patient.require_accessible()
     page.get_by_role("button", name="Discard").click()
 
     document = resonant("array", lines=30)
@@ -30,8 +30,8 @@ def test_from_the_start_to_a_history_by_the_adopted_model(visitor: Visit, server
     page.get_by_label("Skin").fill(SKIN)
     page.get_by_role("button", name="Look at them").click()
     page.get_by_text("does not say what they are").wait_for()
-    visitor.drawn(1)  # as it came
-    visitor.require_accessible()
+    patient.drawn(1)  # as it came
+    patient.require_accessible()
     assert page.get_by_label("What Frequency is").input_value() == "frequency_hz"  # by its unit
     page.get_by_label("What FRF imaginary is").select_option("frf_im_pc_per_n")
     page.get_by_label("thickness h").fill("2,5")
@@ -41,22 +41,22 @@ def test_from_the_start_to_a_history_by_the_adopted_model(visitor: Visit, server
     page.get_by_label("dynamic force", exact=False).first.fill("0.05")
     page.get_by_role("button", name="Read it with these settings").click()
     page.get_by_text("12 recordings understood").wait_for()
-    visitor.drawn(2)  # and its FRFs
-    visitor.require_accessible()
-    assert server.http.get(f"/v1/skins/{SKIN}").status_code == 404  # nothing is kept yet
+    patient.drawn(2)  # and its FRFs
+    patient.require_accessible()
+    assert diagnosing.http.get(f"/v1/skins/{SKIN}").status_code == 404  # nothing is kept yet
     page.get_by_role("button", name="Keep 12 recordings").click()
 
     page.wait_for_url("**/campaigns/*")
-    visitor.drawn(4)
+    patient.drawn(4)
     page.get_by_role("button", name="Diagnose").click()
-    page.get_by_role("button", name="Adopt this model").wait_for(timeout=240_000)
-    visitor.drawn(4)
-    visitor.require_accessible()
+    page.get_by_role("button", name="Adopt this model").wait_for()
+    patient.drawn(4)
+    patient.require_accessible()
     page.get_by_role("button", name="Adopt this model").click()
 
     page.wait_for_url(f"**/skins/{SKIN}?model=adopted")
-    visitor.drawn(2)
-    visitor.require_accessible()
+    patient.drawn(2)
+    patient.require_accessible()
     with page.expect_download() as saving:
         page.locator("#figure-history").get_by_role("link", name="CSV").click()
     rows = saving.value.path().read_text().splitlines()

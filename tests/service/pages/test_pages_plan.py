@@ -6,31 +6,36 @@ import re
 from pathlib import Path
 from typing import Any
 
-import httpx
 import pytest
 from openpyxl import load_workbook
 
-from tests.diagnosis.test_diagnosis_plan import NARROW
+import underskin
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING
-from tests.support.diagnosed import asked, awaited, diagnosed, report, resonant, sent, table
-from tests.support.diagnosis_campaigns import campaign
+from tests.support.diagnosed import diagnosed, report, resonant, sent, table
+from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import beside
 from tests.support.store_server import Server
-from underskin.diagnosis.pipeline import diagnose
+from underskin import Client
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.wording import readable
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import to_dict
 
+pytestmark = pytest.mark.server
+NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=2, gain=0.01)
 LIMITS = RigLimits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
+WITHOUT = beside("modulus_error", "thickness_error")
 
 
 @pytest.fixture(scope="module")
-def diagnosis_id(server: Server) -> str:
+def diagnosis_id(diagnosing: Server) -> str:
     """Of a campaign that leaves several explanations."""
-    found = str(asked(server, sent(server, to_dict(campaign(NARROW, table())), "narrow")))
-    assert awaited(server, found)["report"]["next_experiment"] is not None
-    return found
+    with Client(str(diagnosing.http.base_url)) as client:
+        campaign_id = sent(diagnosing, to_dict(campaign(NARROW, table())), "narrow")
+        found = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=WITHOUT)["id"])
+    assert found["report"]["next_experiment"] is not None
+    return str(found["id"])
 
 
 def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dict[str, Any]]) -> None:
@@ -60,35 +65,35 @@ def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dic
 
 
 def test_the_next_experiment_is_planned_within_the_reader_s_rig(
-    visitor: Visit, server: Server, diagnosis_id: str
+    patient: Visit, diagnosing: Server, diagnosis_id: str
 ) -> None:
-    expected = diagnose(campaign(NARROW, table()), table(), limits=LIMITS).next_experiment
-    page = visitor.page
-    visitor.go(f"/diagnoses/{diagnosis_id}")
+    expected = underskin.diagnose(campaign(NARROW, table()), table(), limits=LIMITS, without=WITHOUT)["next_experiment"]
+    page = patient.page
+    patient.go(f"/diagnoses/{diagnosis_id}")
     page.get_by_label("lowest preload").fill("0.3")
     page.get_by_label("radii of the spheres at hand").fill("4, 8")
     page.get_by_label("recordings at most").fill("5")
     page.get_by_role("button", name="Plan the next recordings").click()
     assert "lowest and highest preload [N] – give both" in page.get_by_role("alert").inner_text()
-    visitor.require_accessible()
+    patient.require_accessible()
     page.get_by_label("highest preload").fill("2.5")
     page.get_by_role("button", name="Plan the next recordings").click()
-    page.get_by_role("progressbar", name="How far the plan is").wait_for()
-    visitor.require_accessible()
     plan = page.get_by_role("region", name="The plan")
-    plan.wait_for(timeout=240_000)  # without reloading by hand
+    page.get_by_role("progressbar", name="How far the plan is").or_(plan).first.wait_for()
+    patient.require_accessible()
+    plan.wait_for()  # without reloading by hand
     assert readable(expected["statement"]) in plan.inner_text()
     assert plan.locator("tbody tr").count() == len(expected["recordings"])
     assert "None of them has arrived yet." in plan.inner_text()
-    visitor.require_accessible()
+    patient.require_accessible()
     page.set_viewport_size({"width": 390, "height": 844})
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    visitor.require_accessible()
+    patient.require_accessible()
     rows = plan.get_by_role("region", name="Recordings to make")
     assert rows.evaluate("table => table.scrollWidth <= table.clientWidth")
     page.set_viewport_size({"width": 1280, "height": 844})
     assert rows.evaluate("table => table.scrollWidth <= table.clientWidth")
-    _ticked_off_as_they_arrive(visitor, server, expected["recordings"])
+    _ticked_off_as_they_arrive(patient, diagnosing, expected["recordings"])
     page.get_by_text("The same by request").click()
     command = page.get_by_label("Shell").inner_text()
     assert "--preload-n 0.3 2.5 --indenter-radius-mm 4.0 --indenter-radius-mm 8.0 --recordings 5" in command
@@ -110,14 +115,15 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(
     ],
 )
 def test_limits_that_no_rig_has_are_refused(
-    server: Server, diagnosis_id: str, query: dict[str, str], told: str
+    diagnosing: Server, diagnosis_id: str, query: dict[str, str], told: str
 ) -> None:
-    place = f"{server.http.base_url}/diagnoses/{diagnosis_id}/plan"
-    shown = httpx.get(place, params=query, headers=BROWSING, timeout=60).text
+    shown = diagnosing.http.get(f"/diagnoses/{diagnosis_id}/plan", params=query, headers=BROWSING).text
     assert re.search(told, shown) is not None, shown
 
 
-def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, idle: Server, tmp_path: Path) -> None:
+def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(
+    visitor: Visit, server: Server, tmp_path: Path
+) -> None:
     first = {"sensor": "s1", "indenter_radius_mm": 4.0, "preload_n": 3.0, "position_mm": [0.0, 2.5], "repeats": 2}
     recordings = [first, {**first, "sensor": "=s2", "dwell_s": 60.0, "repeats": 1}]
     planned = {
@@ -125,19 +131,19 @@ def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, 
         "statement": "2 recordings should tell.",
     }  # fmt: skip
     found = {**report(), "verdict": "ambiguous", "next_experiment": planned}
-    _, diagnosis_id = diagnosed(idle, resonant("planned"), found, "planned")
-    reader.go(f"/diagnoses/{diagnosis_id}")
-    own = reader.page.get_by_role("region", name="The planned recordings, as they arrive")
+    _, diagnosis_id = diagnosed(server, resonant("planned"), found, "planned")
+    visitor.go(f"/diagnoses/{diagnosis_id}")
+    own = visitor.page.get_by_role("region", name="The planned recordings, as they arrive")
     assert own.locator("tbody tr").count() == 2
-    with reader.page.expect_download() as saving:
+    with visitor.page.expect_download() as saving:
         own.get_by_role("link", name="YAML of recording 1").click()
     assert rig_description.parse(saving.value.path().read_bytes(), "rig.yaml").recording["preload_n"] == 3.0
-    assert reader.page.request.get(f"{reader.page.url}/planned/3/rig.yaml").status == 404
-    reader.page.get_by_text("What to measure next").click()
+    assert visitor.page.request.get(f"{visitor.page.url}/planned/3/rig.yaml").status == 404
+    visitor.page.get_by_text("What to measure next").click()
     tables: dict[str, list[tuple[object, ...]]] = {}
     for kind in ("CSV", "XLSX"):
-        with reader.page.expect_download() as saving:
-            reader.page.locator("details", has_text="What to measure next").get_by_role("link", name=kind).click()
+        with visitor.page.expect_download() as saving:
+            visitor.page.locator("details", has_text="What to measure next").get_by_role("link", name=kind).click()
         assert saving.value.suggested_filename == f"{diagnosis_id}-plan.{kind.lower()}"
         content = saving.value.path().read_bytes()
         if kind == "CSV":
@@ -151,18 +157,18 @@ def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(reader: Visit, 
         ("'=s2", "4.0", "3.0", "0.0 2.5", "1", "60.0"),
     ]
     assert tables["XLSX"][1:] == [("s1", 4, 3, "0.0 2.5", 2, None), ("=s2", 4, 3, "0.0 2.5", 1, 60)]
-    reader.require_accessible()
-    with reader.page.expect_download() as saving:
-        reader.page.get_by_role("link", name="Save as one HTML file").click()
+    visitor.require_accessible()
+    with visitor.page.expect_download() as saving:
+        visitor.page.get_by_role("link", name="Save as one HTML file").click()
     saving.value.save_as(tmp_path / "report.html")
-    reader.page.goto((tmp_path / "report.html").as_uri())
-    section = reader.page.locator("details", has_text="What to measure next")
+    visitor.page.goto((tmp_path / "report.html").as_uri())
+    section = visitor.page.locator("details", has_text="What to measure next")
     section.locator("summary").click()
-    with reader.page.expect_download() as saving:
+    with visitor.page.expect_download() as saving:
         section.get_by_role("link", name="CSV").click()
     assert saving.value.suggested_filename == "plan.csv"
     saved = csv.reader(io.StringIO(saving.value.path().read_text("utf-8")))
     assert [tuple(row) for row in saved] == tables["CSV"]
-    reader.wrong.clear()  # the file itself is not of the server
-    without = diagnosed(idle, resonant("unplanned"), {**report(), "next_experiment": None}, "planned")[1]
-    assert idle.http.get(f"/diagnoses/{without}/planned.csv").status_code == 404
+    visitor.wrong.clear()  # the file itself is not of the server
+    without = diagnosed(server, resonant("unplanned"), {**report(), "next_experiment": None}, "planned")[1]
+    assert server.http.get(f"/diagnoses/{without}/planned.csv").status_code == 404

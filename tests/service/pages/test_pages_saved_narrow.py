@@ -7,8 +7,7 @@ import plotly.io
 import pytest
 
 from tests.service.pages.conftest import Visit
-from tests.service.pages.finished import made_of
-from tests.support.diagnosed import resonant
+from tests.service.pages.finished import made
 from underskin.diagnosis.reporting.html_report import page as saved_page
 
 LONG = "after: contact resonance + sensor relaxation + charge amplifier"
@@ -22,8 +21,7 @@ _CUT = """plot => [...plot.querySelectorAll(".gtitle, .legendtext, .annotation-t
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With a model of a long name, and a map of so many steps that they have no room for their names."""
-    made = made_of(resonant("saved", lines=60))
-    figures = {name: plotly.io.from_json(figure) for name, figure in made.figures.items()}
+    figures = {name: plotly.io.from_json(figure) for name, figure in made().figures.items()}
     figures["frf"].update_traces(name=LONG, selector={"name": "after: contact resonance"})
     assert LONG in {trace.name for trace in figures["frf"].data}
     rows, columns = len(figures["where"].layout.yaxis.ticktext), 24
@@ -31,12 +29,12 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     figures["where"].update_traces(z=[[1.0] * columns] * rows, text=[["+1"] * columns] * rows)
     figures["where"].update_layout(xaxis=steps, shapes=[])
     file = tmp_path_factory.mktemp("saved") / "report.html"
-    file.write_text(saved_page(made.report, figures), encoding="utf-8")
+    file.write_text(saved_page(made().report, figures), encoding="utf-8")
     return file
 
 
-def test_texts_of_figures_are_whole_and_apart(reader: Visit, saved: Path) -> None:
-    page = reader.page
+def test_texts_of_figures_are_whole_and_apart(visitor: Visit, saved: Path) -> None:
+    page = visitor.page
     page.set_viewport_size({"width": 390, "height": 800})
     page.goto(saved.as_uri())
     page.wait_for_function("() => document.querySelectorAll('.main-svg').length >= 4")
@@ -61,4 +59,4 @@ def test_texts_of_figures_are_whole_and_apart(reader: Visit, saved: Path) -> Non
     assert below is not None
     assert legend is not None
     assert legend["y"] + legend["height"] <= below["y"]
-    reader.wrong.clear()  # the file itself is not of the server
+    visitor.wrong.clear()  # the file itself is not of the server

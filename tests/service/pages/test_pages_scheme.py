@@ -11,7 +11,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from tests.service.pages.conftest import Visit, visit
-from tests.service.pages.finished import keep, made_of
+from tests.service.pages.finished import keep, made
 from tests.support.cases import first
 from tests.support.diagnosed import resonant, table
 from tests.support.store_server import Server
@@ -32,8 +32,8 @@ _ON_WHITE = """() => [...document.querySelectorAll(".main-svg:first-child")].eve
 
 
 @pytest.fixture
-def dark(browser: Browser, idle: Server) -> Iterator[Visit]:
-    for seen in visit(browser, idle):
+def dark(browser: Browser, server: Server) -> Iterator[Visit]:
+    for seen in visit(browser, server):
         seen.page.emulate_media(color_scheme="dark")
         yield seen
 
@@ -73,17 +73,16 @@ def require_light(page: Page) -> None:
 
 
 @pytest.fixture(scope="module")
-def addresses(idle: Server) -> dict[str, str]:
+def addresses(server: Server) -> dict[str, str]:
     """Ids of a campaign, and of a diagnosis that is done."""
-    document = resonant("dark")
-    diagnosis = keep(idle, document, made_of(document), "dark")
-    return {"diagnosis": diagnosis, "campaign": idle.http.get(f"/v1/diagnoses/{diagnosis}").json()["campaign_id"]}
+    diagnosis = keep(server, "dark", made()).rpartition("/")[2]
+    return {"diagnosis": diagnosis, "campaign": server.http.get(f"/v1/diagnoses/{diagnosis}").json()["campaign_id"]}
 
 
 @pytest.mark.parametrize(
     ("path", "figures"),
     first(
-        3,
+        2,
         [
             ("/skins/dark", 2),
             ("/diagnoses/{diagnosis}", 6),
@@ -122,11 +121,11 @@ def test_a_saved_figure_and_what_a_browser_prints_are_on_white(
 
 
 def test_files_without_a_server_are_dark_too(
-    dark: Visit, idle: Server, addresses: dict[str, str], downloads: Path
+    dark: Visit, server: Server, addresses: dict[str, str], downloads: Path
 ) -> None:
     document = parse(resonant("dark"))
     files = {
-        "report.html": idle.http.get(f"/diagnoses/{addresses['diagnosis']}/report.html").text,
+        "report.html": server.http.get(f"/diagnoses/{addresses['diagnosis']}/report.html").text,
         "campaign.html": campaign_page(document, invert(document, table())),
     }
     for name, text in files.items():

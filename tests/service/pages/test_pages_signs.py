@@ -11,13 +11,13 @@ MODULUS = "The elastomer's modulus"
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_force_and_travel_are_flipped_on_demand(reader: Visit, width: int) -> None:
-    page = reader.page
+def test_force_and_travel_are_flipped_on_demand(visitor: Visit, width: int) -> None:
+    page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
-    look_at(reader, [file("block.json", as_json(block("flipped", force=-1, travel=-1)))], skin=f"block-{width}")
+    look_at(visitor, [file("block.json", as_json(block("flipped", force=-1, travel=-1)))], skin=f"block-{width}")
     assert "force and displacement are counted negative" in page.get_by_role("main").inner_text()
     assert "the sign -1" not in page.get_by_role("main").inner_text()
-    reader.require_accessible()
+    visitor.require_accessible()
     flip = page.get_by_role("button", name="Flip what is counted negative")
     flip.focus()
     page.keyboard.press("Enter")
@@ -29,9 +29,9 @@ def test_force_and_travel_are_flipped_on_demand(reader: Visit, width: int) -> No
     assert "2.000\xa0MPa" in page.get_by_role("main").inner_text()
 
 
-def test_a_force_left_negative_gives_no_modulus(reader: Visit) -> None:
-    page = reader.page
-    look_at(reader, [file("block.json", as_json(block("left", force=-1)))], skin="left")
+def test_a_force_left_negative_gives_no_modulus(visitor: Visit) -> None:
+    page = visitor.page
+    look_at(visitor, [file("block.json", as_json(block("left", force=-1)))], skin="left")
     page.get_by_role("button", name="Keep 1 recording").click()
     page.wait_for_url("**/campaigns/*")
     shown = page.get_by_role("main").inner_text()

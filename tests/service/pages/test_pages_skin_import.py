@@ -2,45 +2,50 @@
 
 import io
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from urllib.parse import quote
 
 import h5py
 import httpx
 import pytest
 
+from tests.service.conftest import emptied
 from tests.service.pages.conftest import Visit
 from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.uploads import as_json, file, look_at
+from tests.support.cases import first
 from tests.support.diagnosed import diagnosed, report, resonant
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 SKIN = 'palm "3" <b>'
 PATH = quote(SKIN, safe="")
 
 
 @pytest.fixture(scope="module")
-def export(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A skin of three campaigns, one with an excluded recording, one diagnosed; its model was adopted and withdrawn."""
-    with running(Place(tmp_path_factory.mktemp("source")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
-        http = server.http
-        for name in ("monday", "tuesday"):
-            kept = http.post("/v1/campaigns", json=campaign(name), params={"skin": SKIN}).json()["id"]
-        left_out = {"recording": "s1-2N", "reason": "cable loose"}
-        assert http.post(f"/v1/campaigns/{kept}/exclusions", json=left_out).status_code == 200
-        _, diagnosis_id = diagnosed(server, resonant("array"), report(), SKIN)
-        adopted = http.post(f"/v1/skins/{PATH}/model", json={"diagnosis_id": diagnosis_id})
-        assert adopted.is_success, adopted.text
-        withdrawn = http.delete(f"/v1/skins/{PATH}/model", params={"reason": "wrong diagnosis"})
-        assert withdrawn.is_success, withdrawn.text
-        return http.get(f"/v1/skins/{PATH}/export").content
+def export(server: Server) -> bytes:
+    """A skin of three campaigns, one with an excluded recording, one diagnosed; its model was adopted and withdrawn.
+
+    The server where it was has nothing of it any more.
+    """
+    http = server.http
+    for name in ("monday", "tuesday"):
+        kept = http.post("/v1/campaigns", json=campaign(name), params={"skin": SKIN}).json()["id"]
+    left_out = {"recording": "s1-2N", "reason": "cable loose"}
+    assert http.post(f"/v1/campaigns/{kept}/exclusions", json=left_out).status_code == 200
+    _, diagnosis_id = diagnosed(server, resonant("array"), report(), SKIN)
+    adopted = http.post(f"/v1/skins/{PATH}/model", json={"diagnosis_id": diagnosis_id})
+    assert adopted.is_success, adopted.text
+    withdrawn = http.delete(f"/v1/skins/{PATH}/model", params={"reason": "wrong diagnosis"})
+    assert withdrawn.is_success, withdrawn.text
+    exported = http.get(f"/v1/skins/{PATH}/export").content
+    emptied(server)
+    return exported
 
 
-@pytest.fixture(scope="module")
-def empty(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """Where nothing ever comes in."""
-    with running(Place(tmp_path_factory.mktemp("empty"))) as started:
-        yield started
+@pytest.fixture
+def empty(server: Server, export: bytes) -> Server:
+    """Where nothing came in."""
+    assert export
+    return emptied(server)
 
 
 @pytest.fixture
@@ -61,9 +66,9 @@ def looked_at(client: httpx.Client, content: bytes) -> str:
     return answer.text
 
 
-def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, idle: Server, export: bytes) -> None:
-    page = reader.page
-    look_at(reader, [file("palm.h5", export)])
+def test_an_exported_skin_comes_in_where_somebody_says_so(visitor: Visit, server: Server, export: bytes) -> None:
+    page = visitor.page
+    look_at(visitor, [file("palm.h5", export)])
     status = page.get_by_role("status")
     assert "3 campaigns" in status.inner_text()
     assert "none of them here yet" in status.inner_text()
@@ -73,29 +78,29 @@ def test_an_exported_skin_comes_in_where_somebody_says_so(reader: Visit, idle: S
     assert ", withdrawn " in told
     row = page.get_by_role("row", name="tuesday").inner_text().split("\t")
     assert (row[2:]) == ["6", "1", "not yet"]
-    reader.require_accessible()
-    assert kept(idle) == []
+    visitor.require_accessible()
+    assert kept(server) == []
     page.get_by_role("button", name="Bring it in").click()
     page.wait_for_url("**/skins/*")
     assert page.get_by_role("heading", level=1).inner_text() == f"Skin {SKIN}"
-    assert sorted(kept(idle)) == ["array", "monday", "tuesday"]
+    assert sorted(kept(server)) == ["array", "monday", "tuesday"]
     said = page.get_by_role("status").first.inner_text()
     assert "version 1" in said
     assert "wrong diagnosis" in said
-    look_at(reader, [file("palm.h5", export)], skin="another name")
+    look_at(visitor, [file("palm.h5", export)], skin="another name")
     assert "All of it is here already" in page.locator(".adopted").inner_text()
     assert "keeps its name" in page.locator("main").inner_text()
     assert page.get_by_role("button", name="Bring it in").count() == 0
-    monday = next(entry for entry in idle.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday")
-    withdrawn = idle.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
+    monday = next(entry for entry in server.http.get("/v1/campaigns").json()["campaigns"] if entry["name"] == "monday")
+    withdrawn = server.http.post(f"/v1/campaigns/{monday['id']}/withdraw", json={"reason": "fell down"})
     assert withdrawn.status_code == 200
-    look_at(reader, [file("palm.h5", export)])
+    look_at(visitor, [file("palm.h5", export)])
     alert = page.get_by_role("alert").inner_text()
     assert "'monday'" in alert
     assert "differs" in alert
     assert "differs" in page.get_by_role("row", name="monday").inner_text()
     assert page.get_by_role("button", name="Bring it in").count() == 0
-    reader.require_accessible()
+    visitor.require_accessible()
     page.get_by_role("button", name="Discard").click()
     page.wait_for_url("**/upload")
 
@@ -129,12 +134,15 @@ def _other(_content: bytes) -> bytes:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "told"),
-    [
-        (_cut, "was cut off"),
-        (_newer, "skin-export/2; this one reads skin-export/1"),
-        (_spoilt, "frf_re_pc_per_n"),
-        (_other, "no campaign"),
-    ],
+    first(
+        2,
+        [
+            (_spoilt, "frf_re_pc_per_n"),
+            (_cut, "was cut off"),
+            (_newer, "skin-export/2; this one reads skin-export/1"),
+            (_other, "no campaign"),
+        ],
+    ),
 )
 def test_a_file_that_cannot_come_in_says_what_is_wrong_with_it(
     sender: httpx.Client, empty: Server, export: bytes, spoil: Callable[[bytes], bytes], told: str
@@ -158,9 +166,9 @@ def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> No
 
 
 @pytest.mark.slow
-def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(tmp_path: Path, export: bytes) -> None:
+def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(empty: Server, export: bytes) -> None:
+    server = empty
     with (
-        running(Place(tmp_path / "third")) as server,
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as own,
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as other,
     ):
@@ -171,11 +179,11 @@ def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(tmp_pa
         assert own.post(f"{place}/skin", data=form, headers=other_site).status_code == 403
         assert other.post(f"{place}/skin", data=stolen).status_code == 404
         assert kept(server) == []
-        first, second = (own.post(f"{place}/skin", data=form) for _ in range(2))
-        assert first.headers["location"] == second.headers["location"] == f"/skins/{PATH}"
+        one, again = (own.post(f"{place}/skin", data=form) for _ in range(2))
+        assert one.headers["location"] == again.headers["location"] == f"/skins/{PATH}"
         assert len(kept(server)) == 3
-        again = own.post("/upload", data=form, files={"file": ("a.json", as_json(campaign("plain")))})
-        assert own.post(f"{again.headers['location']}/skin", data=form).status_code == 404
+        plain = own.post("/upload", data=form, files={"file": ("a.json", as_json(campaign("plain")))})
+        assert own.post(f"{plain.headers['location']}/skin", data=form).status_code == 404
 
 
 def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str]], export: bytes) -> None:
@@ -194,15 +202,3 @@ def test_who_may_read_only_brings_no_skin_in(locked: tuple[Server, dict[str, str
         place = writer.post("/upload", data=own, files={"file": ("skin.h5", export)}).headers["location"]
         assert somebody.post(f"{place}/skin", data=form).status_code == 403
         assert SKIN not in [entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]]
-
-
-@pytest.mark.slow
-def test_an_export_beyond_the_limit_is_refused(tmp_path: Path, export: bytes) -> None:
-    with (
-        running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.02") as server,
-        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody,
-    ):
-        form = {"form_token": token_of(somebody.get("/upload").text)}
-        answer = somebody.post("/upload", data=form, files={"file": ("skin.h5", export)})
-        assert (answer.status_code, "UNDERSKIN_MAX_UPLOAD_MB" in answer.text) == (413, True)
-        assert kept(server) == []

@@ -14,22 +14,22 @@ def sent_to(server: Server, skin: str, *names: str) -> list[str]:
     return [sent(server, campaign(name, sensors=1), skin) for name in names]
 
 
-def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: Server) -> None:
-    page = reader.page
-    sent_to(idle, "alone", "the only one")
-    reader.go("/skins/alone")
+def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(visitor: Visit, server: Server) -> None:
+    page = visitor.page
+    sent_to(server, "alone", "the only one")
+    visitor.go("/skins/alone")
     assert page.get_by_role("button", name="Diagnose its campaigns together").count() == 0
-    first, second = sent_to(idle, "several", "one", "two")
-    reader.go("/skins/several")
-    reader.require_accessible()
+    first, second = sent_to(server, "several", "one", "two")
+    visitor.go("/skins/several")
+    visitor.require_accessible()
     page.get_by_role("button", name="Diagnose its campaigns together").focus()
     page.keyboard.press("Enter")
     page.wait_for_url("**/diagnoses/*")
     assert page.get_by_role("heading", level=1).inner_text() == "Diagnosis of several"
     page.get_by_text("It waits for its turn.").wait_for()
-    finished(idle)
-    page.get_by_role("heading", name="What the model lacks, and").wait_for(timeout=240_000)  # without reloading by hand
-    reader.require_accessible()
+    finished(server)
+    page.get_by_role("heading", name="What the model lacks, and").wait_for()  # without reloading by hand
+    visitor.require_accessible()
     assert "to quote, take a campaign's own diagnosis" in page.get_by_role("main").inner_text()
     for name, campaign_id in (("one", first), ("two", second)):
         link = page.locator("details").get_by_role("link", name=name, exact=True)
@@ -37,30 +37,30 @@ def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(reader: Visit, idle: 
     for nothing in ("Adopt", "Within the limits of your rig", "cannot be adopted", "were not kept"):
         assert page.get_by_text(nothing, exact=False).count() == 0, nothing
     for part in ("report.html", "explanations.csv"):
-        assert idle.http.get(f"{page.url}/{part}", headers=BROWSING).status_code == 200, part
-    plan = idle.http.get(f"{page.url}/plan", headers=BROWSING)
+        assert server.http.get(f"{page.url}/{part}", headers=BROWSING).status_code == 200, part
+    plan = server.http.get(f"{page.url}/plan", headers=BROWSING)
     assert (plan.status_code, "of several campaigns" in plan.text) == (404, True)
     page.get_by_role("button", name="Without contact resonance").click()
     page.get_by_text("Supposed that it is not contact resonance").wait_for()
-    reader.go("/skins/several")
+    visitor.go("/skins/several")
     assert page.get_by_role("heading", name="Diagnosed together").count() == 1
-    reader.go(f"/campaigns/{first}")
+    visitor.go(f"/campaigns/{first}")
     assert "together with others, as several" in page.get_by_role("main").inner_text()
-    reader.go("/")
+    visitor.go("/")
     assert "together, as several" in page.get_by_role("row").filter(has_text="several").inner_text()
     assert "not diagnosed" in page.get_by_role("row").filter(has_text="alone").inner_text()
 
 
-def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
-    first, second, _ = sent_to(idle, "changing", "a", "b", "c")
+def test_what_is_outdated_is_diagnosed_again(server: Server) -> None:
+    first, second, _ = sent_to(server, "changing", "a", "b", "c")
     with (
-        Client(str(idle.http.base_url)) as client,
-        httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form,
+        Client(str(server.http.base_url)) as client,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as form,
     ):
         whole = client.skins.diagnose("changing", name="all of it")["id"]
         chosen = client.skins.diagnose("changing", [first, second], "two of it")["id"]
-        finished(idle)
-        sent_to(idle, "changing", "d")
+        finished(server)
+        sent_to(server, "changing", "d")
         client.campaigns.exclude(second, "s0-1N", "cable loose")
         for diagnosis_id, count, why in ((whole, 4, "excluded since"), (chosen, 2, "excluded since")):
             shown = form.get(f"/diagnoses/{diagnosis_id}").text
@@ -77,12 +77,12 @@ def test_what_is_outdated_is_diagnosed_again(idle: Server) -> None:
         assert (answer.status_code, "withdrawn: wrong sphere" in answer.text) == (409, True)
 
 
-def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> None:
+def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) -> None:
     for number in range(3):
-        sent_to(idle, f"fleet-{number}", f"{HOSTILE[:20]} {number}")
+        sent_to(server, f"fleet-{number}", f"{HOSTILE[:20]} {number}")
     context = browser.new_context(java_script_enabled=False)
     page = context.new_page()
-    address = str(idle.http.base_url).rstrip("/")
+    address = str(server.http.base_url).rstrip("/")
     page.goto(f"{address}/")
     page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     page.get_by_label("Find a skin").fill("fleet-")
@@ -100,22 +100,22 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, idle: Server) -> N
     page.get_by_label("fleet-2").check()
     page.get_by_role("button", name="Diagnose these skins together").click()
     page.wait_for_url("**/diagnoses/*")
-    finished(idle)
+    finished(server)
     page.reload()
     assert "<script>" in page.get_by_role("heading", level=1).inner_text()
     for number in range(3):
         assert page.get_by_role("link", name=f"fleet-{number}").get_attribute("href") == f"/skins/fleet-{number}"
-    assert idle.http.get(f"{page.url}/report.html", headers=BROWSING).status_code == 200
+    assert server.http.get(f"{page.url}/report.html", headers=BROWSING).status_code == 200
     page.get_by_role("navigation").get_by_role("link", name="Fleets").click()
     assert page.get_by_role("heading", name="Diagnosed before").count() == 1
     context.close()
 
 
-def test_what_is_chosen_stays_while_the_list_is_searched(reader: Visit, idle: Server) -> None:
+def test_what_is_chosen_stays_while_the_list_is_searched(visitor: Visit, server: Server) -> None:
     for name in ("ring", "disc", "plate"):
-        sent_to(idle, f"make-a-{name}", name)
-    page = reader.page
-    reader.go("/fleets?find=make-a-ring")
+        sent_to(server, f"make-a-{name}", name)
+    page = visitor.page
+    visitor.go("/fleets?find=make-a-ring")
     page.get_by_label("make-a-ring").check()
     page.get_by_label("Name").fill("make a")
     for name, there in (("disc", ["ring", "disc"]), ("plate", ["disc", "ring", "plate"]), ("nothing", None)):
@@ -129,7 +129,7 @@ def test_what_is_chosen_stays_while_the_list_is_searched(reader: Visit, idle: Se
         assert [shown.nth(k).get_attribute("value") for k in range(shown.count())] == [f"make-a-{one}" for one in there]
         page.get_by_label(f"make-a-{name}").check()
     assert page.get_by_role("checkbox", checked=True).count() == 3
-    reader.require_accessible()
+    visitor.require_accessible()
     assert page.get_by_label("Name").input_value() == "make a"
     page.get_by_label("Name").press("Enter")
     page.wait_for_url("**/diagnoses/*")
@@ -137,33 +137,33 @@ def test_what_is_chosen_stays_while_the_list_is_searched(reader: Visit, idle: Se
         assert page.get_by_role("link", name=f"make-a-{name}").count() == 1
 
 
-def test_a_filter_of_the_page_hides_no_skin_that_is_ticked(reader: Visit, idle: Server) -> None:
+def test_a_filter_of_the_page_hides_no_skin_that_is_ticked(visitor: Visit, server: Server) -> None:
     for number in range(12):
-        sent_to(idle, f"make-b-{number}", f"b{number}")
-    page = reader.page
-    reader.go("/fleets?find=make-b-")
+        sent_to(server, f"make-b-{number}", f"b{number}")
+    page = visitor.page
+    visitor.go("/fleets?find=make-b-")
     page.get_by_label("make-b-3").check()
     page.get_by_label("Filter").fill("make-b-7")
     assert page.locator("tbody tr:visible label").all_inner_texts() == ["make-b-3", "make-b-7"]
 
 
-def test_the_page_of_fleets_is_accessible(reader: Visit, idle: Server) -> None:
-    sent_to(idle, "fleet-9", "nine")
-    idle.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
-    reader.go("/fleets")
-    assert reader.page.get_by_label("left <palm> fleet-9").get_attribute("value") == "fleet-9"
-    reader.require_accessible()
-    reader.go("/fleets?find=nothing-is-called-so")
-    assert "No skin is called so" in reader.page.get_by_role("main").inner_text()
+def test_the_page_of_fleets_is_accessible(visitor: Visit, server: Server) -> None:
+    sent_to(server, "fleet-9", "nine")
+    server.http.patch("/v1/skins/fleet-9", json={"title": "left <palm>"}).raise_for_status()
+    visitor.go("/fleets")
+    assert visitor.page.get_by_label("left <palm> fleet-9").get_attribute("value") == "fleet-9"
+    visitor.require_accessible()
+    visitor.go("/fleets?find=nothing-is-called-so")
+    assert "No skin is called so" in visitor.page.get_by_role("main").inner_text()
 
 
-def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form(idle: Server) -> None:
-    sent_to(idle, "bare-0", "a")
-    (only,) = sent_to(idle, "bare-1", "b")
-    sent_to(idle, "bare-2", "c")
+def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form(server: Server) -> None:
+    sent_to(server, "bare-0", "a")
+    (only,) = sent_to(server, "bare-1", "b")
+    sent_to(server, "bare-2", "c")
     with (
-        Client(str(idle.http.base_url)) as client,
-        httpx.Client(base_url=idle.http.base_url, headers=BROWSING, timeout=60) as form,
+        Client(str(server.http.base_url)) as client,
+        httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as form,
     ):
         client.campaigns.withdraw(only, "wrong sphere")
         fields = {"form_token": token_of(form.get("/fleets").text), "find": "bare-", "name": "<b>batch"}

@@ -98,6 +98,7 @@ def test_the_table_that_is_offered_can_be_sent(visitor: Visit) -> None:
     assert page.get_by_role("button", name="Keep").count() == 1
 
 
+@pytest.mark.soak
 def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/upload")

@@ -14,7 +14,6 @@ from tests.support.cases import first
 from tests.support.file_readers import readers
 from tests.support.store_server import Server, campaign
 
-BACKEND = "sqlite"
 FILES = 8  # of which the figures of six are kept
 
 
@@ -49,7 +48,7 @@ def counted(server: int) -> Iterator[list[int]]:
 
 
 @pytest.mark.parametrize(
-    "paths", first(2, [["/0/frf.csv", "/0/traces.csv"], ["?file={}"], ["?first=1"], ["/0/frf.xlsx"]])
+    "paths", first(1, [["/0/frf.csv", "/0/traces.csv"], ["?file={}"], ["?first=1"], ["/0/frf.xlsx"]])
 )
 def test_two_files_at_a_time_are_read_to_be_looked_at(
     server: Server, upload: tuple[httpx.Client, str], paths: list[str]

@@ -40,12 +40,12 @@ def read_it(page: Page) -> None:
     page.wait_for_load_state()
 
 
-def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept(reader: Visit) -> None:
-    page = reader.page
+def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept(visitor: Visit) -> None:
+    page = visitor.page
     document = campaign("hand of May", sensors=6, id="noted")
     for number, recording in enumerate(document["recordings"]):
         recording["conditions"] = {"temperature_c": 23.5 + number} | ({"operator": "mb"} if number else {})
-    look_at(reader, [file("may.json", as_json(document))])
+    look_at(visitor, [file("may.json", as_json(document))])
     facts = page.locator("dl.facts").inner_text().replace("\xa0", " ")
     for said in ("thickness\n2.5 mm", "Young's modulus, declared\n16 MPa", "sensor radius\n1.5 mm"):
         assert said in facts
@@ -56,19 +56,19 @@ def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept
     row = page.get_by_role("row", name="s1-2N")
     for said in ("2017", "26.5", "mb"):
         assert said in row.inner_text()
-    reader.require_accessible()
+    visitor.require_accessible()
     page.get_by_role("button", name="Keep 12 recordings").click()
     page.wait_for_url("**/campaigns/*")
     assert page.locator("#recordings th[scope=col]").all_inner_texts()[-3:] == ["temperature_c", "operator", "State"]
     assert page.get_by_role("row", name="s0-1N").inner_text().split()[-4:] == ["23.5", "–", "in", "use"]
-    reader.require_accessible()
+    visitor.require_accessible()
 
 
-def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(reader: Visit, idle: Server) -> None:
-    page = reader.page
+def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(visitor: Visit, server: Server) -> None:
+    page = visitor.page
     dated = campaign("hand of April", sensors=6, id="hand")
-    idle.http.post("/v1/campaigns", json=dated).raise_for_status()
-    look_at(reader, [file("press.csv", pressed())], skin="hand")
+    server.http.post("/v1/campaigns", json=dated).raise_for_status()
+    look_at(visitor, [file("press.csv", pressed())], skin="hand")
     expect(page.get_by_text("2000 Hz by the times of Time [s]")).to_be_visible()
     fill_in(page)
     read_it(page)
@@ -90,15 +90,15 @@ def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(reader
     with page.expect_navigation():  # as a page would send it that was opened before
         page.evaluate("document.querySelector('form.keep').submit()")
     expect(keep).to_be_disabled()
-    assert len(campaigns_of(idle, "hand")) == 1
-    reader.require_accessible()
+    assert len(campaigns_of(server, "hand")) == 1
+    visitor.require_accessible()
 
     for name, value in (("first_sample", ""), ("last_sample", ""), ("recorded_at", "3.5.2026 14:30")):
         page.locator(f"#{name}").fill(value)
     read_it(page)
     page.get_by_role("button", name="Discard").click()
     page.wait_for_url("**/upload")
-    reader.require_accessible()
+    visitor.require_accessible()
     page.get_by_role("button", name="Undo: discarded press.csv").click()
     page.wait_for_url("**/upload/*")
     keep.click()
@@ -110,11 +110,11 @@ def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(reader
         "sensor that was pressed s0; sphere radius R 5 mm; preload F 1 N; date and time of recording 2026-05-03T14:30",
     ):
         expect(page.get_by_text(said)).to_be_visible()
-    (kept, _) = [idle.http.get(f"/v1/campaigns/{one}").json() for one in campaigns_of(idle, "hand")]
+    (kept, _) = [server.http.get(f"/v1/campaigns/{one}").json() for one in campaigns_of(server, "hand")]
     assert kept["recorded_at"].startswith("2026-05-03T14:30")
 
     for path in ("/skins/hand", "/"):
-        reader.go(path)
+        visitor.go(path)
         assert "from 1 of 6 sensors" in page.locator("main").inner_text()
-    reader.go("/loads?skin=hand")
+    visitor.go("/loads?skin=hand")
     expect(page.get_by_text("is that of the array in press, from 1 of 6 sensors")).to_be_visible()

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from tests.service.pages.conftest import EXAMPLE, Visit
+from tests.support.cases import first
 
 
 def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:
@@ -27,6 +28,7 @@ def test_from_the_start_to_a_campaign(newcomer: Visit) -> None:
     assert page.locator("#figure-frf .legend .traces").count() == 8
 
 
+@pytest.mark.soak
 def test_loading_the_example_again_adds_nothing(newcomer: Visit) -> None:
     newcomer.go("/")
     newcomer.page.get_by_role("button", name="Load the example skin").click()
@@ -34,7 +36,9 @@ def test_loading_the_example_again_adds_nothing(newcomer: Visit) -> None:
     assert newcomer.page.get_by_role("row", name="example, ").count() == 4
 
 
-def test_a_figure_is_saved_as_it_is_and_its_numbers_too(newcomer: Visit, downloads: Path) -> None:
+def test_a_skin_s_page_gives_its_figures_numbers_and_request_with_times_in_the_viewer_s_zone(
+    newcomer: Visit, downloads: Path
+) -> None:
     page = newcomer.page
     newcomer.drawn(2)
     figure = page.locator("#figure-history")
@@ -49,20 +53,20 @@ def test_a_figure_is_saved_as_it_is_and_its_numbers_too(newcomer: Visit, downloa
     rows = list(csv.DictReader((downloads / "numbers.csv").read_text().splitlines()))
     assert len(rows) == 4 * 8
     assert 12 < float(rows[0]["d33_pc_per_n"]) < 15
-
-
-def test_the_request_that_a_page_names_returns_the_same(newcomer: Visit) -> None:
-    newcomer.page.get_by_text("The same by request").click()
-    command = newcomer.page.get_by_label("Shell").inner_text()
+    rows = list(csv.DictReader(page.request.get(f"{newcomer.address}{EXAMPLE}/map.csv").text().splitlines()))
+    assert len(rows) == 8
+    assert all(float(row["slope_pc_per_n_per_year"]) < 0 for row in rows)  # the example ages
+    page.get_by_text("The same by request").click()
+    command = page.get_by_label("Shell").inner_text()
     path = command.removeprefix("curl -s ").strip().removeprefix(newcomer.address)
-    shown = newcomer.page.request.get(newcomer.address + path).json()
+    shown = page.request.get(newcomer.address + path).json()
     assert [entry["sensor"] for entry in shown["sensors"]] == [f"s{number:02d}" for number in range(1, 9)]
-
-
-def test_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
-    time = newcomer.page.locator("table time").last
+    time = page.locator("table time").last
     assert time.get_attribute("datetime") == "2024-05-14T08:30:00.000000Z"
     assert "10:30" in time.inner_text()  # in Rome
+    earliest = page.locator("#figure-history .plot").evaluate("plot => plot.data[0].x[0]")
+    assert earliest.startswith("2024-05-14T10:30")
+    assert "Europe/Rome" in page.locator("#figure-history .plot").evaluate("plot => plot.layout.xaxis.title.text")
 
 
 def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
@@ -99,6 +103,7 @@ def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
     assert not page.locator("#outside").is_visible()  # it was of 200 N
 
 
+@pytest.mark.soak
 def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_role("link", name="example, as built").click()
@@ -131,28 +136,15 @@ def test_no_page_is_wider_than_a_phone(newcomer: Visit) -> None:
     page = newcomer.page
     page.set_viewport_size({"width": 390, "height": 844})
     campaign = page.get_by_role("link", name="example, as built").get_attribute("href")
-    for path in ("/", EXAMPLE, str(campaign), "/upload", "/design", "/loads"):
+    for path in first(3, (EXAMPLE, str(campaign), "/", "/upload", "/design", "/loads")):
         newcomer.go(path)
         newcomer.drawn(page.locator(".plot").count())
         assert page.evaluate("document.documentElement.scrollWidth") <= 390, path
 
 
-def test_a_figure_s_times_are_in_the_viewer_s_zone(newcomer: Visit) -> None:
-    page = newcomer.page
-    newcomer.drawn(2)
-    first = page.locator("#figure-history .plot").evaluate("plot => plot.data[0].x[0]")
-    assert first.startswith("2024-05-14T10:30")  # in Rome
-    assert "Europe/Rome" in page.locator("#figure-history .plot").evaluate("plot => plot.layout.xaxis.title.text")
-
-
+@pytest.mark.soak
 def test_who_chose_is_where_he_was(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_label("Colour by").select_option("trend")
     page.wait_for_url("**show=trend*")
     page.wait_for_function("() => document.activeElement.id === 'show'")
-
-
-def test_the_numbers_of_the_map_hold_what_colours_it(newcomer: Visit) -> None:
-    rows = list(csv.DictReader(newcomer.page.request.get(f"{newcomer.address}{EXAMPLE}/map.csv").text().splitlines()))
-    assert len(rows) == 8
-    assert all(float(row["slope_pc_per_n_per_year"]) < 0 for row in rows)  # the example ages

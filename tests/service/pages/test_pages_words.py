@@ -28,12 +28,12 @@ def test_digits_of_a_value_and_its_interval_agree(numbers: tuple[float, float, f
     assert len(places) == 1
 
 
-def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: Server, reader: Visit) -> None:
-    page = reader.page
-    sent = idle.http.post("/v1/campaigns?skin=words", json=campaign("alike", sensors=6, lines=60)).raise_for_status()
+def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(server: Server, visitor: Visit) -> None:
+    page = visitor.page
+    sent = server.http.post("/v1/campaigns?skin=words", json=campaign("alike", sensors=6, lines=60)).raise_for_status()
     place = f"/campaigns/{sent.json()['id']}"
-    answer = idle.http.get(f"/v1{place}/d33").json()
-    reader.go(place)
+    answer = server.http.get(f"/v1{place}/d33").json()
+    visitor.go(place)
     text = page.get_by_role("main").inner_text().replace("\xa0", " ")
     spread = answer["sensor_spread_percent"]
     assert ("differ by less than can be measured" in text) == (spread["low"] < 0.05 * spread["high"])
@@ -44,24 +44,24 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(idle: 
     assert "where the response is flat within 2 %" in text
     page.get_by_text("Why this band").click()
     assert page.get_by_text("no resonance in any recording").is_visible()
-    reader.require_accessible()
+    visitor.require_accessible()
 
 
-def test_a_date_without_a_time_is_that_day_whatever_the_zone(idle: Server, reader: Visit) -> None:
+def test_a_date_without_a_time_is_that_day_whatever_the_zone(server: Server, visitor: Visit) -> None:
     document = campaign("of a day", sensors=1)
     for recording in document["recordings"]:
         recording["recorded_at"] = "2026-05-03T00:00:00+00:00"
-    kept = idle.http.post("/v1/campaigns?skin=day", json=document).raise_for_status().json()["id"]
-    page = reader.page
-    reader.go(f"/campaigns/{kept}")
+    kept = server.http.post("/v1/campaigns?skin=day", json=document).raise_for_status().json()["id"]
+    page = visitor.page
+    visitor.go(f"/campaigns/{kept}")
     assert page.locator("dt:text-is('recorded') + dd").inner_text() == "3 May 2026"
     assert ":" in page.locator("dt:text-is('received') + dd").inner_text()
 
 
-def test_a_length_that_has_no_sign_is_refused_without_words_on_magnitude(idle: Server) -> None:
+def test_a_length_that_has_no_sign_is_refused_without_words_on_magnitude(server: Server) -> None:
     asked = {"thickness_mm": "2.5", "youngs_modulus_mpa": "16", "poisson_ratio": "0.5", "sensor_radius_mm": "1.5"}
     asked |= {"indenter_radius_mm": "0.001", "preload_n": "1"}
-    told = idle.http.get("/field", params=asked, headers=BROWSING).text
+    told = server.http.get("/field", params=asked, headers=BROWSING).text
     assert "must be 0.05 to 1000 mm" in told
     assert "in magnitude" not in told
 
@@ -73,22 +73,22 @@ def test_what_was_not_given_has_no_unit() -> None:
 
 
 @pytest.mark.parametrize("second", [1.0, 0.7])
-def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(idle: Server, second: float) -> None:
+def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(server: Server, second: float) -> None:
     skin, document = f"second sensor {second}", campaign("two sensors", sensors=2)
     for recording in document["recordings"][2:]:
         recording["frf_re_pc_per_n"] = [second * value for value in recording["frf_re_pc_per_n"]]
-    kept = idle.http.post("/v1/campaigns", json=document, params={"skin": skin}).raise_for_status().json()["id"]
-    array = idle.http.get(f"/v1/campaigns/{kept}/d33").json()["array"]
+    kept = server.http.post("/v1/campaigns", json=document, params={"skin": skin}).raise_for_status().json()["id"]
+    array = server.http.get(f"/v1/campaigns/{kept}/d33").json()["array"]
     value, low, high = (array[f"d33{part}_pc_per_n"] for part in ("", "_low", "_high"))
     lopsided = second == 1
     assert ((high - value) / (value - low) > 1.14) == lopsided
     assert ((high - value) / (value - low) < 1.05) != lopsided
     for path in (f"/campaigns/{kept}", f"/skins/{skin}"):
-        page = idle.http.get(path, headers=BROWSING).text
+        page = server.http.get(path, headers=BROWSING).text
         assert page.count("The interval reaches further up than down: a sphere that misses the middle") == lopsided
 
 
-def test_a_load_that_looks_wrong_is_named_by_its_line(reader: Visit) -> None:
-    reader.go("/loads?loads=10+8+4+1%0A14+16+10+60")
-    assert "Check load in line 2:" in reader.page.locator(".note[role=status]").first.inner_text()
-    reader.require_accessible()
+def test_a_load_that_looks_wrong_is_named_by_its_line(visitor: Visit) -> None:
+    visitor.go("/loads?loads=10+8+4+1%0A14+16+10+60")
+    assert "Check load in line 2:" in visitor.page.locator(".note[role=status]").first.inner_text()
+    visitor.require_accessible()

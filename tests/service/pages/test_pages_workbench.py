@@ -28,18 +28,12 @@ def fill_in(page: Page) -> None:
     page.get_by_label("These values are right").check()
 
 
-# What shows as on a desktop, but for its width; in `make soak` on both.
-ON_A_PHONE = pytest.mark.parametrize(
-    "sized", first(1, [(390, 844), (1280, 900)]), ids=first(1, ["phone", "desktop"]), indirect=True
-)
-
-
 def read_it(page: Page) -> None:
     page.get_by_role("button", name="Read it with these settings").click()
     page.wait_for_load_state()
 
 
-@pytest.fixture(params=[(1280, 900), (390, 844)], ids=["desktop", "phone"])
+@pytest.fixture(params=first(1, [(390, 844), (1280, 900)]), ids=first(1, ["phone", "desktop"]))
 def sized(request: pytest.FixtureRequest, visitor: Visit) -> Iterator[Visit]:
     width, height = request.param
     visitor.page.set_viewport_size({"width": width, "height": height})
@@ -75,16 +69,18 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     np.testing.assert_allclose(recording["displacement_mm"], DEPTH_MM - 1e-6 * OFFSET_NM, atol=1e-9)
 
 
-@ON_A_PHONE
 def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     page = sized.page
     look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
     fill_in(page)
     assert page.get_by_role("region", name="Formulas").evaluate("box => box.scrollWidth <= box.clientWidth")
-    for typed, said in (
-        ("'Height (nm)' ** 2", "'Height (nm)' ** 2: is not allowed"),
-        ("'Height (nm)' - 5 [N]", "5 [N] has the unit N; only what has units of one kind"),
-        ("", "it has a name and no formula: write one, or clear its name"),
+    for typed, said in first(
+        1,
+        (
+            ("'Height (nm)' - 5 [N]", "5 [N] has the unit N; only what has units of one kind"),
+            ("'Height (nm)' ** 2", "'Height (nm)' ** 2: is not allowed"),
+            ("", "it has a name and no formula: write one, or clear its name"),
+        ),
     ):
         formula = page.get_by_label("Formula of derived channel 1", exact=True)
         formula.fill(typed)
@@ -117,17 +113,18 @@ def test_brushing_the_figure_fills_in_the_trim(visitor: Visit) -> None:
     page.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 45, steps=4)
     page.mouse.up()
     expect(page.locator("[data-brushed]")).to_contain_text("are filled in below")
-    first, last = (int(page.get_by_label(f"{name} sample used").input_value()) for name in ("first", "last"))
+    lowest, highest = (int(page.get_by_label(f"{name} sample used").input_value()) for name in ("first", "last"))
     per_pixel = (high - low) / box["width"]
-    assert first == pytest.approx(low + 0.1 * (high - low), abs=2 + 2 * per_pixel)
-    assert last == pytest.approx(low + 0.8 * (high - low), abs=2 + 2 * per_pixel)
+    assert lowest == pytest.approx(low + 0.1 * (high - low), abs=2 + 2 * per_pixel)
+    assert highest == pytest.approx(low + 0.8 * (high - low), abs=2 + 2 * per_pixel)
     read_it(page)
-    expect(page.get_by_text(f"of each curve, samples {first} to {last} are used")).to_be_visible()
+    expect(page.get_by_text(f"of each curve, samples {lowest} to {highest} are used")).to_be_visible()
     visitor.drawn(2)
     names = page.evaluate("document.querySelector('#figure-course .plot').data.map(trace => trace.name)")
     assert set(names) == {"loading", "way back", "left out"}
 
 
+@pytest.mark.soak
 def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("keys.txt", text_of_raw_curve(above="# keys"))])
@@ -160,7 +157,6 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     expect(page.get_by_text("of each curve, samples 11 to 380 are used")).to_be_visible()
 
 
-@ON_A_PHONE
 def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Server) -> None:
     page = sized.page
     width = page.viewport_size["width"] if page.viewport_size else 0
@@ -196,6 +192,7 @@ def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Ser
     expect(page.get_by_role("button", name="Read them so again")).to_have_count(0)
 
 
+@pytest.mark.soak
 def test_recordings_of_a_file_are_listed_page_by_page(sized: Visit) -> None:
     page = sized.page
     head = (

@@ -12,7 +12,8 @@ from service.store.write_turns import THREADS
 from tests.support.store_server import Place, campaign, running
 
 
-@pytest.mark.slow
+@pytest.mark.soak
+@pytest.mark.alone
 def test_many_workbooks_leave_threads_for_other_pages(tmp_path: Path) -> None:
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
         sent = server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).raise_for_status().json()
@@ -31,7 +32,8 @@ def test_many_workbooks_leave_threads_for_other_pages(tmp_path: Path) -> None:
             assert time.monotonic() - begun < 3 * of_one_s
 
 
-@pytest.mark.slow
+@pytest.mark.soak
+@pytest.mark.alone
 @pytest.mark.parametrize("path", ["/design/search", "/design/search/region.csv"])
 def test_many_long_answers_leave_threads_for_other_pages(tmp_path: Path, path: str) -> None:
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:

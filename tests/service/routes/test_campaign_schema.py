@@ -45,6 +45,7 @@ def files() -> Iterator[Path]:
             yield from Path(folder).rglob("*.json")
 
 
+@pytest.mark.slow
 def test_every_campaign_that_is_at_hand_is_valid() -> None:
     tried = 0
     for file in files():

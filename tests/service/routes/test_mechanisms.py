@@ -1,23 +1,23 @@
 """The lab's own mechanisms over HTTP: kept, known to diagnoses by name, refused, discarded; and what is left out."""
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import httpx
 import numpy as np
 import pytest
 
 from tests.support.diagnosed import sent
 from tests.support.diagnosis_campaigns import Made
 from tests.support.diagnosis_campaigns import campaign as made_campaign
-from tests.support.store_server import Place, Server, running
+from tests.support.lean_reports import beside
+from tests.support.store_server import Server
 from underskin import Client, ServiceError
+from underskin.client.documents.diagnoses import Diagnosis
 from underskin.recordings.campaign import FrfRecording, to_dict
 from underskin.surrogate.sigma_table import load_table
 
-ONE = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1"}
-SEVERAL = ONE | {"UNDERSKIN_DIAGNOSIS_READY": "true"}  # of a test with several diagnoses: the program is loaded once
+FEW = beside("ageing", "contact_resonance")  # what its diagnoses leave out, so that they take little time
 WARM = """\
 schema: mechanism/1
 name: warm_amplifier
@@ -32,17 +32,18 @@ source: Our own measurements.
 
 
 @pytest.fixture
-def own_place(tmp_path: Path) -> Place:
-    folder = tmp_path / "data"
-    folder.mkdir()
-    return Place(folder)
+def lab(working: Server) -> Iterator[Server]:
+    """A server that makes diagnoses, and has no mechanisms of the lab's own before and after."""
+    folder = working.place.folder / "mechanisms"
+    shutil.rmtree(folder, ignore_errors=True)
+    yield working
+    shutil.rmtree(folder, ignore_errors=True)
 
 
-@pytest.fixture(scope="module")
-def refusing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A server for what it refuses, none of which stays."""
-    with running(Place(tmp_path_factory.mktemp("refusing")), UNDERSKIN_DIAGNOSIS_WORKERS="0") as started:
-        yield started
+@pytest.fixture
+def client(lab: Server) -> Iterator[Client]:
+    with Client(str(lab.http.base_url)) as opened:
+        yield opened
 
 
 def warmed() -> dict[str, object]:
@@ -66,97 +67,91 @@ def warmed() -> dict[str, object]:
     return to_dict(replace(quiet, recordings=tuple(recordings)))
 
 
-def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(own_place: Place) -> None:
-    with running(own_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        campaign_id = sent(server, warmed())
-        first = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
-        assert (first["verdict"], first["report"]["unnamed"]["axis"]) == ("unexplained", "temperature_c")
-        kept = client.mechanisms.keep_found(first["id"], "warm_amplifier", "The gain follows the temperature.")
-        assert (kept["own"], kept["package"].split()[0]) == (True, "warm_amplifier.yaml")
-        assert "warm_amplifier" in {entry["name"] for entry in client.mechanisms.all()}
+def test_a_law_is_found_kept_under_a_name_recognised_and_left_out_again(lab: Server, client: Client) -> None:
+    campaign_id = sent(lab, warmed())
 
-        second = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
-        assert second["id"] != first["id"]
-        assert [entry["name"] for entry in second["report"]["mechanisms"]] == ["warm_amplifier"]
-        assert client.diagnoses.start(campaign_id) == {"id": second["id"], "state": "done"}
+    def diagnosed(*without: str) -> Diagnosis:
+        return client.diagnoses.wait(client.diagnoses.start(campaign_id, without=[*FEW, *without])["id"])
 
-        without = client.diagnoses.start(campaign_id, without=["warm_amplifier"])
-        third = client.diagnoses.wait(without["id"])
-        assert (third["without"], third["verdict"]) == (["warm_amplifier"], "unexplained")
-        assert third["report"]["provenance"]["without"] == ["warm_amplifier"]
+    first = diagnosed()
+    assert (first["verdict"], first["report"]["unnamed"]["axis"]) == ("unexplained", "temperature_c")
+    kept = client.mechanisms.keep_found(first["id"], "warm_amplifier", "The gain follows the temperature.")
+    assert (kept["own"], kept["package"].split()[0]) == (True, "warm_amplifier.yaml")
+    assert "warm_amplifier" in {entry["name"] for entry in client.mechanisms.all()}
 
-        client.skins.adopt("palm", second["id"])
-        with pytest.raises(ServiceError, match="withdraw it first"):
-            client.mechanisms.discard("warm_amplifier")
-        client.skins.withdraw_model("palm", "tried")
-        assert client.mechanisms.discard("warm_amplifier")["name"] == "warm_amplifier"
-        assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
-        assert client.diagnoses.get(second["id"])["report"] == second["report"]
-        fourth = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
-        assert fourth["report"]["verdict"] == "unexplained"
-    assert [file.name.split()[0] for file in (own_place.folder / "mechanisms" / "discarded").iterdir()]
+    second = diagnosed()
+    assert second["id"] != first["id"]
+    assert [entry["name"] for entry in second["report"]["mechanisms"]] == ["warm_amplifier"]
+    assert client.diagnoses.start(campaign_id, without=FEW) == {"id": second["id"], "state": "done"}
+
+    third = diagnosed("warm_amplifier")
+    assert (third["verdict"], set(third["without"])) == ("unexplained", {*FEW, "warm_amplifier"})
+    assert set(third["report"]["provenance"]["without"]) == {*FEW, "warm_amplifier"}
+
+    client.skins.adopt("palm", second["id"])
+    with pytest.raises(ServiceError, match="withdraw it first"):
+        client.mechanisms.discard("warm_amplifier")
+    client.skins.withdraw_model("palm", "tried")
+    assert client.mechanisms.discard("warm_amplifier")["name"] == "warm_amplifier"
+    assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
+    assert client.diagnoses.get(second["id"])["report"] == second["report"]
+    assert diagnosed()["verdict"] == "unexplained"
+    assert [file.name.split()[0] for file in (lab.place.folder / "mechanisms" / "discarded").iterdir()]
 
 
-def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(own_place: Place) -> None:
-    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        assert client.mechanisms.keep(WARM)["parameters"] == [
-            {"name": "rise", "unit": "1/°C", "low": -0.1, "high": 0.1}
-        ]
-        with pytest.raises(ServiceError, match="taken"):
-            client.mechanisms.keep(WARM)
-        with pytest.raises(ServiceError, match="cannot be discarded"):
-            client.mechanisms.discard("ageing")
-        with pytest.raises(ServiceError, match="There is no mechanism"):
-            client.mechanisms.discard("nothing")
-        with pytest.raises(ServiceError, match="must be one of"):
-            client.diagnoses.start(sent(server, warmed()), without=["nothing"])
-        with pytest.raises(ServiceError, match="no diagnosis"):
-            client.mechanisms.keep_found("d-0123456789abcdef", "other")
-    file = own_place.folder / "mechanisms" / "warm_amplifier.yaml"
+def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(lab: Server, client: Client) -> None:
+    assert client.mechanisms.keep(WARM)["parameters"] == [{"name": "rise", "unit": "1/°C", "low": -0.1, "high": 0.1}]
+    with pytest.raises(ServiceError, match="taken"):
+        client.mechanisms.keep(WARM)
+    with pytest.raises(ServiceError, match="cannot be discarded"):
+        client.mechanisms.discard("ageing")
+    with pytest.raises(ServiceError, match="There is no mechanism"):
+        client.mechanisms.discard("nothing")
+    with pytest.raises(ServiceError, match="must be one of"):
+        client.diagnoses.start(sent(lab, warmed()), without=["nothing"])
+    with pytest.raises(ServiceError, match="no diagnosis"):
+        client.mechanisms.keep_found("d-0123456789abcdef", "other")
+    file = lab.place.folder / "mechanisms" / "warm_amplifier.yaml"
     assert file.read_text(encoding="utf-8") == WARM
     file.unlink()
-    with running(own_place, **ONE) as server, Client(str(server.http.base_url)) as client:
-        assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
+    assert "warm_amplifier" not in {entry["name"] for entry in client.mechanisms.all()}
 
 
-@pytest.mark.parametrize(
-    ("body", "status", "said"),
-    [
-        (WARM.replace("gain", "weather"), 422, "acts_on"),
-        (WARM.replace("rise *", "__import__('os').system('x') *"), 422, "line 6"),
-        (WARM.replace("name: warm_amplifier", "name: ../evil"), 422, "name"),
-        ("a: [", 422, "not YAML"),
-        ("", 422, "schema"),
-        ('{"diagnosis_id": "d-1"}', 422, "name"),
-        ('{"name": "a", "name": "b", "diagnosis_id": "d-1"}', 422, "given twice"),
-        ("x" * 100_001, 413, "100000 bytes"),
-    ],
+REFUSED = (
+    (WARM.replace("gain", "weather"), 422, "acts_on"),
+    (WARM.replace("rise *", "__import__('os').system('x') *"), 422, "line 6"),
+    (WARM.replace("name: warm_amplifier", "name: ../evil"), 422, "name"),
+    ("a: [", 422, "not YAML"),
+    ("", 422, "schema"),
+    ('{"diagnosis_id": "d-1"}', 422, "name"),
+    ('{"name": "a", "name": "b", "diagnosis_id": "d-1"}', 422, "given twice"),
+    ("x" * 100_001, 413, "100000 bytes"),
 )
-def test_what_cannot_be_kept_is_refused_with_its_reason(refusing: Server, body: str, status: int, said: str) -> None:
-    kind = "application/json" if body.startswith("{") else "application/yaml"
-    address = f"{refusing.http.base_url}/v1/mechanisms"
-    answer = httpx.post(address, content=body.encode(), headers={"Content-Type": kind})
-    assert answer.status_code == status
-    assert said in answer.text
-    folder = refusing.place.folder / "mechanisms"
+
+
+def test_what_cannot_be_kept_is_refused_with_its_reason(lab: Server) -> None:
+    for body, status, said in REFUSED:
+        kind = "application/json" if body.startswith("{") else "application/yaml"
+        answer = lab.http.post("/v1/mechanisms", content=body.encode(), headers={"Content-Type": kind})
+        assert (answer.status_code, said in answer.text) == (status, True), f"{body[:200]}: {answer.text}"
+    folder = lab.place.folder / "mechanisms"
     assert not folder.exists() or not list(folder.iterdir())
 
 
-def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(own_place: Place) -> None:
-    folder = own_place.folder / "mechanisms"
-    with running(own_place, **SEVERAL) as server, Client(str(server.http.base_url)) as client:
-        campaign_id = sent(server, warmed())
-        before = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
-        folder.mkdir()
-        (folder / "warm.yaml").write_text(WARM.replace("gain", "weather"), encoding="utf-8")
-        for _ in range(2):
-            with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
-                client.mechanisms.all()
-            with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
-                client.diagnoses.start(campaign_id)
-        page = httpx.get(f"{server.http.base_url}/diagnoses/{before['id']}", headers={"Accept": "text/html"})
-        assert page.status_code == 200
-        assert "follows" in page.text
-        (folder / "warm.yaml").write_text(WARM, encoding="utf-8")
-        found = client.diagnoses.wait(client.diagnoses.start(campaign_id)["id"])
-        assert [entry["name"] for entry in found["report"]["mechanisms"]] == ["warm_amplifier"]
+def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(lab: Server, client: Client) -> None:
+    file = lab.place.folder / "mechanisms" / "warm.yaml"
+    campaign_id = sent(lab, warmed())
+    before = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=FEW)["id"])
+    file.parent.mkdir()
+    file.write_text(WARM.replace("gain", "weather"), encoding="utf-8")
+    for _ in range(2):
+        with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
+            client.mechanisms.all()
+        with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
+            client.diagnoses.start(campaign_id, without=FEW)
+    page = lab.http.get(f"/diagnoses/{before['id']}", headers={"Accept": "text/html"})
+    assert page.status_code == 200
+    assert "follows" in page.text
+    file.write_text(WARM, encoding="utf-8")
+    found = client.diagnoses.wait(client.diagnoses.start(campaign_id, without=FEW)["id"])
+    assert [entry["name"] for entry in found["report"]["mechanisms"]] == ["warm_amplifier"]

@@ -15,6 +15,7 @@ from service.store.tables import models as model_rows
 from tests.support.store_server import Place, campaign
 from underskin.recordings.campaign import parse
 
+BACKEND = "postgresql"
 BASIS = diagnoses.Basis("0" * 64, "1.0")
 
 

@@ -1,7 +1,7 @@
 """A migration killed half way: the store is as it was or as it is to be, and the next start ends the work.
 
 A process of its own is killed by SIGKILL before one of its statements or commits, on its way from the first schema: at
-one in twenty of them, or with UNDERSKIN_SOAK=1 at each of them and from every schema.
+one in thirty of them, or with UNDERSKIN_SOAK=1 at each of them and from every schema.
 """
 
 import multiprocessing
@@ -25,7 +25,7 @@ from tests.service.backends import BACKENDS
 from tests.service.store.old_stores.contents import LANDED, take_over
 from tests.support.store_server import Place
 
-STEP = 1 if SOAK else 20
+STEP = 1 if SOAK else 30
 OLDER = list(LANDED)[: None if SOAK else 1]
 
 

@@ -15,6 +15,9 @@ from tests.service.backends import BACKENDS
 from tests.support.store_server import Place, Server, campaign, running
 from underskin.recordings.campaign import parse
 
+BACKEND = "sqlite"
+on_both = pytest.mark.parametrize("server", BACKENDS, indirect=True)
+
 
 def names(server: Server) -> set[str]:
     return {entry["name"] for entry in server.http.get("/v1/campaigns?limit=200&state=all").json()["campaigns"]}
@@ -24,6 +27,7 @@ def send(server: Server, name: str) -> None:
     assert server.http.post("/v1/campaigns", json=campaign(name)).status_code == 201
 
 
+@on_both
 def test_a_backup_brings_back_what_was_there(server: Server, tmp_path: Path) -> None:
     file = tmp_path / "kept.backup"
     send(server, "before")
@@ -89,6 +93,7 @@ def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> No
         assert names(there) == {"moved"}
 
 
+@pytest.mark.parametrize("place", BACKENDS, indirect=True)
 def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
     place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -155,6 +160,7 @@ def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> Non
         assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
+@on_both
 def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:
     send(server, "kept")
     good = tmp_path / "good"

@@ -7,6 +7,8 @@ import pytest
 
 from tests.support.store_server import Server, campaign
 
+BACKEND = "postgresql"
+
 
 def post(server: Server, document: Any, **query: str) -> dict[str, Any]:
     answer = server.http.post("/v1/campaigns", json=document, params=query)

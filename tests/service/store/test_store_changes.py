@@ -11,6 +11,8 @@ import pytest
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "postgresql"
+
 
 @pytest.fixture
 def lab(server: Server) -> Iterator[httpx.Client]:

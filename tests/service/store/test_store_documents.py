@@ -19,7 +19,8 @@ from tests.support.store_server import Place, Server, campaign
 from underskin.recordings.campaign import parse, to_dict
 from underskin.recordings.readers import hdf5_file
 
-RECORDINGS, SAMPLES = 60, 50_000
+BACKEND = "sqlite"
+RECORDINGS, SAMPLES = 60, 20_000
 ONE = SAMPLES * 8 * 2  # bytes of a recording's two arrays
 
 
@@ -74,7 +75,7 @@ def test_a_document_takes_the_memory_of_a_few_recordings(place: Place, tmp_path:
     store.close()
 
 
-@pytest.mark.parametrize("count", [1, 7, 8, 9, 17])
+@pytest.mark.parametrize("count", [1, 8, 9, 17])
 def test_documents_of_any_number_of_recordings_are_whole(server: Server, count: int) -> None:
     document = {**campaign("many", sensors=9, lines=3, id="palm"), "units_checked": True}
     document["recordings"] = document["recordings"][:count]

@@ -13,7 +13,7 @@ from tests.support.streams import BATCH, Stream, check_kept
 
 # In parts, so that an interrupted soak goes on with the next one.
 PARTS = 10 if SOAK else 1
-KILLS = {"sqlite": 20 if SOAK else 6, "postgresql": 5 if SOAK else 2}
+KILLS = {"sqlite": 20 if SOAK else 4, "postgresql": 5 if SOAK else 2}
 SENDERS = 2
 
 

@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import httpx
 import orjson
@@ -20,9 +21,9 @@ from tests.support.store_server import Place, Server, campaign, running
 
 @pytest.fixture
 def small_disk() -> Iterator[Path]:
-    """A folder with room for 8 MB."""
+    """A folder with room for 4 MB."""
     folder = Path(tempfile.mkdtemp(prefix="underskin-small-"))
-    mount = ["mount", "-t", "tmpfs", "-o", "size=8m", "tmpfs", str(folder)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=4m", "tmpfs", str(folder)]
     if os.geteuid() != 0 or subprocess.run(mount, capture_output=True).returncode != 0:
         folder.rmdir()
         pytest.skip("mounting a small disk takes root")
@@ -48,20 +49,19 @@ def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) ->
 
 
 def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place) -> None:
-    acknowledged: dict[str, str] = {}
+    acknowledged: dict[str, dict[str, Any]] = {}
     with running(cramped) as server:
         statuses: list[int] = []
         while statuses[-3:] != [507] * 3:
             assert len(statuses) < 300, "the disk does not fill"
-            name = f"run {len(statuses)}"
-            answer = server.http.post("/v1/campaigns", json=campaign(name, sensors=20, lines=100))
+            document = campaign(f"run {len(statuses)}", sensors=20, lines=100)
+            answer = server.http.post("/v1/campaigns", json=document)
             statuses.append(answer.status_code)
             assert answer.status_code in (201, 507), answer.text
             if answer.status_code == 201:
-                acknowledged[answer.json()["id"]] = name
+                acknowledged[answer.json()["id"]] = document
         assert statuses[0] == 201
         assert answer.headers["content-type"] == "application/problem+json"
-        require_kept(server, acknowledged)
         one = next(iter(acknowledged))
         reads = ["/v1/sigma?a_over_h=0.3&rt_over_h=0.6", "/v1/skins", f"/v1/campaigns/{one}/d33", "/ready"]
         reads.append(f"/v1/campaigns/{one}/d33?band_low_hz=10&band_high_hz=100")
@@ -95,12 +95,11 @@ def test_who_has_a_key_can_log_in_to_read(small_disk: Path) -> None:
     assert "a login cannot be noted" in (small_disk.parent / f"{small_disk.name}.log").read_text()
 
 
-def require_kept(server: Server, acknowledged: dict[str, str]) -> None:
+def require_kept(server: Server, acknowledged: dict[str, dict[str, Any]]) -> None:
     """The store holds these campaigns, whole, and no other."""
     page = server.http.get("/v1/campaigns?limit=200&state=all").json()["campaigns"]
-    assert {entry["id"]: entry["name"] for entry in page} == acknowledged
-    for campaign_id, name in acknowledged.items():
-        sent = campaign(name, sensors=20, lines=100)
+    assert {entry["id"]: entry["name"] for entry in page} == {key: sent["name"] for key, sent in acknowledged.items()}
+    for campaign_id, sent in acknowledged.items():
         sent["skin"]["d33_pc_per_n"] = None
         assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json() == sent
 

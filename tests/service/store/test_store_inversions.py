@@ -16,6 +16,7 @@ from underskin import load_table
 from underskin.inversion import invert
 from underskin.recordings.campaign import parse
 
+BACKEND = "sqlite"
 TABLE = "0" * 64
 
 

@@ -3,6 +3,8 @@
 from tests.support.diagnosed import asked, finished, sent
 from tests.support.store_server import Server, campaign
 
+BACKEND = "sqlite"
+
 
 def test_a_mark_changes_with_what_the_page_shows_and_with_nothing_else(server: Server) -> None:
     def mark(skin: str) -> str:

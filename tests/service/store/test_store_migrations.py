@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from sqlalchemy import inspect
 
-from service.store import Database, StoreError, database, migrate
+from service.store import Database, StoreError, campaigns, database, migrate, open_store
 from service.store.tables import metadata
-from tests.support.store_server import Place, campaign, running
+from tests.support.store_server import Place, campaign
+from underskin.recordings.campaign import parse
 
 NEWEST = migrate.VERSIONS[-1]
 NEXT = '''"""What a later underskin might add."""
@@ -32,10 +33,9 @@ def upgrade() -> None:
 
 @pytest.fixture
 def store(place: Place) -> Iterator[Database]:
-    """A store with a campaign in it, the server gone."""
-    with running(place) as server:
-        assert server.http.post("/v1/campaigns", json=campaign("kept")).status_code == 201
-    opened = database(place.database_url, place.folder)
+    """A store with a campaign in it."""
+    opened = open_store(place.database_url, place.folder)
+    opened.write(campaigns.add, campaigns.NewCampaign(parse(campaign("kept", sensors=1)), None))
     yield opened
     opened.close()
 

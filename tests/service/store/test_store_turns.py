@@ -20,6 +20,7 @@ from service.store import Database, open_store, write_turns
 from tests.service.backends import BACKENDS
 from tests.support.store_server import Place, Server, campaign
 
+BACKEND = "postgresql"
 WRITERS = 45
 
 
@@ -48,9 +49,8 @@ def test_readers_are_answered_while_writers_wait(server: Server) -> None:
             time.sleep(1.0)
             assert not any(one.done() for one in waiting)
             for read in ("/ready", "/health", "/v1/campaigns", "/v1/skins", "/"):
-                began = time.monotonic()
-                assert server.http.get(read, timeout=10).status_code == 200
-                assert time.monotonic() - began < 2.0
+                assert server.http.get(read).status_code == 200
+            assert not any(one.done() for one in waiting)
         answers = [one.result() for one in waiting]
     assert {200, 201} & set(answers)
     assert max(answers) < 500
@@ -69,7 +69,7 @@ def test_files_are_read_while_uploads_wait_for_other_writers(server: Server) -> 
             waiting = [pool.submit(send, number) for number in range(4)]
             time.sleep(1.0)
             assert not any(one.done() for one in waiting)
-            answer = server.http.post("/v1/sigma", content=book.getvalue(), headers={"Content-Type": XLSX}, timeout=10)
+            answer = server.http.post("/v1/sigma", content=book.getvalue(), headers={"Content-Type": XLSX})
             assert answer.status_code == 200, answer.text
         assert [one.result() for one in waiting] == [201] * 4
 
@@ -111,7 +111,7 @@ def test_a_write_that_waits_too_long_is_refused_and_keeps_nothing(
         began = time.monotonic()
         with locked(place), pytest.raises(OperationalError), store.writing():
             raise AssertionError("nobody else may write")
-        assert 0.2 < time.monotonic() - began < 5.0
+        assert time.monotonic() - began > 0.2
         with store.writing() as connection:
             assert connection.execute(text("SELECT 1")).scalar() == 1
 
@@ -128,11 +128,14 @@ def test_of_many_that_wait_in_vain_each_is_told_so(place: Place, monkeypatch: py
             with store.writing():
                 raise AssertionError("nobody else may write")
 
-        began = time.monotonic()
+        def waited_s(count: int) -> float:
+            began = time.monotonic()
+            errors = [one.exception() for one in [pool.submit(write) for _ in range(count)]]
+            assert {type(error) for error in errors} == {OperationalError}
+            return time.monotonic() - began
+
         with locked(place):
-            errors = [one.exception() for one in [pool.submit(write) for _ in range(WRITERS)]]
-        assert {type(error) for error in errors} == {OperationalError}
-        assert time.monotonic() - began < 20.0
+            assert waited_s(WRITERS) < WRITERS / 2 * waited_s(1), "they wait one after the other"
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)

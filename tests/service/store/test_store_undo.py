@@ -29,6 +29,8 @@ from tests.support.store_server import Place, campaign
 from underskin.recordings.campaign import parse
 from underskin.recordings.skin_export import read_overview
 
+BACKEND = "postgresql"
+
 
 @pytest.fixture
 def store(place: Place) -> Iterator[Database]:

@@ -16,6 +16,7 @@ from service.store.tables import adopted_inversions, inversions, sensor_d33
 from tests.support.diagnosed import diagnosed, report, resonant
 from tests.support.store_server import Place, Server, campaign, running
 
+BACKEND = "sqlite"
 CAMPAIGNS = 2  # for so many pages wait
 QUICKLY_S = 8.0  # on a busy machine; a write waits for 20 s
 

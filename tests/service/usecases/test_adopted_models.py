@@ -9,7 +9,7 @@ import numpy as np
 import orjson
 import pytest
 
-from tests.support.diagnosed import D33, SKIN, diagnosed, report, resonant, sent
+from tests.support.diagnosed import D33, SKIN, diagnosed, report, resonant, sent, small
 from tests.support.store_server import Server, campaign
 from underskin import Client, ServiceError
 from underskin.client.answers import Adopted
@@ -156,19 +156,16 @@ def test_histories_say_which_model_each_value_used(server: Server, client: Clien
         client.campaigns.d33(other, model="adopted")
 
 
-@pytest.mark.parametrize(
-    ("verdict", "what_to_do"),
-    [
+def test_only_what_is_explained_is_adopted(server: Server, client: Client) -> None:
+    for verdict, what_to_do in (
         ("no_mismatch", "nothing to adopt; the paper's model serves"),
         ("ambiguous", r"several explanations remain.*recordings that it plans"),
         ("unexplained", "Look at the rig"),
         ("insufficient_data", r"too little was recorded.*Record what it says is lacking"),
-    ],
-)
-def test_only_what_is_explained_is_adopted(server: Server, client: Client, verdict: str, what_to_do: str) -> None:
-    _, diagnosis_id = diagnosed(server, resonant("array"), {**report(), "verdict": verdict})
-    with pytest.raises(ServiceError, match=f"a diagnosis of verdict {verdict}.*must be explained: .*{what_to_do}"):
-        client.skins.adopt("palm", diagnosis_id)
+    ):
+        _, diagnosis_id = diagnosed(server, small(), {**report(), "verdict": verdict})
+        with pytest.raises(ServiceError, match=f"a diagnosis of verdict {verdict}.*must be explained: .*{what_to_do}"):
+            client.skins.adopt("palm", diagnosis_id)
     assert client.skins.models("palm") == []
 
 
@@ -271,23 +268,19 @@ def _spoil(report: dict[str, Any], part: str) -> dict[str, Any]:
     return spoilt
 
 
-@pytest.mark.parametrize("part", ["value", "d33", "provenance"])
-def test_a_report_that_was_tampered_with_is_refused(
-    server: Server, elsewhere: Server, tmp_path: Path, part: str
-) -> None:
+def test_a_report_that_was_tampered_with_is_refused(server: Server, elsewhere: Server, tmp_path: Path) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     with Client(str(server.http.base_url)) as here, Client(str(elsewhere.http.base_url)) as there:
         here.skins.adopt("palm", diagnosis_id)
         file = tmp_path / "palm.h5"
         here.skins.export("palm", file)
-        _rewrite(file, lambda rows: [{**row, "report": _spoil(row["report"], part)} for row in rows])
-        with pytest.raises(ServiceError, match="422"):
-            there.skins.load(file)
-        assert list(there.campaigns.all(state="all")) == []
-
-
-def _rewrite(file: Path, change: Any) -> None:
-    with h5py.File(file, "r+") as opened:
-        rows = change(orjson.loads(opened["diagnoses"][()].tobytes()))
-        del opened["diagnoses"]
-        opened["diagnoses"] = np.frombuffer(orjson.dumps(rows), np.uint8)
+        with h5py.File(file) as opened:
+            rows = orjson.loads(opened["diagnoses"][()].tobytes())
+        for part in ("value", "d33", "provenance"):
+            spoilt = [{**row, "report": _spoil(row["report"], part)} for row in rows]
+            with h5py.File(file, "r+") as opened:
+                del opened["diagnoses"]
+                opened["diagnoses"] = np.frombuffer(orjson.dumps(spoilt), np.uint8)
+            with pytest.raises(ServiceError, match="422"):
+                there.skins.load(file)
+            assert list(there.campaigns.all(state="all")) == [], part

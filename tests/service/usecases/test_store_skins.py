@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.blocks import block
-from tests.support.store_server import Place, Server, campaign, running
+from tests.support.store_server import Server, campaign
 
 BACKEND = "postgresql"
 
@@ -181,30 +181,6 @@ def sent(server: Server, document: dict[str, Any]) -> str:
     answer = server.http.post("/v1/campaigns", json=document)
     assert answer.status_code == 201, answer.text
     return str(answer.json()["id"])
-
-
-def test_changes_need_a_key_of_scope_write(place: Place) -> None:
-    keys = {}
-    for scope in ("read", "write"):
-        done = place.command("key", "create", scope, "--scope", scope)
-        assert done.returncode == 0, done.stderr
-        keys[scope] = done.stdout.split()[-1]
-    changes = [
-        ("/v1/campaigns", campaign("x")),
-        ("/v1/campaigns/c-1/withdraw", {"reason": "?"}),
-        ("/v1/campaigns/c-1/exclusions", {"recording": "r", "reason": "?"}),
-        ("/v1/skins/a/join", {"skin_id": "b", "reason": "?"}),
-        ("/v1/skins/import", {}),
-    ]
-    with running(place, key=keys["read"]) as server:
-        assert server.http.get("/v1/campaigns").status_code == 200
-        for path, body in changes:
-            assert server.http.post(path, json=body).status_code == 403, path
-        for path, body in changes:
-            answer = server.http.post(path, json=body, headers={"Authorization": f"Bearer {keys['write']}"})
-            assert answer.status_code != 403, path
-        sent_by = server.http.get("/v1/campaigns").json()["campaigns"][0]["received_from"]
-        assert sent_by == "write"
 
 
 def test_the_page_describes_the_skin_by_its_latest_campaign_with_frfs(server: Server) -> None:

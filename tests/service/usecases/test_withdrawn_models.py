@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import h5py
 import httpx
@@ -110,13 +109,13 @@ def test_a_model_that_serves_nothing_can_be_withdrawn(server: Server, client: Cl
     assert by_the_adopted_model(server, campaign_id)[0][0] == 404
 
 
-@pytest.mark.parametrize("query", ["", "?reason=", "?reason=%20", f"?reason={'x' * 1001}"])
-def test_a_reason_is_asked_for(server: Server, client: Client, query: str) -> None:
+def test_a_reason_is_asked_for(server: Server, client: Client) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     adopted = client.skins.adopt("palm", diagnosis_id)
-    refused = server.http.delete(f"/v1/skins/palm/model{query}")
-    assert refused.status_code == 422, refused.text
-    assert client.skins.model("palm") == adopted
+    for query in ("", "?reason=", "?reason=%20", f"?reason={'x' * 1001}"):
+        refused = server.http.delete(f"/v1/skins/palm/model{query}")
+        assert refused.status_code == 422, refused.text
+        assert client.skins.model("palm") == adopted
 
 
 def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
@@ -182,31 +181,28 @@ def test_it_is_elsewhere_and_after_a_restore_as_it_was_here(
         client.skins.model("palm")
 
 
-@pytest.mark.parametrize(
-    ("change", "status"),
-    [
-        ({"withdrawn_at": "2026-11-21T20:00:00.000000Z"}, 422),  # without a reason
-        ({"withdraw_reason": "without a time"}, 422),
-        ({"withdrawn_at": "yesterday", "withdraw_reason": "wrong"}, 422),
-        (None, 200),
-    ],
-)
 def test_files_of_an_older_underskin_come_in_and_spoilt_ones_do_not(
-    server: Server, elsewhere: Server, client: Client, tmp_path: Path, change: dict[str, Any] | None, status: int
+    server: Server, elsewhere: Server, client: Client, tmp_path: Path
 ) -> None:
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     adopted = client.skins.adopt("palm", diagnosis_id)
     file = tmp_path / "palm.h5"
     client.skins.export("palm", file)
-    with h5py.File(file, "r+") as opened:
+    with h5py.File(file) as opened:
         (row,) = orjson.loads(opened["models"][()].tobytes())
-        older = {name: value for name, value in row.items() if not name.startswith("withdr")}
-        assert len(older) == len(row) - 3
-        del opened["models"]
-        opened["models"] = np.frombuffer(orjson.dumps([older if change is None else row | change]), np.uint8)
-    answer = elsewhere.http.post(
-        "/v1/skins/import", content=file.read_bytes(), headers={"Content-Type": "application/octet-stream"}
-    )
-    assert answer.status_code == status, answer.text
-    found = elsewhere.http.get("/v1/skins/palm/model")
-    assert (found.json() if status == 200 else found.status_code) == (adopted if status == 200 else 404)
+    older = {name: value for name, value in row.items() if not name.startswith("withdr")}
+    assert len(older) == len(row) - 3
+    for model, status in (
+        (row | {"withdrawn_at": "2026-11-21T20:00:00.000000Z"}, 422),  # without a reason
+        (row | {"withdraw_reason": "without a time"}, 422),
+        (row | {"withdrawn_at": "yesterday", "withdraw_reason": "wrong"}, 422),
+        (older, 200),
+    ):
+        with h5py.File(file, "r+") as opened:
+            del opened["models"]
+            opened["models"] = np.frombuffer(orjson.dumps([model]), np.uint8)
+        headers = {"Content-Type": "application/octet-stream"}
+        answer = elsewhere.http.post("/v1/skins/import", content=file.read_bytes(), headers=headers)
+        assert answer.status_code == status, answer.text
+        found = elsewhere.http.get("/v1/skins/palm/model")
+        assert (found.json() if status == 200 else found.status_code) == (adopted if status == 200 else 404)
