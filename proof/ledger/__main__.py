@@ -7,10 +7,24 @@ test, unless the new answers are kept.
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from proof.ledger.campaigns import PARTS
+from proof.ledger.campaigns import NEEDS, PARTS
+from proof.ledger.differences import text
 from proof.ledger.run import run
+from proof.stored import Work
+
+
+def main(names: Sequence[str], work: Work, *, keep: bool) -> int:
+    """Run the parts whose data are there, print what changed, and return the exit status."""
+    for name in names:
+        if name in NEEDS and NEEDS[name] not in os.environ:
+            print(f"{name}: left out, since {NEEDS[name]} does not name the folder of its data", file=sys.stderr)
+    there = [name for name in names if name not in NEEDS or NEEDS[name] in os.environ]
+    compared = run({name: PARTS[name]() for name in there}, work, keep=keep)
+    print(text(compared))
+    return int(not keep and any(part.is_worse for part in compared))
 
 
 def _arguments() -> argparse.Namespace:
@@ -28,4 +42,4 @@ def _arguments() -> argparse.Namespace:
 
 if __name__ == "__main__":
     given = _arguments()
-    sys.exit(run(given.parts or list(PARTS), keep=given.keep, work_dir=given.work_dir, workers=given.workers))
+    sys.exit(main(given.parts or list(PARTS), Work(given.work_dir, given.workers), keep=given.keep))
