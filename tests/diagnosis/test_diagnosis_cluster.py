@@ -10,7 +10,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from bench.soak import SOAK
 from tests.support.diagnosis_campaigns import Made, campaign
+from tests.support.lean_reports import beside
 from underskin.cli.app import app
 from underskin.recordings.campaign import to_dict
 from underskin.surrogate.sigma_table import load_table
@@ -29,7 +31,8 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
         file.write_text(json.dumps(to_dict(campaign(made, load_table()))), encoding="utf-8")
     torn = tmp_path / "torn.json"
     torn.write_text("{", encoding="utf-8")
-    given = ["diagnose", *map(str, files), str(torn), "--html"]
+    left_out = [word for name in beside("contact_resonance", "ageing") for word in ("--without", name)]
+    given = ["diagnose", *map(str, files), str(torn), "--html", *left_out]
 
     def written(folder: str, *options: str) -> dict[str, bytes]:
         result = CliRunner().invoke(app, [*given, "--output-dir", str(tmp_path / folder), *options])
@@ -44,7 +47,8 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
         there = written("there", "--scheduler", cluster.scheduler_address)
     assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]
     assert there == here
-    assert written("processes", "--workers", "2") == here
+    if SOAK:
+        assert written("processes", "--workers", "2") == here
 
 
 @pytest.mark.slow

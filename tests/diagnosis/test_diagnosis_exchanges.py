@@ -6,10 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from rig.draw import drawn, record
 from rig.recorded import campaign as recorded_campaign
+from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.slip_campaigns import MADE, Change, changed, looked_at, named, put_right, slips, times
+from tests.support.slip_campaigns import MADE, Change, changed, looked_at, named, put_right, right, slips, times
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -32,7 +34,7 @@ def require_put_right(wrong: Campaign, good: Campaign, table: SigmaTable, *words
     ((code, statement),) = slips(report)
     assert code == "sensors_exchanged"
     assert all(word in statement for word in words), statement
-    assert put_right(report, looked_at(good, table, known))
+    assert put_right(report, right(good, table, known))
 
 
 def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTable) -> None:
@@ -51,13 +53,14 @@ def test_cables_exchanged_from_some_recording_on(good: Campaign, table: SigmaTab
     """Told by the places, also of a single recording after it; and without places by the sensors' gains."""
     require_put_right(changed(good, exchanged("s0", "s2", 26)), good, table, "r26")
     last = max(number for number, entry in enumerate(frf_recordings(good)) if entry.sensor in ("s0", "s2"))
-    require_put_right(changed(good, exchanged("s0", "s2", last)), good, table, f"r{last}")
+    if SOAK:
+        require_put_right(changed(good, exchanged("s0", "s2", last)), good, table, f"r{last}")
     gains = {"s0": 0.8, "s1": 1.0, "s2": 1.2}
     unequal = changed(good, lambda entry, _: replace(times(entry, gains[entry.sensor]), position_mm=None))
     require_put_right(changed(unequal, exchanged("s0", "s2", 26)), unequal, table, "r26", known="sensor_spread")
 
 
-@pytest.mark.parametrize("since", [0, 20])
+@pytest.mark.parametrize("since", first(1, [20, 0]))
 def test_a_rotated_connector_is_put_right_as_a_whole(since: int, good: Campaign, table: SigmaTable) -> None:
     """A plug that is off by one: each label is the next sensor's."""
     following = {"s0": "s1", "s1": "s2", "s2": "s0"}

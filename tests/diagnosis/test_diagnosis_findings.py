@@ -11,7 +11,7 @@ import underskin
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, added, campaign
 from tests.support.slip_campaigns import MADE, looked_at
-from underskin.recordings.campaign import Campaign, FrfRecording, from_dict, frf_recordings, to_dict
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict, to_dict
 from underskin.recordings.reading import Reading
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
@@ -316,12 +316,11 @@ def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbe
         replace(entry, position_mm=(float(x), 0.0)) for entry, x in zip(frf_recordings(made), places, strict=True)
     ]
     sensor = replace(made.skin.sensors[0], x_mm=0.1 + 0.2 - 0.3)
-    report = looked_at(
-        replace(made, recordings=tuple(scanned), skin=replace(made.skin, sensors=(sensor,))), table
-    )
+    report = looked_at(replace(made, recordings=tuple(scanned), skin=replace(made.skin, sensors=(sensor,))), table)
     assert codes(report) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "word"), [(1e3, "large"), (1e-3, "small")])
 def test_a_d33_far_from_the_declared_one_is_named(factor: float, word: str, table: SigmaTable) -> None:
     """A thousandth of a ceramic's d33, or a weak polymer's times 1000, could be a sensor's."""

@@ -82,6 +82,7 @@ def test_limits_beyond_the_tables_are_said_to_be_that(narrow: Campaign, tmp_path
     assert "more widely" not in plan["statement"]
 
 
+@pytest.mark.soak
 def test_where_nothing_can_be_planned_it_is_said_why(twins: Campaign, tmp_path: Path) -> None:
     plan = planned(twins, tmp_path, "--preload-n", "0.3", "2.4")
     assert plan["recordings"] == []

@@ -126,7 +126,7 @@ def test_campaigns_of_one_name_are_told_what_to_do(tmp_path: Path) -> None:
 @pytest.mark.skipif(SHARED is None, reason="UNDERSKIN_CAMPAIGNS is not set")
 @pytest.mark.parametrize(
     ("name", "verdict"),
-    first(2, [("cxcz7s613", "unexplained"), ("c2pdsjnae", "no_mismatch"), ("c4chxhg3d", "explained")]),
+    first(1, [("cxcz7s613", "unexplained"), ("c2pdsjnae", "no_mismatch"), ("c4chxhg3d", "explained")]),
 )
 def test_campaigns_of_another_rig(name: str, verdict: str, table: SigmaTable) -> None:
     assert SHARED is not None

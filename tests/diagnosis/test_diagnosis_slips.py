@@ -10,7 +10,7 @@ from rig.draw import drawn, record
 from rig.recorded import campaign as recorded_campaign
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.slip_campaigns import MADE, Change, changed, looked_at, named, put_right, slips, times
+from tests.support.slip_campaigns import MADE, Change, changed, looked_at, named, put_right, right, slips, times
 from underskin.mechanisms.unnamed.axes import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
@@ -121,7 +121,7 @@ def conjugate(entry: FrfRecording, _: int) -> FrfRecording:
 def test_polarity_at_random_is_put_right(good: Campaign, table: SigmaTable) -> None:
     report = looked_at(changed(good, by(a_third(len(good.recordings), -1.0, seed=4))), table)
     assert [code for code, _ in slips(report)] == ["sign_flipped"]
-    assert put_right(report, looked_at(good, table))
+    assert put_right(report, right(good, table))
 
 
 def test_a_sensor_at_a_tenth_is_left_out_and_a_spread_of_sensors_is_not(good: Campaign, table: SigmaTable) -> None:
@@ -153,7 +153,7 @@ def test_a_sensor_that_stands_alone_is_its_own_fault_and_no_physics(share: float
 def test_of_sensors_that_all_differ_none_stands_alone(table: SigmaTable) -> None:
     """A spread of 15 %, as poled films have, in skins of six sensors."""
     six = campaign(Made(sensors=6), table)
-    for seed in first(2, range(12)):
+    for seed in first(1, range(12)):
         gains = np.exp(0.15 * np.random.default_rng(seed).normal(size=6))
         assert named(changed(six, by(np.repeat(gains, len(six.recordings) // 6))), table, "sensor_spread") == [], seed
 
@@ -166,7 +166,7 @@ def test_amplitudes_of_another_kind_are_put_right(factor: float, meant: str, goo
     ((code, statement),) = slips(report)
     assert code == "gain_steps"
     assert meant in statement
-    assert put_right(report, looked_at(good, table))
+    assert put_right(report, right(good, table))
 
 
 def test_a_factor_that_all_recordings_share_and_one_of_no_meaning_are_no_slips(
@@ -181,7 +181,7 @@ def test_a_factor_that_all_recordings_share_and_one_of_no_meaning_are_no_slips(
 
 @pytest.mark.parametrize(
     ("seed", "number", "factor"),
-    first(2, [(900500, 11, 0.5**0.5), (944207, 59, 2.0), (900500, 11, 2**0.5), (944207, 59, 0.5)]),
+    first(1, [(900500, 11, 0.5**0.5), (944207, 59, 2.0), (900500, 11, 2**0.5), (944207, 59, 0.5)]),
 )
 def test_another_kind_of_amplitude_is_told_beside_a_scatter_that_no_rig_has(
     seed: int, number: int, factor: float, table: SigmaTable

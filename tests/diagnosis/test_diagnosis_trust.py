@@ -43,7 +43,7 @@ def pdms_curve(
     force = 4 * reduced * a**3 / (3 * radius) - np.sqrt(8 * np.pi * work * reduced * a**3)
     stage = a**2 / radius - np.sqrt(2 * np.pi * work * a / reduced) + force / stage_n_per_m
     lowest = int(np.argmin(stage))
-    travel = np.linspace(-2e-6, 3e-6, 200)
+    travel = np.linspace(-2e-6, 3e-6, 120)
 
     def measured(contact: NDArray[np.bool_]) -> Floats:
         return np.where(contact, np.interp(travel, stage[lowest:], force[lowest:]), 0.0)

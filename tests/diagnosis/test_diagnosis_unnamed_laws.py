@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bench.soak import SOAK
 from rig.unlisted.campaign import as_json, draw
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
@@ -235,6 +236,7 @@ def left_out(mechanism: str, parameters: tuple[float, ...], table: SigmaTable, m
     return found
 
 
+@pytest.mark.soak
 def test_a_thickness_that_is_off_everywhere_is_found_without_its_mechanism(table: SigmaTable) -> None:
     found = left_out("thickness_error", (1.2,), table)
     law = found["unnamed"]
@@ -256,6 +258,7 @@ def test_a_place_that_is_off_everywhere_can_be_adopted(table: SigmaTable) -> Non
     assert adopted(found, made, table) is not None
 
 
+@pytest.mark.soak
 def test_a_gain_of_each_sensor_is_found_without_its_mechanism(table: SigmaTable) -> None:
     made = replace(PLACES, sensors=9, sensor_radius_mm=0.5, offsets_mm=(0.0,), preloads_n=(0.2, 1.0, 5.0))
     found = left_out("sensor_spread", (0.25,), table, made)
@@ -325,5 +328,6 @@ def test_what_the_rig_hides_in_the_order_of_recordings_is_found(
 
 def test_the_scatter_of_an_ordinary_rig_is_nothing_missing_and_a_larger_one_is(table: SigmaTable) -> None:
     assert rig_report(table, {}, *FEW, gain=0.02, position_mm=0.28)["verdict"] == "no_mismatch"
-    assert rig_report(table, {}, *FEW, gain=0.05)["verdict"] == "no_mismatch"
+    if SOAK:
+        assert rig_report(table, {}, *FEW, gain=0.05)["verdict"] == "no_mismatch"
     assert rig_report(table, {}, *FEW, gain=0.25)["verdict"] == "unexplained"

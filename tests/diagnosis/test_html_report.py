@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 import pytest
 
+# Reports that no campaign of a test would have: the command makes pages of diagnoses alone (test_diagnosis_page.py).
 from underskin.diagnosis.reporting.html_report import body_of, page, provenance
 
 HOSTILE = "<script>alert(\"x\")</script> & 'y'"
@@ -156,6 +157,17 @@ def test_a_group_that_the_others_do_not_foretell_is_told_beside_the_error(worst:
     fit = {"before": errors, "after": errors, "noise_floor_percent": 2.4, "groups": groups}
     shown = texts(body_of({**EMPTY, "verdict": "explained", "fit": fit}, {}))
     assert ("the largest on sensor: a3 (31.3 %), which the others do not foretell" in shown) == told
+
+
+@pytest.mark.parametrize(
+    ("verdict", "probability", "decided"),
+    [("explained", 0.97, True), ("no_mismatch", 0.6, False), ("ambiguous", 0.5, False)],
+)
+def test_an_answer_that_is_not_sure_is_not_called_decided(verdict: str, probability: float, decided: bool) -> None:
+    """Of a campaign whose rivals no recording of its rig would tell apart."""
+    shown = texts(body_of({**EMPTY, "verdict": verdict, "probability": probability}, {}))
+    assert ("these recordings decide" in shown) == decided
+    assert ("These recordings do not decide" in shown) == (not decided)
 
 
 def test_what_each_kind_tells_is_a_table() -> None:

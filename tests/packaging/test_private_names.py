@@ -34,6 +34,7 @@ def private_names(tree: ast.Module) -> Iterator[str]:
                 yield from (f"line {node.lineno}: {path}" for name in path.split(".") if is_private(name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_no_private_name_is_used(folder: str) -> None:
     uses = {

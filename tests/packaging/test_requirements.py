@@ -42,6 +42,7 @@ def named(requirements: list[str]) -> set[str]:
     return {canonicalize_name(Requirement(text).name) for text in requirements}
 
 
+@pytest.mark.slow
 def test_the_library_requires_what_it_imports_and_no_more() -> None:
     assert imported("underskin") - named(EXTRAS["cluster"]) == named(PROJECT["dependencies"])
 

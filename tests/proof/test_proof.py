@@ -26,7 +26,7 @@ from rig.description import parse as parse_experiment
 from rig.draw import CATALOGUED, UNKNOWN, drawn
 from rig.strengths import of_frf
 from tests.support.cases import first
-from underskin.diagnosis.pipeline import diagnosis_report
+from underskin import diagnose
 from underskin.recordings.campaign import FrfRecording, parse
 from underskin.surrogate.sigma_table import load_table
 
@@ -149,7 +149,7 @@ def _light(description: dict[str, Any]) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("sources_digested_once")
+@pytest.mark.usefixtures("quick_digests")
 def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -193,7 +193,7 @@ def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("sources_digested_once")
+@pytest.mark.usefixtures("quick_digests")
 def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
     [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _, __: None)
     found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
@@ -241,7 +241,7 @@ def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
 def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
     """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
     made = paper_array.worlds()
-    array = diagnosis_report(parse(made["array"]), load_table())
+    array = diagnose(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
     assert array["verdict"] == "ambiguous"
     assert array["probability"] < 0.6
@@ -258,7 +258,7 @@ def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned()
 def test_what_would_settle_the_paper_s_question_does() -> None:
     """Both preloads on late sensors: what did it is named."""
     made = paper_array.worlds()
-    aged = diagnosis_report(parse(made["array, then both preloads: age did it"]), load_table())
+    aged = diagnose(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
 
 
@@ -272,7 +272,7 @@ def test_real_recordings() -> None:
     for entry in recorded():
         if entry.name in names:
             document = entry.make(Path(RECORDINGS))
-            made = diagnosis_report(parse(document), load_table())
+            made = diagnose(parse(document), load_table())
             found[entry.name] = made, {mechanism["name"] for mechanism in made["mechanisms"]}
     assert set(found) == set(names)
     assert found["well-E5"][0]["verdict"] == "unexplained"  # with a layer, too, several times the noise remain

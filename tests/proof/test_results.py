@@ -2,6 +2,8 @@
 
 from itertools import zip_longest
 
+import pytest
+
 from proof.results import PARTS, stored_parts
 from proof.text import document
 from tests.support.repository import ROOT
@@ -10,6 +12,7 @@ from tests.support.shown import is_as_shown
 _RESULTS = ROOT / "proof" / "results"
 
 
+@pytest.mark.slow
 def test_the_page_is_what_the_results_give() -> None:
     page = (ROOT / "docs" / "proof.md").read_text(encoding="utf-8").splitlines()
     given = document(stored_parts(_RESULTS)).splitlines()

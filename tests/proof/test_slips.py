@@ -45,6 +45,7 @@ def test_a_conjugated_delay_is_one_of_the_other_sign() -> None:
     ("effect", "values"),
     [("amplifier_high_pass", {"corner_hz": 1.5}), ("sensor_relaxation", {"law": "ladder", "exponent": 0.05})],
 )
+@pytest.mark.slow
 def test_a_conjugated_high_pass_or_relaxation_is_nothing_else(effect: str, values: dict[str, Any]) -> None:
     assert left_of_conjugated(recorded(effect, **values)) > 20.0
 

@@ -108,12 +108,14 @@ def test_a_table_with_a_row_that_does_not_fit_is_refused_by_line() -> None:
         read_contents(b"a;b\n1;2\n2;3\n3", "a.csv")
 
 
+@pytest.mark.slow
 def test_tdms() -> None:
     assert the_time_series(tdms(2), "run.tdms", rig()) == []
     assert contents(tdms(1), "run.tdms").properties == {"operator": "me", "run.preload": 1.0}
 
 
 @pytest.mark.parametrize("lost", ["bytes", "length"])
+@pytest.mark.slow
 def test_an_interrupted_tdms_acquisition_is_read_up_to_the_last_whole_segment(lost: str) -> None:
     whole = tdms(4)
     last = whole.rindex(b"TDSm")
@@ -200,6 +202,7 @@ def test_matlab(write: Any) -> None:
     assert contents(write(matlab_variables()), "run.mat").properties == {"fs": 1000.0, "operator": "me"}
 
 
+@pytest.mark.slow
 def test_matlab_structures_and_matrices() -> None:
     data = matlab_5(
         {"run": {"force": FORCE, "fs": 2.0}, "both": np.column_stack([FORCE, CHARGE]), "cell": [{"a": 1}, "x"]}

@@ -97,7 +97,7 @@ def test_a_force_that_falls_with_depth_needs_its_sign_said() -> None:
 def test_a_wrong_rig_description_is_refused_by_field(
     part: tuple[str, ...], changes: dict[str, Any], message: str
 ) -> None:
-    described = copy.deepcopy(parsed(SMALL).document)
+    described: dict[str, Any] = copy.deepcopy(dict(parsed(SMALL).document))
     place = functools.reduce(lambda found, name: found[name], part, described)
     place.update(changes)
     for name in [name for name, value in changes.items() if value is None]:

@@ -33,13 +33,12 @@ def test_a_spectrum_in_uff58_is_an_frf() -> None:
         "abscissa_axis_units_lab": "Hz",
     }  # fmt: skip
     channels = {"frequency_hz": {"channel": "frequency"}, "frf_pc_per_n": {"channel": "H1"}}
-    for binary in (0, 1):
-        reading = read_file(uff(binary, [dataset]), "run.uff", rig(channels=channels))
-        (recording,) = to_dict(reading.campaign)["recordings"]
-        assert recording["frequency_hz"] == [10.0, 20.0]
-        assert recording["frf_re_pc_per_n"] == pytest.approx([7000.0, 7100.0])
-        assert recording["frf_im_pc_per_n"] == pytest.approx([-500.0, -600.0])
-        assert reading.warnings == ["the line at 0 Hz is left out"]
+    reading = read_file(uff(0, [dataset]), "run.uff", rig(channels=channels))
+    (recording,) = to_dict(reading.campaign)["recordings"]
+    assert recording["frequency_hz"] == [10.0, 20.0]
+    assert recording["frf_re_pc_per_n"] == pytest.approx([7000.0, 7100.0])
+    assert recording["frf_im_pc_per_n"] == pytest.approx([-500.0, -600.0])
+    assert reading.warnings == ["the line at 0 Hz is left out"]
 
 
 SEVERAL = {"frequency_hz": {"channel": "frequency"}, "frf_pc_per_n": {"channel": "FRF"}}
@@ -51,16 +50,15 @@ def test_of_several_frfs_in_uff58_each_is_a_recording() -> None:
     places = {"s1": 0.0, "s2": 8.0, "s3": 16.0}
     skin = {**SKIN, "sensors": [{"id": name, "x_mm": x, "y_mm": 0.0} for name, x in places.items()]}
     channels = {**SEVERAL, "coherence": {"channel": "coherence"}}
-    for binary in (0, 1):
-        data = uff(binary, frf_datasets(["s1", "s2", "s3"]))
-        reading = read_file(data, "run.uff", rig(skin=skin, recording=recording, channels=channels))
-        assert not reading.problems
-        found = to_dict(reading.campaign)["recordings"]
-        assert [(one["id"], one["sensor"]) for one in found] == [(f"run {name}", name) for name in ("s1", "s2", "s3")]
-        for number, one in enumerate(found, start=1):
-            assert one["frf_re_pc_per_n"] == pytest.approx(number * np.array([7.0, 7.1, 7.2]))
-            assert one["coherence"] == pytest.approx([1 - 0.01 * number] * 3)
-        assert reading.warnings == ["holds 3 FRFs, each a part of its own: s1, s2, s3"]
+    data = uff(1, frf_datasets(["s1", "s2", "s3"]))
+    reading = read_file(data, "run.uff", rig(skin=skin, recording=recording, channels=channels))
+    assert not reading.problems
+    found = to_dict(reading.campaign)["recordings"]
+    assert [(one["id"], one["sensor"]) for one in found] == [(f"run {name}", name) for name in ("s1", "s2", "s3")]
+    for number, one in enumerate(found, start=1):
+        assert one["frf_re_pc_per_n"] == pytest.approx(number * np.array([7.0, 7.1, 7.2]))
+        assert one["coherence"] == pytest.approx([1 - 0.01 * number] * 3)
+    assert reading.warnings == ["holds 3 FRFs, each a part of its own: s1, s2, s3"]
 
 
 @leaky_writer

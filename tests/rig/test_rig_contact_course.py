@@ -22,7 +22,7 @@ PULL_OFF = 1.5 * np.pi * W_S * R
 RADII = np.geomspace(1e-5, 1e-2, 20000)
 
 
-def there_and_back(body: Body, compliance: float, samples: int = 3000) -> tuple[Floats, Floats, Floats, Floats]:
+def there_and_back(body: Body, compliance: float, samples: int = 2000) -> tuple[Floats, Floats, Floats, Floats]:
     """Time, travel, depth and force, in 10 s with a hold at the peak."""
     peak = DEPTH + compliance * body.elastic(DEPTH)
     end = min(body.last_touch(compliance), 0.0) - 0.2 * peak
@@ -92,6 +92,7 @@ def test_an_edge_at_rest_is_a_flat_punch() -> None:
     assert slope == pytest.approx(2 * PLANE * a, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_the_cycle_dissipates_the_hysteresis() -> None:
     """Work over the cycle: (w_s − w) over the largest contact, and what snap-in and tear release at constant depth."""
     _, travel, _, force = there_and_back(STICKY, 0.0, 8000)

@@ -79,7 +79,7 @@ def test_a_sphere_on_the_skin_follows_hertz_at_its_modulus() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["compression", "indentation"])
 def test_curves_have_the_elastomer_of_the_lines_and_what_is_declared_is_off_in_half(what: str) -> None:
-    off, count = 0, 60 if SOAK else 16
+    off, count = 0, 60 if SOAK else 12
     for number in range(count):
         document = joint_campaigns(7, number, what).documents[0]
         effects = document.experiment.effects

@@ -149,6 +149,7 @@ def test_d33_comes_back_within_the_stated_uncertainty() -> None:
     assert abs(off.mean()) < 4 / np.sqrt(runs)  # no bias
 
 
+@pytest.mark.slow
 def test_raw_recordings_are_read_with_the_description_written_beside_them(tmp_path: Path) -> None:
     description = described(
         lines=None, drive={**DRIVE, "duration_s": 1.0}, design={"offsets_mm": [[0.0, 0.0]], "preloads_n": [1.0]}

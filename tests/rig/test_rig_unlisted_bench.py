@@ -41,6 +41,7 @@ def test_designs_keep_their_promises() -> None:
         assert {"preload_n", "indenter_radius_mm", "order", "previous_preload_n"} <= set(axes(design))
 
 
+@pytest.mark.slow
 def test_amplitudes_have_the_declared_covariance() -> None:
     """chi2 of the base model over many quiet campaigns: its mean and its spread."""
     chi2, freedom = [], []

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bench.soak import SOAK
 from rig.unlisted.bench import Companion, base_state, log_amplitude, measure, state
 from rig.unlisted.design import Design, draw_design
 from rig.unlisted.fits import Lines, base_chi2, fit_shapes, value
@@ -47,6 +46,12 @@ def _quiet(design: Design, change: np.ndarray[Any, Any] | None = None) -> Observ
     return replace(observed, residual=np.zeros(design.count) if change is None else change)
 
 
+def only_of(monkeypatch: pytest.MonkeyPatch, *names: str) -> None:
+    """Of the static mechanisms try these alone."""
+    every = Skin.forms
+    monkeypatch.setattr(Skin, "forms", lambda skin: {name: f for name, f in every(skin).items() if name in names})
+
+
 @pytest.mark.slow
 def test_every_mechanism_that_can_act_is_fitted() -> None:
     full = _design(4, "load_cycles", "dwell_s", "sensor")
@@ -56,6 +61,7 @@ def test_every_mechanism_that_can_act_is_fitted() -> None:
     assert CATALOGUE - set(static_chi2(_quiet(bare))) == {"ageing", "contact_creep", "sensor_spread", "crosstalk"}
 
 
+@pytest.mark.slow
 def test_mechanisms_reproduce_a_skin_with_another_parameter(monkeypatch: pytest.MonkeyPatch) -> None:
     """The base model of a skin with another E, h or position, made without the mechanism's own code."""
     design = _design(4, "sensor", "y_mm", gain=0.002)
@@ -70,9 +76,8 @@ def test_mechanisms_reproduce_a_skin_with_another_parameter(monkeypatch: pytest.
         "misalignment": log_amplitude(design, state(design, None, shift)) - base,
         "sensor_spread": member[design.sensor],
     }
-    every = Skin.forms
+    only_of(monkeypatch, *changes)
     for name, change in changes.items():
-        monkeypatch.setattr(Skin, "forms", lambda skin, name=name: {n: f for n, f in every(skin).items() if n == name})
         seen = _quiet(design, change)
         assert base_chi2(seen) > 10.0, name
         assert static_chi2(seen)[name] < 0.01, name
@@ -194,12 +199,12 @@ def test_pick_up_of_the_mains_is_recognised() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "needs", "names"),
-    [
-        (Law("contact_radius", "dwell_s", "saturating", (100.0,), (0.12,)), "dwell_s", {"contact_creep"}),
-        (Law("gain", "load_cycles", "saturating", (2000.0,), (-0.12,)), "load_cycles", {"ageing"}),
+    first(2, [
         (Law("frequency_response", "frequency_hz", "threshold", (), (-2.0, 9.5)), "order",
          {"timing_delay", "sensor_relaxation"}),
-    ],
+        (Law("contact_radius", "dwell_s", "saturating", (100.0,), (0.12,)), "dwell_s", {"contact_creep"}),
+        (Law("gain", "load_cycles", "saturating", (2000.0,), (-0.12,)), "load_cycles", {"ageing"}),
+    ]),
 )  # fmt: skip
 def test_a_law_that_is_a_listed_mechanism_is_not_identifiable(law: Law, needs: str, names: set[str]) -> None:
     """A radius that saturates over the dwell time; a gain that falls with load cycles; H near exp(-i w t0).
@@ -231,8 +236,10 @@ def test_a_companion_of_the_catalogue_does_not_hide_a_law() -> None:
     assert entry["chi2_gain_over_best_listed"] > 0.7 * entry["chi2_gain_over_base"] > 100.0
 
 
-@pytest.mark.slow
-def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others() -> None:
+def test_a_companion_is_replaced_by_its_own_mechanism_and_kept_beside_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    only_of(monkeypatch, "crosstalk", "misalignment", "preload_dependent_d33")
     design, companion = _design(4), Companion("preload_dependent_d33", (1.0,))
     data = measure(np.random.default_rng(2), design, None, companion)
     flat = np.ones_like(data.frf)
@@ -254,11 +261,11 @@ def test_a_gain_along_y_is_spread_or_misalignment() -> None:
         assert entry["chi2_gain_over_best_listed"] < 0.3 * entry["chi2_gain_over_base"]
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_base_model_is_within_reach_of_the_mechanisms() -> None:
     """Where there is no law, the best mechanism gains what a few parameters gain from noise, and never less than 0."""
     gains = []
-    for seed in range(5 if SOAK else 2):
+    for seed in range(5):
         design = _design(seed, gain=0.02)
         data = measure(np.random.default_rng(seed), design, None, None)
         seen = amplitudes(design, data, np.ones_like(data.frf), None, base_state(design))

@@ -69,4 +69,3 @@ def lean_fleet(
 ) -> dict[str, Any]:
     """The report on a fleet, likewise."""
     return held(underskin.diagnose_fleet(skins, name, table, without=() if SOAK else left_out))
-

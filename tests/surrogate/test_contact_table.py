@@ -44,7 +44,7 @@ def test_fresh_solves_agree_within_the_reported_error(a: float, radius: float) -
     (sphere,) = press_spheres(a, np.array([radius]), np.array(RHO), 5)
     load = sphere.cbrt_load**3
     contact, stress = TABLE.contact(radius, load), TABLE.stress(radius, load, RHO)
-    assert abs(contact.a_over_h / sphere.contact_radius - 1) <= min(contact.a_error, 1e-5)
+    assert abs(contact.a_over_h / sphere.contact_radius - 1) <= np.minimum(contact.a_error, 1e-5)
     assert abs(contact.indentation_over_h / sphere.indentation - 1) <= contact.indentation_error
     assert abs(contact.stiffness / (sphere.stiffness / 3) - 1) <= contact.stiffness_error
     assert (np.abs(stress.sigma - sphere.sigma) <= stress.sigma_error).all()

@@ -73,7 +73,7 @@ def test_killed_at_any_moment_it_resumes_to_the_table_that_a_cluster_makes(tmp_p
     path, script = tmp_path / "sigma.h5", tmp_path / "make.py"
     script.write_text(SCRIPT)
     for late in first(1, (5, 1, 2, 1, 4, 2, 3, 2)):
-        command = [sys.executable, script, path, str(ORDER), str(late)]
+        command = [sys.executable, str(script), str(path), str(ORDER), str(late)]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         sweep = subprocess.run(command, env=environment, start_new_session=True, stdout=subprocess.DEVNULL, check=False)
         assert sweep.returncode == -signal.SIGKILL

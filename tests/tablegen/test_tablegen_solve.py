@@ -127,6 +127,7 @@ def test_change_grows_like_the_cube_root_of_the_load() -> None:
     assert column.sigma_change[3, 2] / column.sigma_change[3, 1] == pytest.approx(2.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_an_unreachable_load_names_the_point() -> None:
     with pytest.raises(SolverError, match=r"a/h = 1, L = 200"):
         solve_column(1.0, nodes(200.0), order=2)

@@ -82,6 +82,7 @@ def test_the_map_says_who_differs_and_prints_who_is_who(lab: Visit) -> None:
     assert sorted(drawn) == [f"s{number:02d}" for number in range(1, 9)]
 
 
+@pytest.mark.soak
 def test_the_same_is_chosen_with_keys(lab: Visit) -> None:
     page = lab.page
     page.get_by_label("Sensor", exact=True).focus()
@@ -101,6 +102,7 @@ def test_every_page_says_that_its_bars_are_95_percent(lab: Visit) -> None:
         assert "95 %" in page.locator(f"#figure-{name} .plot").evaluate(title)
 
 
+@pytest.mark.soak
 def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(visitor: Visit, server: Server) -> None:
     made = Made(sensors=14, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6)
     sent(server, to_dict(campaign(made, table())), "many")
@@ -116,6 +118,7 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(visitor: Visit
         page.wait_for_function(f"() => {pointed}.customdata?.[0] === {sensor!r}")
 
 
+@pytest.mark.soak
 def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_in_the_dark(
     visitor: Visit, server: Server
 ) -> None:

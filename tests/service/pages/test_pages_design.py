@@ -73,6 +73,7 @@ def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
     assert "pitch of the array [mm]: x – must be a number" in answer.text
 
 
+@pytest.mark.soak
 def test_a_material_gives_its_number_and_leaves_the_others(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design?thickness_mm=3")
@@ -119,6 +120,7 @@ def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(visit
     assert float(page.locator("#pitch_mm").input_value()) == pitch
 
 
+@pytest.mark.soak
 def test_where_no_skin_does_the_limit_is_named(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design/search?thinnest_mm=3")

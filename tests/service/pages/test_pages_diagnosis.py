@@ -102,6 +102,7 @@ def require_whole(figure: Locator, width: int) -> None:
     assert figure.evaluate("one => one.scrollWidth <= one.clientWidth")
 
 
+@pytest.mark.soak
 def test_a_curve_is_chosen_with_keys(visitor: Visit, server: Server) -> None:
     figure = adhesive_figure()
     place = keep(server, "curve", Made(made().report, {**made().figures, "curve": figure.to_json()}))

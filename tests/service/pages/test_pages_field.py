@@ -104,6 +104,7 @@ def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
         visitor.page.locator("#figure-base").get_by_role("button", name="SVG").click()
 
 
+@pytest.mark.soak
 def test_the_load_plays_to_its_end_and_pauses_by_key(visitor: Visit) -> None:
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)
@@ -126,6 +127,7 @@ def test_the_load_plays_to_its_end_and_pauses_by_key(visitor: Visit) -> None:
     assert told(visitor)[0] == "3 N"
 
 
+@pytest.mark.soak
 def test_frames_that_did_not_come_are_asked_for_again(visitor: Visit) -> None:
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)

@@ -49,6 +49,7 @@ def test_every_form_reads_decimal_commas(visitor: Visit, kept: str, width: int) 
     page.get_by_text("Averaged over your own band, 5.5 to 50").wait_for()
 
 
+@pytest.mark.soak
 def test_a_mistyped_number_stays_in_its_form(visitor: Visit, kept: str) -> None:
     page = visitor.page
     for path in first(1, ("/design", "/loads", "/d33")):
@@ -108,6 +109,7 @@ def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(vis
     visitor.drawn(2)
 
 
+@pytest.mark.soak
 def test_a_second_upload_leaves_the_first_draft_and_the_form_lists_both(visitor: Visit) -> None:
     page = visitor.page
     for name in ("first", "second"):

@@ -80,6 +80,7 @@ def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(server: Server, v
     assert [row["absent"] for row in rows] == ["", old, old]
 
 
+@pytest.mark.soak
 def test_older_campaigns_are_on_the_pages_behind(server: Server, visitor: Visit) -> None:
     for number in range(52):
         month, day = 1 + number // 28, 1 + number % 28

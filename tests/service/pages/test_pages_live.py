@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import orjson
+import pytest
 
 from tests.service.pages.conftest import Visit
 from tests.support import preloaded
@@ -58,6 +59,7 @@ def test_a_verdict_and_a_withdrawal_are_shown_without_a_reload(visitor: Visit, s
     assert page.evaluate(STAYED)
 
 
+@pytest.mark.soak
 def test_the_choice_of_a_sensor_stays_and_works_after_the_page_was_renewed(visitor: Visit, server: Server) -> None:
     page = visitor.page
     sent(server, campaign("first", sensors=2), "chosen")

@@ -1,6 +1,7 @@
 """Changing one's mind with a mouse: a recording excluded, a campaign withdrawn; and what then is said of models."""
 
 import httpx
+import pytest
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
@@ -58,6 +59,7 @@ def test_a_key_tells_who_it_is_whatever_is_typed(locked: tuple[Server, dict[str,
     assert server.http.get(f"/v1/campaigns/{kept}").json()["withdrawn_from"] == "the writeer"
 
 
+@pytest.mark.soak
 def test_a_recording_that_is_not_there_is_said_so(visitor: Visit, server: Server) -> None:
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
@@ -77,6 +79,7 @@ def test_a_recording_that_is_not_there_is_said_so(visitor: Visit, server: Server
     assert "in use" in page.get_by_role("row", name="s0-1N").inner_text()
 
 
+@pytest.mark.soak
 def test_who_undoes_is_asked_without_keys(visitor: Visit, server: Server) -> None:
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=hasty", json=campaign("hasty")).raise_for_status().json()
@@ -117,6 +120,7 @@ def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(server: S
     server.http.delete(f"/v1/diagnoses/{waiting}").raise_for_status()  # so that no other test here claims it
 
 
+@pytest.mark.soak
 def test_an_excluded_recording_takes_the_model_out_of_force(visitor: Visit, server: Server) -> None:
     page = visitor.page
     campaign_id, diagnosis_id = diagnosed(server, resonant("explained"), report(), "adopts")

@@ -1,5 +1,7 @@
 """The whole way of somebody who is here for the first time, with a real browser."""
 
+import pytest
+
 from tests.service.pages.conftest import Visit
 from tests.service.pages.lab_files import frf_tdms
 from tests.support.diagnosed import resonant
@@ -8,6 +10,7 @@ from tests.support.store_server import Server
 SKIN = "my-first"
 
 
+@pytest.mark.soak
 def test_from_the_start_to_a_history_by_the_adopted_model(patient: Visit, diagnosing: Server) -> None:
     page = patient.page
     patient.go("/")

@@ -147,6 +147,7 @@ def test_the_summary_of_a_page_is_one_sheet_on_which_no_texts_overlap(visitor: V
     assert not any(part.get_attribute("open") is not None for part in folded.all())  # as it was before printing
 
 
+@pytest.mark.soak
 def test_so_is_that_of_a_saved_file(visitor: Visit, server: Server, place: str, tmp_path: Path) -> None:
     page = visitor.page
     file = tmp_path / "report.html"

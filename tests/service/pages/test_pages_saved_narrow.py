@@ -33,6 +33,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
+@pytest.mark.soak
 def test_texts_of_figures_are_whole_and_apart(visitor: Visit, saved: Path) -> None:
     page = visitor.page
     page.set_viewport_size({"width": 390, "height": 800})

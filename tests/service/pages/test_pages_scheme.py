@@ -104,6 +104,7 @@ def test_figures_are_dark_on_the_screen_and_light_on_paper(
     require_light(dark.page)
 
 
+@pytest.mark.soak
 def test_a_saved_figure_and_what_a_browser_prints_are_on_white(
     dark: Visit, addresses: dict[str, str], downloads: Path
 ) -> None:
@@ -120,6 +121,7 @@ def test_a_saved_figure_and_what_a_browser_prints_are_on_white(
     require_dark(page)
 
 
+@pytest.mark.soak
 def test_files_without_a_server_are_dark_too(
     dark: Visit, server: Server, addresses: dict[str, str], downloads: Path
 ) -> None:

@@ -29,6 +29,7 @@ def test_force_and_travel_are_flipped_on_demand(visitor: Visit, width: int) -> N
     assert "2.000\xa0MPa" in page.get_by_role("main").inner_text()
 
 
+@pytest.mark.soak
 def test_a_force_left_negative_gives_no_modulus(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("block.json", as_json(block("left", force=-1)))], skin="left")

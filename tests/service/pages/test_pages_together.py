@@ -1,6 +1,7 @@
 """Several campaigns, of a skin or of a fleet, diagnosed together in the browser; hostile names, and no script."""
 
 import httpx
+import pytest
 from playwright.sync_api import Browser
 
 from tests.service.pages.conftest import Visit
@@ -111,6 +112,7 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) ->
     context.close()
 
 
+@pytest.mark.soak
 def test_what_is_chosen_stays_while_the_list_is_searched(visitor: Visit, server: Server) -> None:
     for name in ("ring", "disc", "plate"):
         sent_to(server, f"make-a-{name}", name)

@@ -57,6 +57,7 @@ def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(vis
     page.get_by_text("1 recording understood").wait_for()
 
 
+@pytest.mark.soak
 def test_a_mapping_that_cannot_be_used_says_why(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG)
@@ -115,6 +116,7 @@ def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:
     assert "6 recordings understood" in page.get_by_role("status").inner_text()
 
 
+@pytest.mark.soak
 def test_files_of_one_day_become_one_campaign_or_one_each(visitor: Visit, server: Server) -> None:
     page = visitor.page
     both = [file(f"{name}.json", as_json(campaign(name, id="day"))) for name in ("morning", "evening")]

@@ -144,6 +144,7 @@ def test_the_request_names_the_files_that_were_chosen(visitor: Visit) -> None:
     assert 'rig="bench 3.yaml"' in python
 
 
+@pytest.mark.soak
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore:unclosed file:ResourceWarning")
 def test_every_frf_of_a_universal_file_becomes_a_recording(visitor: Visit) -> None:
     page = visitor.page

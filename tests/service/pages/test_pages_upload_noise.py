@@ -24,6 +24,7 @@ def shaken() -> tuple[str, float]:
     return "\n".join(["Time [s],Force [N],Charge [pC]", *rows]), float(np.sqrt(2) * (force - force.mean()).std())
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
 def test_the_dynamic_force_of_noise_is_measured_and_not_asked_for(visitor: Visit, server: Server, width: int) -> None:
     page = visitor.page

@@ -43,6 +43,7 @@ def keep_curve(visitor: Visit, skin: str) -> None:
     visitor.page.wait_for_url("**/campaigns/*")
 
 
+@pytest.mark.soak
 def test_a_shaker_s_file_is_not_read_with_the_settings_of_a_force_microscope(visitor: Visit) -> None:
     page = visitor.page
     keep_curve(visitor, "pdms-7")
@@ -66,6 +67,7 @@ def test_a_shaker_s_file_is_not_read_with_the_settings_of_a_force_microscope(vis
     expect(page.get_by_text("less 3")).to_have_count(0)
 
 
+@pytest.mark.soak
 def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not_be_kept(visitor: Visit) -> None:
     page = visitor.page
     curve = file("afm.txt", text_of_raw_curve(above="# both"))
@@ -89,6 +91,7 @@ def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not
     visitor.require_accessible()
 
 
+@pytest.mark.soak
 def test_a_rig_description_that_cannot_be_used_is_named_and_not_what_was_typed(visitor: Visit) -> None:
     page = visitor.page
     curve = file("afm.txt", text_of_raw_curve(above="# rig"))
@@ -117,6 +120,7 @@ def test_a_second_file_of_the_instrument_says_what_it_is_read_by_and_can_start_w
     expect(page.get_by_label("Formula of derived channel 1", exact=True)).to_have_value("")
 
 
+@pytest.mark.soak
 def test_a_typed_value_counts_for_more_than_a_property(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("typed.txt", text_of_raw_curve(above="# Tip radius [mm]: 5"))])
@@ -175,6 +179,7 @@ def test_that_a_preload_beyond_the_table_gives_no_d33_is_said_before(
     assert page.index(said) < page.index("<button>Keep")
 
 
+@pytest.mark.soak
 def test_a_kind_that_lacks_a_channel_is_said_in_the_form_s_words(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("shaker.tdms", shaker())])

@@ -1,15 +1,20 @@
 """A preload that is typed once for several files, or was for earlier ones, beside what each file's own force says."""
 
+import html
 import io
 import re
 
+import httpx
 import numpy as np
+import pytest
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 from playwright.sync_api import expect
 
 from tests.service.pages.conftest import Visit
+from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.test_pages_workbench import read_it
 from tests.service.pages.uploads import file, look_at
+from tests.support.store_server import Server
 
 RATE_HZ, SAMPLES = 1024, 2048
 TIME = np.arange(SAMPLES) / RATE_HZ
@@ -29,6 +34,27 @@ def shaken(static: np.ndarray | float) -> bytes:
     return buffer.getvalue()
 
 
+RIG = """\
+schema: rig/1
+kind: frf
+skin: {thickness_mm: 2.5, youngs_modulus_mpa: 16, poisson_ratio: 0.5, sensor_radius_mm: 1.5,
+       sensors: [{id: s1, x_mm: 0, y_mm: 0}]}
+recording: {sensor: s1, indenter_radius_mm: 4, preload_n: 1}
+channels: {force_n: {channel: Force}, charge_pc: {channel: Charge}}
+"""
+
+
+def test_a_stated_preload_is_held_against_the_force_of_each_file(server: Server) -> None:
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+        form = {"form_token": token_of(client.get("/upload").text)}
+        files = [("file", (f"{force}.tdms", shaken(force))) for force in (1.0, 2.0)]
+        answer = client.post("/upload", data=form, files=[*files, ("rig", ("rig.yaml", RIG))], follow_redirects=True)
+    assert "<b>2</b> recordings understood" in answer.text
+    assert answer.text.count("as stated, but its force is") == 1
+    assert "2.0.tdms: pressed by 1 N as stated, but its force is 2.00 N on average" in html.unescape(answer.text)
+
+
+@pytest.mark.soak
 def test_a_typed_preload_is_held_against_the_force_of_each_file(visitor: Visit) -> None:
     page = visitor.page
     # A piezo sensor goes to 0 from the preload that it was pressed by; a creeping one never holds still.

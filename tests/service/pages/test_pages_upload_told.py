@@ -1,6 +1,7 @@
 """What an upload tells of a campaign before it is kept, and what stays told of a raw file afterwards."""
 
 import numpy as np
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.service.pages.conftest import Visit
@@ -64,6 +65,7 @@ def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept
     visitor.require_accessible()
 
 
+@pytest.mark.soak
 def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(visitor: Visit, server: Server) -> None:
     page = visitor.page
     dated = campaign("hand of April", sensors=6, id="hand")

@@ -117,6 +117,7 @@ def test_d33_over_a_band_of_one_s_own(newcomer: Visit) -> None:
     assert "band_low_hz=5.0&band_high_hz=50.0" in page.get_by_label("Shell").inner_text()
 
 
+@pytest.mark.soak
 def test_loads_on_the_skin_s_array(newcomer: Visit) -> None:
     page = newcomer.page
     page.get_by_role("main").get_by_role("link", name="Loads").click()

@@ -96,6 +96,7 @@ def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     expect(page.get_by_role("status").first).to_contain_text("1 recording understood")
 
 
+@pytest.mark.soak
 def test_brushing_the_figure_fills_in_the_trim(visitor: Visit) -> None:
     page = visitor.page
     look_at(visitor, [file("brush.txt", text_of_raw_curve(above="# brush"))])
@@ -157,6 +158,7 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
     expect(page.get_by_text("of each curve, samples 11 to 380 are used")).to_be_visible()
 
 
+@pytest.mark.soak
 def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Server) -> None:
     page = sized.page
     width = page.viewport_size["width"] if page.viewport_size else 0

@@ -12,7 +12,7 @@ from tests.service.pages.forms import BROWSING, token_of
 from tests.service.pages.uploads import campaigns_of
 from tests.support.raw_curves import MODULUS_MPA, RADIUS_MM, SPRING_N_PER_M, rig_of_raw_curve, text_of_raw_curve
 from tests.support.store_server import Server
-from underskin.diagnosis.pipeline import diagnosis_report
+from underskin import diagnose
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import load_table
 
@@ -46,6 +46,30 @@ def kept_by_page(server: Server, text: str, skin: str) -> None:
             "derived force": DERIVED["load"],
         }
         client.post(f"{address}/keep", data={"skin": skin} | token)
+
+
+def test_an_instrument_s_template_reads_its_next_file(server: Server) -> None:
+    text = text_of_raw_curve(above="# template")
+    with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
+        for day in ("monday", "tuesday"):
+            token = {"form_token": token_of(client.get("/upload").text)}
+            sent = {"file": (f"{day}.txt", f"{text}\n".encode())}
+            address = client.post("/upload", data=token, files=sent).headers["location"]
+            page = client.get(address).text
+            token = {"form_token": token_of(page)}
+            assert ("Read them so again" in page) == (day == "tuesday")
+            if day == "monday":
+                client.post(f"{address}/mapping", data=FORM | token | {"instrument": "force microscope 2"})
+            else:
+                assert "force microscope 2" in page
+                client.post(f"{address}/template", data=token)
+            assert "<b>1</b> recording understood" in client.get(address).text
+            client.post(f"{address}/keep", data={"skin": day} | token)
+    (one,), (other,) = (campaigns_of(server, day) for day in ("monday", "tuesday"))
+    forces = [
+        server.http.get(f"/v1/campaigns/{kept}/document").json()["recordings"][0]["force_n"] for kept in (one, other)
+    ]
+    assert forces[0] == forces[1]
 
 
 def test_a_depth_of_several_channels_is_not_flipped_as_a_whole(server: Server) -> None:
@@ -100,7 +124,7 @@ def test_a_raw_curve_gives_the_known_modulus_by_every_way_in(server: Server, tmp
         documents.append(server.http.get(f"/v1/campaigns/{kept}/document").json())
     columns = [[document["recordings"][0][name] for name in ("displacement_mm", "force_n")] for document in documents]
     assert columns[0] == columns[1] == columns[2]
-    report = diagnosis_report(parse(documents[0]), load_table())
+    report = diagnose(parse(documents[0]), load_table())
     assert report["verdict"] == "no_mismatch"
     found = re.search(
         r"Young's modulus under this answer: ([\d.]+) MPa \(95 %: ([\d.]+) to ([\d.]+)\)", report["statement"]

@@ -107,6 +107,7 @@ def test_many_wrong_lines_are_counted(server: Server) -> None:
     assert "and 10 more" in page
 
 
+@pytest.mark.soak
 def test_a_wrong_map_and_a_wrong_skin_are_told_at_once(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/loads/map")
