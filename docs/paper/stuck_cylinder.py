@@ -139,7 +139,7 @@ def diagnosed(sigma_table: SigmaTable, heights_mm: tuple[float, ...]) -> Diagnos
     pressed = parse(block)
     joint = JointDocument(record_lines(parse(frfs)), CurveSet(pressed, tuple(record_curves(pressed))))
     campaign, _ = from_dict(joint.campaign())
-    return Diagnosed(heights_mm, underskin.diagnose(campaign, sigma_table))
+    return Diagnosed(heights_mm, dict(underskin.diagnose(campaign, sigma_table)))
 
 
 def _consequences(sigma_table: SigmaTable, lower_mpa: float) -> str:

@@ -123,7 +123,7 @@ def test_a_kill_between_the_sending_and_the_journal_doubles_nothing(server: Serv
         at.save("first.json", small("first"))
         through.kill_at_answer.append(at.start())
         assert at.process is not None
-        assert at.process.wait(60) == -signal.SIGKILL
+        assert at.process.wait(240) == -signal.SIGKILL
         assert names(server, "killed") == ["first"]  # kept, and the watch never heard of it
         assert not (at.folder / JOURNAL).exists()
         at.start()
@@ -236,7 +236,7 @@ def test_a_key_that_is_not_known_ends_it_at_the_start(tmp_path: Path) -> None:
     place.folder.mkdir()
     key = place.command("key", "create", "bench", "--scope", "write").stdout.strip()
     with running(place, key=key) as locked, bench(tmp_path, address(locked), "keyed") as at:
-        assert at.start("--key", "us_wrong").wait(60) == 2
+        assert at.start("--key", "us_wrong").wait(240) == 2
         assert "401 Unauthorized: This key is not known" in at.told
         at.save("first.json", small("first"))
         at.start("--key", key)

@@ -134,9 +134,8 @@ def test_mechanism_is_recovered(kind: str, name: str) -> None:
     left_open = report.verdict == "ambiguous" and max((p for names, p in sets if names == [name]), default=0.0)
     assert present >= _PRESENT or left_open >= _LEFT_OPEN, report.statement
     hidden = HIDDEN[kind, name]
-    for mechanism in report.mechanisms:
-        for parameter in mechanism.parameters:
-            effect = hidden.reported.get(parameter.name)
-            if effect in hidden.effect and parameter.low is not None and parameter.high is not None:
-                margin = (parameter.high - parameter.low) / 2
-                assert parameter.low - margin <= hidden.effect[effect] <= parameter.high + margin, parameter
+    for parameter in [one for mechanism in report.mechanisms for one in mechanism.parameters]:
+        effect = hidden.reported.get(parameter.name, "")
+        if effect in hidden.effect and parameter.low is not None and parameter.high is not None:
+            margin = (parameter.high - parameter.low) / 2
+            assert parameter.low - margin <= hidden.effect[effect] <= parameter.high + margin, parameter

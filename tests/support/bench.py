@@ -64,7 +64,7 @@ class Bench:
         """End the watch; its exit status."""
         assert self.process is not None
         self.process.send_signal(number)
-        return self.process.wait(30)
+        return self.process.wait(240)  # ends a hang
 
     def journal(self) -> list[dict[str, Any]]:
         """The entries of the journal."""

@@ -25,7 +25,7 @@ def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_wi
 ) -> None:
     page = visitor.page
     found = underskin.diagnose(parse(warmed()), table(), without=beside())
-    _, diagnosis_id = diagnosed(server, warmed(), found.document, "warmed")
+    _, diagnosis_id = diagnosed(server, warmed(), dict(found.document), "warmed")
     visitor.go(f"/diagnoses/{diagnosis_id}")
     page.get_by_role("heading", name="Keep this law under a name").wait_for()
     page.get_by_label("Name", exact=False).first.fill("Warm Amplifier")

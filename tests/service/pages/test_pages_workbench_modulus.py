@@ -59,7 +59,7 @@ def test_an_instrument_s_template_reads_its_next_file(server: Server) -> None:
             token = {"form_token": token_of(page)}
             assert ("Read them so again" in page) == (day == "tuesday")
             if day == "monday":
-                client.post(f"{address}/mapping", data=FORM | token | {"instrument": "force microscope 2"})
+                client.post(f"{address}/mapping", data=FORM | token | {"name": "force microscope 2"})
             else:
                 assert "force microscope 2" in page
                 client.post(f"{address}/template", data=token)
