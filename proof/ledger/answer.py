@@ -27,7 +27,7 @@ def named(report: Report) -> list[str]:
 
 
 def answer(report: Report) -> dict[str, Any]:
-    """Verdict, set, probability, and the d33 or modulus that is stated, with its 95 % interval."""
+    """Verdict, set, probability, the d33 or modulus that is stated, and the set's parameters, with 95 % intervals."""
     stated = {"verdict": report.get("verdict", "slips"), "names": named(report)}
     if "slips" in report:
         return {**stated, "slips": slips_told(report)}
@@ -39,7 +39,12 @@ def answer(report: Report) -> dict[str, Any]:
     if value and value.get("value") is not None:
         stated[quantity] = [_rounded(value.get(end)) for end in ("value", "low", "high")]
         stated["quotable"] = bool(value.get("quotable", report["verdict"] in ("explained", "no_mismatch")))
-    return stated
+    parameters = {
+        f"{mechanism['name']}.{entry['name']}": [_rounded(entry[end]) for end in ("value", "low", "high")]
+        for mechanism in report["mechanisms"]
+        for entry in mechanism.get("parameters", ())
+    }
+    return {**stated, "parameters": parameters} if parameters else stated
 
 
 def slips_told(report: Report) -> list[int]:

@@ -55,7 +55,7 @@ class Compared:
 
 def differences(kept: Line, new: Line) -> Iterator[str]:
     """What differs in one answer, in words: set, verdict, probability by more than 0.05, a number or its interval by
-    more than a tenth of the kept interval."""
+    more than a tenth of the kept interval (also of each parameter of a set that stayed)."""
     if kept["documents"] != new["documents"]:
         yield "the campaign itself"
     before, after = kept["answer"], new["answer"]
@@ -67,6 +67,10 @@ def differences(kept: Line, new: Line) -> Iterator[str]:
     for quantity in _QUANTITIES:
         if _moved(before.get(quantity), after.get(quantity)):
             yield f"{quantity} {_interval(before.get(quantity))} → {_interval(after.get(quantity))}"
+    known, found = before.get("parameters", {}), after.get("parameters", {})
+    for name in [one for one in known if one in found]:
+        if _moved(known[name], found[name]):
+            yield f"{name} {_interval(known[name])} → {_interval(found[name])}"
     if before.get("quotable", False) != after.get("quotable", False):
         yield "quotable now" if after.get("quotable") else "no longer quotable"
 

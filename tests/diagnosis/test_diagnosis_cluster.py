@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bench.soak import SOAK
+from tests.support.dask_cluster import local_cluster
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside
 from underskin.cli.app import app
@@ -25,7 +26,6 @@ ALONE = Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,))
 
 @pytest.mark.slow
 def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
     files = [tmp_path / f"palm-{number}.json" for number in range(2)]
     for file, made in zip(files, (replace(RESONANT, sensors=1, lines=10, preloads_n=(0.6, 2.4)), ALONE), strict=True):
         file.write_text(json.dumps(to_dict(campaign(made, load_table()))), encoding="utf-8")
@@ -41,9 +41,7 @@ def test_reports_and_pages_are_the_same_on_a_dask_cluster_and_in_processes(tmp_p
         return {file.name: file.read_bytes() for file in (tmp_path / folder).iterdir()}
 
     here = written("here", "--workers", "1")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-    ) as cluster:
+    with local_cluster() as cluster:
         there = written("there", "--scheduler", cluster.scheduler_address)
     assert sorted(here) == ["palm-0.html", "palm-0.json", "palm-1.html", "palm-1.json"]
     assert there == here

@@ -16,7 +16,7 @@ from proof.stored import Work
 LINE: dict[str, Any] = {
     "name": "a", "documents": "d", "truth": {"effects": ["adhesion"], "shows": ["adhesion"], "d33": 14.0},
     "answer": {"verdict": "explained", "names": ["adhesion"], "probability": 0.9, "d33": [14.0, 13.0, 15.0],
-               "quotable": True},
+               "quotable": True, "parameters": {"adhesion.work_of_adhesion": [0.2, 0.18, 0.22]}},
     "grade": "right",
 }  # fmt: skip
 
@@ -36,6 +36,10 @@ def changed(**answer: Any) -> dict[str, Any]:
         ({"d33": [14.3, 13.0, 15.0]}, ["d33 14 (13 to 15) → 14.3 (13 to 15)"]),
         ({"d33": [14.0, 13.0, 17.0]}, ["d33 14 (13 to 15) → 14 (13 to 17)"]),
         ({"verdict": "ambiguous", "names": []}, ["explained → ambiguous", "adhesion → nothing"]),
+        (
+            {"parameters": {"adhesion.work_of_adhesion": [0.21, 0.19, 0.23]}},
+            ["adhesion.work_of_adhesion 0.2 (0.18 to 0.22) → 0.21 (0.19 to 0.23)"],
+        ),
         ({"quotable": False}, ["no longer quotable"]),
     ],
 )

@@ -15,6 +15,7 @@ from tablegen import sigma_table
 from tablegen.sigma import Nodes
 from tablegen.sigma_table import make_sigma_table
 from tests.support.cases import first
+from tests.support.dask_cluster import local_cluster
 from tests.support.repository import ROOT
 from underskin import SolverError
 
@@ -65,10 +66,7 @@ def _order(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_killed_at_any_moment_it_resumes_to_the_table_that_a_cluster_makes(tmp_path: Path) -> None:
     """Killed as a piece is begun or finished on the disk; a piece that was cut there is solved again."""
-    distributed = pytest.importorskip("distributed", reason="the cluster extra is not installed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-    ) as cluster:
+    with local_cluster() as cluster:
         make_sigma_table(tmp_path / "cluster.h5", SMALL, scheduler=cluster.scheduler_address)
     path, script = tmp_path / "sigma.h5", tmp_path / "make.py"
     script.write_text(SCRIPT)
