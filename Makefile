@@ -32,8 +32,9 @@ help: ## this list
 serve: $(VENV)/.runtime ## serve on http://127.0.0.1:8000 (PORT=...)
 	@$(VENV)/bin/underskin serve --port $(PORT)
 
-unit: $(VENV)/.dev ## run the quick tests, without server, browser or database (TESTS=...)
-	$(PYTEST) -m unit --durations 5 $(TESTS)
+# Two processes, since nothing waits and each has to collect; the service's own tests take half of that.
+unit: $(VENV)/.dev ## run the quick tests of the library, without server, browser or database (TESTS=...)
+	$(PYTEST) --numprocesses 2 -m unit --ignore tests/service --durations 5 $(TESTS)
 
 test: $(VENV)/.dev $(VENV)-$(GENERATOR)/.installed ## run the tests at reduced counts (TESTS=tests/physics for some of them)
 	@scripts/system-packages.sh $(TEST_PACKAGES)

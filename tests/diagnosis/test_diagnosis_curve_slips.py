@@ -14,6 +14,8 @@ from underskin.recordings.campaign import Campaign, CompressionRecording, parse
 from underskin.recordings.conditions import SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 
+pytestmark = pytest.mark.slow
+
 Change = Callable[[CompressionRecording], CompressionRecording]
 MODULUS_MPA = 0.5
 

@@ -5,6 +5,8 @@ import pytest
 
 from docs.paper.cylinder import gent_lindley, stiffness_ratio
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_slender_cylinder_shows_its_modulus() -> None:
     """Saint-Venant: what the ends hold is confined to a length of the order of the diameter."""

@@ -17,6 +17,8 @@ from rig.unlisted.fits import Lines, fit_shapes
 from rig.unlisted.laws import AXES, STATIC, Law, listed
 from rig.unlisted.truth import IDENTIFIABLE, describe, observe
 
+pytestmark = pytest.mark.slow
+
 FORMS = {"linear", "power", "exponential", "saturating", "threshold", "step", "periodic", "peak", "notch", "free"}
 SEED, COUNT = (77, 24) if SOAK else (82, 4)
 RECORDING = {
