@@ -33,7 +33,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Fixtures that start something; a test that uses one, directly or through another, gets the marker.
 _STARTED_BY = {
-    "server": {"shared_server", "server", "servers", "idle", "locked"},
+    "server": {"shared_server", "server", "servers", "working", "diagnosing", "idle", "locked"},
     "browser": {"browser"},
     "database": {"cluster"},
 }

@@ -3,6 +3,10 @@
 import subprocess
 import sys
 
+import pytest
+
+pytestmark = pytest.mark.slow
+
 _LOADED = """
 import tempfile
 def refuse(*args, **kwargs):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from bench.soak import SOAK
 from proof.real import recorded
 from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
@@ -83,8 +84,9 @@ def test_silicone_stiffens_and_does_not_creep_where_nothing_tells_time(name: str
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("ends", "share"),
-    [((-0.2, 0.3, -0.2), 0.9), ((-0.01, 0.3, -0.3), -0.35), ((0.03, 0.3, -0.3), 0.35), ((-0.3, 0.3, -0.04), 0.2)],
-    ids=["air on both sides", "air after contact", "no air before contact", "little air after contact"],
+    first(
+        2, [((-0.2, 0.3, -0.2), 0.9), ((0.03, 0.3, -0.3), 0.35), ((-0.01, 0.3, -0.3), -0.35), ((-0.3, 0.3, -0.04), 0.2)]
+    ),
 )
 def test_a_drift_of_the_cell_is_no_mismatch(ends: tuple[float, ...], share: float, table: SigmaTable) -> None:
     """Of this share of the largest force over the curve: told by the air, where there is any."""
@@ -201,7 +203,7 @@ def test_the_known_stiffness_of_a_stage_decides_where_contact_ends(stiffness: fl
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("samples", "ripple"), [(1500, 0.0), (360, 5e-3)])
+@pytest.mark.parametrize(("samples", "ripple"), first(1, [(360, 5e-3), (1500, 0.0)]))
 def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
     random = np.random.default_rng(4)
     displacement = np.linspace(-0.1, 0.4, samples)
@@ -293,8 +295,10 @@ def test_laws_that_would_look_like_an_explanation_take_from_its_probability_and_
         assert names(report) == ["instrument_compliance"]
         return report
 
-    weak, strong, several = reported(60.0, (5.0,)), reported(3.0, (5.0,)), reported(60.0, (1.0, 5.0))
-    assert weak["probability"] < min(strong["probability"], several["probability"])
+    weak, strong = reported(60.0, (5.0,)), reported(3.0, (5.0,))
+    assert weak["probability"] < strong["probability"]
+    if SOAK:
+        assert weak["probability"] < reported(60.0, (1.0, 5.0))["probability"]
     (finding,) = [entry for entry in weak["findings"] if entry["code"] == "imitated"]
     assert "would look like instrument compliance in these recordings" in finding["statement"]
     assert finding["statement"][1:] in weak["statement"]
@@ -324,8 +328,8 @@ def test_a_bend_below_the_noise_that_all_samples_show_contradicts_hertz(bend: fl
     assert report["verdict"] == ("unexplained" if bend else "no_mismatch")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("work", first(1, [5e-6, 5e-5]))
+@pytest.mark.soak
+@pytest.mark.parametrize("work", [5e-6, 5e-5])
 def test_adhesion_of_a_gel_in_a_liquid_leaves_the_modulus_right(work: float, table: SigmaTable) -> None:
     """Some µJ/m², a ten-thousandth of a silicone's in air; its forces of nanonewtons are meant."""
     gel = {

@@ -104,7 +104,7 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     return laplace(fitter, fitter.improve(fitter.begin([np.array([own])]).points))
 
 
-@pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(4, (0, 1, 10, 17, 4))])
+@pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(3, (0, 1, 17, 10, 4))])
 def test_evidence_agrees_with_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:

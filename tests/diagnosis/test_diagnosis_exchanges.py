@@ -68,6 +68,7 @@ def test_a_rotated_connector_is_put_right_as_a_whole(since: int, good: Campaign,
     require_put_right(wrong, good, table, "s0", "s1", "s2")
 
 
+@pytest.mark.soak
 def test_a_rotation_is_put_right_where_not_every_sensor_would_show_it_alone(table: SigmaTable) -> None:
     """The rig's contacts lie between the sensors: those of s05, labelled s09, might be of its neighbours."""
     made, _ = from_dict(recorded_campaign(record(drawn(944001, 49, "single"))))
@@ -148,6 +149,7 @@ def test_a_failure_that_sensors_do_not_share_is_no_exchange(good: Campaign, tabl
     assert named(changed(good, stepped), table, "sensor_spread") == []
 
 
+@pytest.mark.soak
 def test_exchanged_labels_are_told_where_all_contacts_miss_their_places(table: SigmaTable) -> None:
     """The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place."""
     description = drawn(934567, 56, "single")

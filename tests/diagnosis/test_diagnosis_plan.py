@@ -75,6 +75,7 @@ def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: 
     assert "beyond what this campaign did" in plan["statement"]
 
 
+@pytest.mark.soak
 def test_limits_beyond_the_tables_are_said_to_be_that(narrow: Campaign, tmp_path: Path) -> None:
     plan = planned(narrow, tmp_path, "--indenter-radius-mm", "2000", "--preload-n", "50", "60")
     assert plan["recordings"] == []

@@ -182,7 +182,8 @@ def test_the_noise_floor_counts_positioning_scatter_of_centred_presses(table: Si
 def test_where_several_answers_are_left_their_d33_are_averaged_and_none_is_to_be_quoted(table: SigmaTable) -> None:
     """E declared three times too small, one sphere and few preloads: E and what acts like it are not told apart."""
     made = campaign(Made(preloads_n=(0.5, 1.0, 2.0), spheres_mm=(10.0,), modulus_mpa=8.0), table)
-    report = whole_report(replace(made, skin=replace(made.skin, youngs_modulus_mpa=8.0 / 3)), table)
+    wrong = replace(made, skin=replace(made.skin, youngs_modulus_mpa=8.0 / 3))
+    report = lean_report(wrong, table, *(name for name in DECLARED if name != "moving_contact_edge"))
     assert report["verdict"] in ("ambiguous", "unexplained")
     if report["d33"] is not None:
         assert report["d33"]["low"] < 15.0 < report["d33"]["high"]

@@ -19,7 +19,7 @@ from underskin.diagnosis.localisation.residual_shape import describe
 from underskin.diagnosis.noise.noise_levels import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
-from underskin.diagnosis.reporting.report import DiagnosisResult, report
+from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
@@ -263,11 +263,6 @@ def _beside_unlisted(
         arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
         begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
     return begun, replace(result, imitating={leader.names: found.odds})
-
-
-def diagnosis_report(campaign: Campaign, table: SigmaTable, refused: Sequence[RecordingProblem] = ()) -> dict[str, Any]:
-    """The report of a campaign's diagnosis (`report/1`); `refused` recordings are named among the findings."""
-    return report(with_refused(diagnose(campaign, table), refused))
 
 
 def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:

@@ -16,13 +16,11 @@ from tests.support.diagnosed import diagnosed, report, resonant, sent, table
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside
 from tests.support.store_server import Server
-from underskin import Client
-from underskin.diagnosis.planning.rig_limits import RigLimits
+from underskin import Client, RigLimits
 from underskin.diagnosis.reporting.wording import readable
 from underskin.recordings import rig_description
 from underskin.recordings.campaign import to_dict
 
-pytestmark = pytest.mark.server
 NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=2, gain=0.01)
 LIMITS = RigLimits(preload_n=(0.3, 2.5), indenter_radius_mm=[4.0, 8.0], recordings=5)
 WITHOUT = beside("modulus_error", "thickness_error")
