@@ -41,7 +41,7 @@ def send_by_page(server: Server, number: int) -> int:
 
 
 def send(server: Server, number: int) -> int:
-    return httpx.post(f"{server.http.base_url}/v1/campaigns", json=campaign(f"sent {number}"), timeout=60).status_code
+    return httpx.post(f"{server.http.base_url}/v1/campaigns", json=campaign(f"sent {number}"), timeout=300).status_code
 
 
 @pytest.mark.parametrize("call", first(2, CALLS))
@@ -53,13 +53,13 @@ def test_others_are_answered_while_the_disk_of_uploads_hangs(
         with disk.hanging(call):
             by_page = [pool.submit(send_by_page, hanging_server, number) for number in range(FEW)]
             sent = [pool.submit(send, hanging_server, number) for number in range(count)]
-            end = time.monotonic() + 20
+            end = time.monotonic() + 120
             while not disk.waiting():
                 assert time.monotonic() < end, "nothing hangs"
                 time.sleep(0.05)
             time.sleep(1.0)
             for path in OTHERS:
-                assert hanging_server.http.get(path, timeout=10).status_code == 200, path
+                assert hanging_server.http.get(path, timeout=60).status_code == 200, path
         assert {one.result() for one in by_page} == {303}
         assert {one.result() for one in sent} == {201}
 

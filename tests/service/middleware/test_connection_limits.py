@@ -20,6 +20,7 @@ from tests.support.memory import family_mb
 from tests.support.server import Server, free_port, running
 
 IDLE_S = 1.0
+HANGS_S = 60.0  # longer than a connection that is given up stays on the busiest machine
 CONNECTIONS = 20
 BODY = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: 60000\r\n\r\n"
 DESCRIPTORS = 256
@@ -77,7 +78,7 @@ def seconds_until_closed(connection: socket.socket, drip: bytes = b"", every_s: 
     """How long the server keeps a connection on which `drip` is sent again and again."""
     start = time.monotonic()
     connection.settimeout(every_s)
-    while time.monotonic() - start < 20:
+    while time.monotonic() - start < HANGS_S:
         try:
             if not connection.recv(1000):
                 break
@@ -96,7 +97,7 @@ def test_headers_that_do_not_end_are_given_up(server: Server, begun: str, drip: 
         drip = drip[:0]  # what is no request at all is refused at once
     with reaching(server, "idle_headers"), connect(server) as connection:
         connection.sendall(begun.encode())
-        assert IDLE_S - 0.3 < seconds_until_closed(connection, drip.encode()) < 10 * IDLE_S
+        assert IDLE_S - 0.3 < seconds_until_closed(connection, drip.encode()) < HANGS_S
     assert is_well(server)
 
 
@@ -105,7 +106,7 @@ def test_headers_that_do_not_end_are_given_up(server: Server, begun: str, drip: 
 def test_a_body_that_trickles_is_given_up(server: Server, path: str, drip: bytes) -> None:
     with reaching(server, "idle_body"), connect(server) as connection:
         connection.sendall(BODY.replace("/v1/sigma", path).replace("60000", "6000").encode() + b"{")
-        assert IDLE_S - 0.3 < seconds_until_closed(connection, drip) < 10 * IDLE_S
+        assert IDLE_S - 0.3 < seconds_until_closed(connection, drip) < HANGS_S
     assert is_well(server)
 
 
@@ -236,7 +237,7 @@ def test_a_body_that_goes_on_after_its_answer_is_given_up(server: Server) -> Non
     with reaching(server, "idle_body"), connect(server) as connection:
         connection.sendall(BODY.replace("60000", "6000000").replace("/v1/sigma", "/v1/nothing").encode() + b"{")
         assert read_answer(connection)[0] == 404
-        assert IDLE_S - 0.3 < seconds_until_closed(connection, 3000 * b" ") < 10 * IDLE_S
+        assert IDLE_S - 0.3 < seconds_until_closed(connection, 3000 * b" ") < HANGS_S
 
 
 @pytest.mark.parametrize("begun", ["", "GET /health HTTP/1.1\r\n", BODY], ids=["silent", "headers", "bodies"])

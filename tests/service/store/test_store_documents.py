@@ -87,7 +87,7 @@ def test_documents_of_any_number_of_recordings_are_whole(server: Server, count: 
     assert to_dict(parse(hdf5_file.read(io.BytesIO(answer.content), ""))) == sent
     with h5py.File(io.BytesIO(answer.content)) as file:
         assert len(file["recordings"]) == count
-    deadline = time.monotonic() + 5  # the file goes once the answer is sent
+    deadline = time.monotonic() + 60  # the file goes once the answer is sent
     while (left := list(server.place.folder.glob("uploads/*/tmp*"))) and time.monotonic() < deadline:
         time.sleep(0.02)
     assert left == []

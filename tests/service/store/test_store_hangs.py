@@ -10,8 +10,6 @@ import pytest
 from tests.service.pages.forms import BROWSING, token_of
 from tests.support.store_server import Server
 
-PROMPT_S = 2.0  # other tests run beside this one
-
 
 @pytest.mark.parametrize("server", ["postgresql"], indirect=True)
 def test_others_are_answered_while_the_example_waits_for_the_store(server: Server) -> None:
@@ -26,8 +24,7 @@ def test_others_are_answered_while_the_example_waits_for_the_store(server: Serve
         time.sleep(0.5)
         assert not loading.done()
         for path in ("/health", "/v1/sigma?a_over_h=0.3&rt_over_h=0.6"):
-            began = time.monotonic()
-            assert server.http.get(path, timeout=10).status_code == 200
-            assert time.monotonic() - began < PROMPT_S, path
+            assert server.http.get(path, timeout=60).status_code == 200
+        assert not loading.done()  # it waits for the lock, which these did not
         locking.rollback()
         assert loading.result().status_code == 303
