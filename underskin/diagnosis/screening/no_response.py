@@ -54,9 +54,8 @@ def dead(
         own = sensors == name
         if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
             missing = missing | own
-            first = entries[int(np.flatnonzero(own)[0])]
             arguments = {"recordings": int(own.sum()), "sensor": name}
-            findings.append(Finding(Reason.SILENT_SENSOR, first.id, "frf_re_pc_per_n", arguments))
+            findings.append(Finding(Reason.SILENT_SENSOR, "", "frf_re_pc_per_n", arguments))
             continue
         missing &= ~own | (expected > _PLAIN * expected.max())
         findings += [
