@@ -15,16 +15,19 @@ _OF_THE_CHAIN = ("an amplifier's gain", "the temperature")
 
 
 def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: Dated) -> list[str]:
-    """What a statement says of d33: of the array first, then of sensors beside it, of more than a few how many."""
+    """What a statement says of d33: of the array first where it changed, and of sensors beside it, of more than a few
+    how many."""
     dates = 0 if over is None else len(over.numbers)
     steps = [change for change in changed if change.sensor is None and change.is_step and dates > 2]
     of_array = [change_in_words(change, dated) for change in steps]
     if over is not None and not steps:
         of_array = _array_in_words(over, changed, dated)
     own = [change for change in changed_once(changed) if change.sensor is not None]
-    said = [*of_array, *(change_in_words(change, dated) for change in own[:_MOST_TOLD])]
+    said = [change_in_words(change, dated) for change in own[:_MOST_TOLD]]
     more = len(own) - _MOST_TOLD
-    return [*said, f"d33 of each sensor has {more} further changes"] if more > 0 else said
+    said += [f"d33 of each sensor has {more} further changes"] if more > 0 else []
+    changed_at_all = steps or (over is not None and over.is_significant)
+    return [*of_array, *said] if changed_at_all else [*said, *of_array]
 
 
 def change_in_words(change: Change, dated: Dated) -> str:
