@@ -9,7 +9,15 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.report_fit import Fit, Parameter, Provenance, UnnamedLaw
-from service.schemas.report_several import Contradiction, KindParameter, Population, Scope, SensorLevel, SkinValue
+from service.schemas.report_several import (
+    CampaignLevel,
+    Contradiction,
+    KindParameter,
+    Population,
+    Scope,
+    SensorLevel,
+    SkinValue,
+)
 from underskin.findings.codes import FindingCode
 
 Verdict = Literal["no_mismatch", "explained", "ambiguous", "unexplained", "insufficient_data"]
@@ -106,6 +114,9 @@ class ReportD33(BaseModel):
     quotable: bool = Field(description="Whether one answer stands, fits to the noise, and nothing hidden moves d33.")
     per_sensor: list[SensorLevel] | None = Field(
         default=None, description="Of several campaigns: one entry a campaign and sensor."
+    )
+    per_campaign: list[CampaignLevel] | None = Field(
+        default=None, description="Of several campaigns: the array's, over the sensors that they share."
     )
     per_skin: list[SkinValue] | None = Field(default=None, description="Of a fleet: one entry a skin.")
 

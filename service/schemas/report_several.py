@@ -27,6 +27,16 @@ class SensorLevel(BaseModel):
     high: float | None = Field(description="Upper end of its 95 % interval.")
 
 
+class CampaignLevel(BaseModel):
+    """d33 of the array in one of several campaigns, over the sensors that these share."""
+
+    campaign: str = Field(description="Name of the campaign.")
+    unit: str = Field(description="Of the three numbers.")
+    value: float | None = Field(description="Its estimate.")
+    low: float | None = Field(description="Lower end of its 95 % interval between campaigns.")
+    high: float | None = Field(description="Upper end of its 95 % interval between campaigns.")
+
+
 class SkinValue(BaseModel):
     """A quantity of one skin of a fleet."""
 

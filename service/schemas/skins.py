@@ -81,6 +81,42 @@ class TrendAnswer(BaseModel):
     significant: bool = Field(description="Whether p_value_adjusted is below 0.05.")
 
 
+class SensorDeparture(BaseModel):
+    """The change of a sensor's d33 beside the array's, from its first campaign to its last."""
+
+    change_percent: float = Field(description="Relative change [%].")
+    change_low_percent: float = Field(description="Lower end of its 95 % interval [%].")
+    change_high_percent: float = Field(description="Upper end of its 95 % interval [%].")
+    significant: bool = Field(description="Whether it is beyond chance, for the number of sensors (Holm, 5 %).")
+
+
+class ArrayPoint(BaseModel):
+    """One campaign's d33 of the array, over the sensors that the campaigns share."""
+
+    campaign_id: str = Field(description="The campaign.")
+    time: str = Field(description="When it was recorded, UTC.")
+    d33_pc_per_n: float = Field(description="d33 [pC/N].")
+    d33_uncertainty_pc_per_n: float = Field(description="Its standard uncertainty between campaigns [pC/N].")
+
+
+class ArrayTrend(BaseModel):
+    """What d33 of the array did: one change that all sensors share, with sensors that depart from it left out."""
+
+    points: list[ArrayPoint] = Field(description="By time.")
+    sensors: list[str] = Field(description="Those that it is pooled over.")
+    days: int = Field(description="From the first point to the last.")
+    change_percent: float = Field(description="Relative change between these [%].")
+    change_low_percent: float = Field(
+        description="Lower end of its 95 % interval [%]; of three dates or more it holds their common scatter."
+    )
+    change_high_percent: float = Field(description="Upper end of its 95 % interval [%].")
+    significant: bool = Field(description="Whether that interval leaves out 0.")
+    dead_since: dict[str, str] = Field(
+        description="Sensors that show no charge beyond noise, with the time since when."
+    )
+    statement: str = Field(description="The same in words, with the sensors that depart.")
+
+
 class SensorHistory(BaseModel):
     """d33 of one sensor over time."""
 
@@ -89,6 +125,10 @@ class SensorHistory(BaseModel):
     trend: TrendAnswer | None = Field(description="Null where `no_trend` says why.")
     no_trend: str | None = Field(
         description="Why there is none: fewer than three points, one timed by its arrival, or less than a day in all."
+    )
+    departure: SensorDeparture | None = Field(
+        default=None,
+        description="Null with fewer than two points, or fewer than three sensors to tell it from the others.",
     )
 
 
@@ -127,6 +167,10 @@ class History(BaseModel):
     differences: list[str] = Field(
         description="What skins that count as one declare differently, in words; figures use each campaign's own.",
         examples=[["youngs_modulus_mpa is 16 of palm-3 and 9 of palm-3b"]],
+    )
+    array: ArrayTrend | None = Field(
+        default=None,
+        description="d33 of the array; null where fewer than two campaigns with times, a day apart, share a sensor.",
     )
     sensors: list[SensorHistory] = Field(description="By id.")
     left_out_campaigns: list[LeftOutCampaign] = Field(

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Literal
 
+import numpy as np
 import orjson
 from sqlalchemy import Connection
 
@@ -15,6 +16,7 @@ from service.store import AnyRow, Database, Missing, campaigns, inversions, skin
 from service.usecases import adopted_models, annotations, d33_cache
 from underskin import InvalidInput
 from underskin.errors import conflicting
+from underskin.inversion.array_history import array_history
 from underskin.inversion.trend import FEWEST, SIGNIFICANT, Trend, holm, trend
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -145,6 +147,7 @@ def _history(
         if (point.campaign_id, sensor) not in repeated:
             by_sensor[sensor].append(point)
     names = sorted(by_sensor)
+    array, departures = _of_array({name: by_sensor[name] for name in names})
     used = {point.campaign_id for points in by_sensor.values() for point in points}
     campaigns_out, recordings_out = _left_out(connection, root, used, unfit, repeats.of_campaigns(repeated))
     others = skins.joined_to(connection, root)
@@ -152,8 +155,15 @@ def _history(
         skin_id=root,
         joined=[joined(row) for row in others],
         differences=differences(connection, [root, *(other.id for other in others)]),
+        array=array,
         sensors=[
-            models.SensorHistory(sensor=name, points=by_sensor[name], trend=line, no_trend=_no_trend(by_sensor[name]))
+            models.SensorHistory(
+                sensor=name,
+                points=by_sensor[name],
+                trend=line,
+                no_trend=_no_trend(by_sensor[name]),
+                departure=departures.get(name),
+            )
             for name, line in zip(names, _trends([by_sensor[name] for name in names]), strict=True)
         ],
         left_out_campaigns=campaigns_out,
@@ -181,6 +191,51 @@ def _point(row: AnyRow, d33: float, uncertainty: float, model_id: str | None) ->
         d33_pc_per_n=d33,
         d33_uncertainty_pc_per_n=uncertainty,
     )
+
+
+def _of_array(
+    by_sensor: Mapping[str, Sequence[models.Point]],
+) -> tuple[models.ArrayTrend | None, dict[str, models.SensorDeparture]]:
+    """What the array did, by the campaigns that tell when they were recorded, and each sensor beside it."""
+    timed = [point for points in by_sensor.values() for point in points if point.time_is == "recorded"]
+    campaigns_in = list({point.campaign_id: point.time for point in sorted(timed, key=_seconds)}.items())
+    column = {campaign_id: number for number, (campaign_id, _) in enumerate(campaigns_in)}
+    value, uncertainty = np.full((2, len(by_sensor), len(column)), np.nan)
+    for row, points in enumerate(by_sensor.values()):
+        for point in points:
+            if point.time_is == "recorded":
+                value[row, column[point.campaign_id]] = point.d33_pc_per_n
+                uncertainty[row, column[point.campaign_id]] = point.d33_uncertainty_pc_per_n
+    moments = [datetime.fromisoformat(time) for _, time in campaigns_in]
+    found = array_history(list(by_sensor), moments, value, uncertainty)
+    if found is None:
+        return None, {}
+    trend_of_array = models.ArrayTrend(
+        points=[
+            models.ArrayPoint(
+                campaign_id=campaigns_in[number][0],
+                time=campaigns_in[number][1],
+                d33_pc_per_n=d33,
+                d33_uncertainty_pc_per_n=of_d33,
+            )
+            for number, d33, of_d33 in zip(found.dates, found.d33.tolist(), found.uncertainty.tolist(), strict=True)
+        ],
+        sensors=list(found.pooled),
+        days=found.days,
+        **_percent(found.value, found.low, found.high),
+        significant=found.significant,
+        dead_since={sensor: campaigns_in[number][1] for sensor, number in found.dead_since.items()},
+        statement=found.statement,
+    )
+    return trend_of_array, {
+        one.sensor: models.SensorDeparture(**_percent(one.value, one.low, one.high), significant=one.significant)
+        for one in found.departures
+    }
+
+
+def _percent(value: float, low: float, high: float) -> dict[str, Any]:
+    names = ("change_percent", "change_low_percent", "change_high_percent")
+    return {name: 100 * relative for name, relative in zip(names, (value, low, high), strict=True)}
 
 
 def _trends(sensors: Sequence[Sequence[models.Point]]) -> list[models.TrendAnswer | None]:

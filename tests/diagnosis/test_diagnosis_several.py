@@ -10,7 +10,7 @@ import pytest
 from bench.soak import SOAK
 from tests.support.cases import first
 from tests.support.kinds_campaigns import of_block
-from tests.support.lean_reports import beside, lean_together
+from tests.support.lean_reports import beside, lean_together, sentences
 from tests.support.report_pages import figures_in, written
 from tests.support.skins import HEAVY_TIP, document, made
 from underskin import InvalidInput, diagnose_fleet, diagnose_together
@@ -109,6 +109,51 @@ def test_two_sensors_that_have_each_others_d33_since_a_date_are_exchanged_and_no
     assert finding["code"] == "sensors_exchanged"
     if SOAK:
         assert "exchanged" not in reported([before, with_gain(after, s05=0.8, s02=0.8)], table, "ageing")["statement"]
+
+
+def silent(campaign: Campaign, sensor: str, seed: int) -> Campaign:
+    """With nothing but noise of 0.03 pC/N in one channel."""
+    generator = np.random.default_rng(seed)
+    entries = []
+    for entry in frf_recordings(campaign):
+        assert entry.frf_re_pc_per_n is not None
+        noise = 0.03 * generator.normal(size=(2, len(entry.frf_re_pc_per_n)))
+        own = {"frf_re_pc_per_n": noise[0], "frf_im_pc_per_n": noise[1]} if entry.sensor == sensor else {}
+        entries.append(replace(entry, **own))
+    return replace(campaign, recordings=tuple(entries))
+
+
+@pytest.mark.parametrize("seed", first(2, [4, 5, 6, 7]))
+def test_a_sensor_that_died_between_two_dates_comes_first_and_hides_no_other(seed: int, table: SigmaTable) -> None:
+    """It is left out of all that is said of both: its noise is no sensor with 13 times the others' charge."""
+    before, after = dates()
+    report = reported([before, silent(with_gain(after, s03=0.85), "s06", seed)], table, "ageing")
+    said = sentences(report["statement"])
+    assert said[0].startswith("Sensor s06 is dead since 2017-09-12: no charge above noise, after 1")
+    assert "d33 of sensor s03, beyond the others, fell by 1" in said[1]
+    assert report["verdict"] == "explained"
+    assert [entry["scope"]["sensors"] for entry in report["mechanisms"]] == [["s03"]]
+    assert {row["sensor"] for row in report["d33"]["per_sensor"] if row["campaign"] == "september"} == {
+        *(f"s{number:02d}" for number in (1, 2, 3, 4, 5, 7, 8))
+    }
+
+
+def test_a_slow_fall_of_the_array_over_four_dates_is_a_change(table: SigmaTable) -> None:
+    """Each step of 3 % could be an amplifier's; all four together fall by 8.7 %, and no sensor beside the others."""
+    times = ["2017-05-03", "2017-07-03", "2017-09-03", "2017-11-03"]
+    made_on = [
+        made(f"date {number}", f"{time}T09:00:00Z", seed=20 + number, d33=14.0 * 0.97**number)
+        for number, time in enumerate(times)
+    ]
+    report = reported(made_on, table, "ageing")
+    (entry,) = report["mechanisms"]
+    assert (report["verdict"], entry["name"], entry["scope"]["since"]) == ("explained", "ageing", times[1])
+    (change,) = entry["parameters"]
+    assert change["low"] < 100 * (0.97**3 - 1) < change["high"] < 0
+    assert "d33 of the array fell by " in report["statement"]
+    assert "in 184 days, between 2017-05-03 and 2017-11-03" in report["statement"]
+    levels = [row["value"] for row in report["d33"]["per_campaign"]]
+    assert levels == pytest.approx([14.0 * 0.97**number for number in range(4)], rel=0.02)
 
 
 def test_where_nothing_changed_one_d33_serves_and_is_of_the_last_alone(table: SigmaTable) -> None:

@@ -59,7 +59,7 @@ def history(
     url: Url = LOCAL,
     key: KeyOption = None,
 ) -> None:
-    """The d33 of each sensor of a skin over time, its trend, and what is left out."""
+    """The d33 of each sensor of a skin over time, the array's change and each sensor's beside it; what is left out."""
     with connect(url, key) as client:
         found = client.skins.history(skin, model=model)
     if json:
@@ -68,8 +68,13 @@ def history(
     points = [(sensor["sensor"], point) for sensor in found["sensors"] for point in sensor["points"]]
     headings = ("sensor", "time (UTC)", "time is", "d33 pC/N", "±", "campaign")
     write_rows(headings, (_point(sensor, point) for sensor, point in points))
-    trends = [(sensor["sensor"], _trend(sensor)) for sensor in found["sensors"]]
-    write_rows(("sensor", "trend"), trends)
+    array = found["array"]
+    if array is not None:
+        typer.echo(f"{array['statement']}.")
+    beside = any(sensor["departure"] is not None for sensor in found["sensors"])
+    told = _departure if beside else _trend
+    heading = "beside the array" if beside else "trend"
+    write_rows(("sensor", heading), ((sensor["sensor"], told(sensor)) for sensor in found["sensors"]))
     for left in found["left_out_campaigns"]:
         typer.echo(f"left out: campaign {left['campaign_id']}: {left['reason']}")
     for left in found["left_out_points"]:
@@ -123,6 +128,15 @@ def _point(sensor: str, point: Document) -> tuple[str, ...]:
         significant(uncertainty, 2),
         point["campaign_id"],
     )
+
+
+def _departure(sensor: Document) -> str:
+    departure = sensor["departure"]
+    if departure is None:
+        return "none: it answers in one campaign at most"
+    value, low, high = (departure[name] for name in ("change_percent", "change_low_percent", "change_high_percent"))
+    weight = "departs" if departure["significant"] else "as the array"
+    return f"{value:+.1f} % ({low:+.1f} to {high:+.1f}), {weight}"
 
 
 def _trend(sensor: Document) -> str:

@@ -5,13 +5,13 @@ from scipy.special import ndtri
 
 from underskin.units import Floats, Mask
 
-_BY_CHANCE = 0.05  # probability that of values that are all alike any one is said to differ
+BY_CHANCE = 0.05  # probability that of values that are all alike any one is said to differ
 _OF_MEDIAN = np.pi / 2  # variance of a median of many over that of their mean
 
 
 def threshold(count: int) -> float:
     """In standard deviations, for each of `count` values: all together exceed it by chance with 5 % at most."""
-    return float(ndtri(1 - _BY_CHANCE / (2 * max(count, 1))))
+    return float(ndtri(1 - BY_CHANCE / (2 * max(count, 1))))
 
 
 def differ_from_zero(values: Floats, uncertainties: Floats) -> Mask:

@@ -9,7 +9,7 @@ from scipy.special import chdtrc, stdtr
 
 from underskin.findings import english
 from underskin.findings.codes import Reason
-from underskin.units import Floats, Indices
+from underskin.units import Floats, Indices, Mask
 
 if TYPE_CHECKING:
     from underskin.inversion.invert import RecordingD33
@@ -54,6 +54,19 @@ def typical_size(d33: Floats) -> float:
     return float(np.median(size[size >= 1e-9 * size.max()]))
 
 
+def is_alive(value: Floats, deviation: Floats) -> Mask:
+    """Which sensors (sensors,) answer beyond noise, and with more than a twentieth of the others' d33."""
+    size = np.abs(value)
+    return np.asarray(size > np.maximum(_DEAD * _typical(size, deviation), 3 * deviation))
+
+
+def _typical(size: Floats, deviation: Floats) -> float:
+    """The median of those beyond noise; of all where none is, NaN where nothing is known."""
+    beyond = size > 3 * deviation
+    known = size[beyond] if beyond.any() else size[np.isfinite(size)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
 def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
     """Sensors that do not belong to the array's population, and each sensor's pilot d33.
 
@@ -81,8 +94,8 @@ def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Fl
         value = np.bincount(sensor, weight * d33, count) / total
         line = np.sqrt(np.bincount(sensor, (weight * noise) ** 2, count)) / total
     size = np.abs(value)
-    array = float(np.nanmedian(size[size > 3 * line])) if (size > 3 * line).any() else float(np.nanmedian(size))
-    alive = size > np.maximum(_DEAD * array, 3 * line)
+    array = _typical(size, line)
+    alive = is_alive(value, line)
     sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
     spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
     flags: dict[int, Flag] = {}

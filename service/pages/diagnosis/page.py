@@ -25,7 +25,7 @@ from service.store import AnyRow, Database, Missing, campaigns, diagnoses, model
 from service.usecases import diagnoses as usecase
 from service.usecases.adopted_models import adopt as adopt_model
 from underskin import InvalidInput
-from underskin.diagnosis.data.names import in_words
+from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
@@ -104,6 +104,7 @@ def diagnosis(
         adopted_as=adopted_as,
         in_force=own is not None and own is of_skin[0] and own.model_withdrawn_at is None,
         may_be_adopted=alone and report is not None and not_adopted is None,
+        settled=report is not None and _settled(report),
         open=alone and report is not None and "curve" not in figures and left_open(report),
         limit_fields=FIELDS,
         planned=planned,
@@ -231,6 +232,13 @@ def _not_adopted(report: Mapping[str, Any]) -> str | None:
         reason = implausible_d33(report)
         return None if reason is None else f"its d33 cannot be right: {reason}"
     return why_not
+
+
+def _settled(report: Mapping[str, Any]) -> bool:
+    """Whether one answer holds four fifths of the probability: an explanation, or one form of an unlisted law."""
+    law = report.get("unnamed")
+    share = 1.0 if law is None else law["probability"]
+    return report["verdict"] in ("explained", "unexplained") and report["probability"] * share >= EXPLAINED
 
 
 def _kept(connection: Connection, diagnosis_id: str) -> tuple[AnyRow, dict[str, Any] | None, dict[str, str]]:

@@ -4,7 +4,7 @@ from typing import Literal
 from urllib.parse import quote
 
 from service.pages.shared.figures import Drawn, drawn
-from service.schemas.skins import History, SensorHistory
+from service.schemas.skins import History, SensorDeparture, SensorHistory
 from underskin.diagnosis.reporting.typeset import with_minus
 
 By = Literal["paper", "adopted"]
@@ -37,10 +37,18 @@ def drawn_history(root: str, history: History, sensor: str | None, by: By) -> Dr
 
 
 def _trend_in_words(entry: SensorHistory) -> str:
-    """What the sensor's d33 does over time."""
+    """What the sensor's d33 does over time: beside the array's, where there are enough sensors."""
+    if entry.departure is not None:
+        return with_minus(_besides(entry.departure))
     line = entry.trend
     if line is None:
         return f"no trend: {entry.no_trend}"
     slope = f"{line.slope_pc_per_n_per_year:+.2g} ± {line.slope_uncertainty_pc_per_n_per_year:.1g} pC/N a year"
     slope = with_minus(slope)
     return slope if line.significant else f"no significant trend ({slope})"
+
+
+def _besides(departure: SensorDeparture) -> str:
+    low, high = departure.change_low_percent, departure.change_high_percent
+    size = f"{departure.change_percent:+.1f} % ({low:+.1f} to {high:+.1f})"
+    return f"besides the array {size}" if departure.significant else f"as the array does, within chance: {size}"

@@ -193,3 +193,20 @@ def test_the_page_describes_the_skin_by_its_latest_campaign_with_frfs(server: Se
     page = server.http.get("/skins/palm", headers={"Accept": "text/html"}).text
     assert page.index(">block</a>") < page.index(">later</a>", page.index(">block</a>")) < page.index(">earlier</a>")
     assert '>3</span>&nbsp;<span class="unit">mm</span>' in page
+
+
+def test_an_array_that_ages_is_told_before_its_sensors(server: Server) -> None:
+    """All sensors fall by 3 % from date to date, which no sensor alone tells; the page and the command say it."""
+    for number in range(4):
+        document = campaign(f"{number}", sensors=6)
+        for recording in document["recordings"]:
+            recording["recorded_at"] = f"2017-0{1 + 2 * number}-03T09:00:00Z"
+            recording["frf_re_pc_per_n"] = [0.97**number * value for value in recording["frf_re_pc_per_n"]]
+        assert server.http.post("/v1/campaigns?skin=palm", json=document).status_code == 201
+    found = history(server, "palm")["array"]
+    assert found["significant"]
+    assert found["change_low_percent"] < 100 * (0.97**3 - 1) < found["change_high_percent"]
+    assert found["days"] == 181
+    assert found["statement"].startswith("d33 of the array fell by ")
+    assert "d33 of the array fell by " in server.http.get("/skins/palm").text
+    assert not any(entry["departure"]["significant"] for entry in history(server, "palm")["sensors"])

@@ -7,6 +7,7 @@ from typing import Literal
 from underskin.client.documents.document import Document
 from underskin.client.documents.report_fit import Fit, Parameter, Provenance, UnnamedLaw
 from underskin.client.documents.report_several import (
+    CampaignLevel,
     Contradiction,
     KindParameter,
     Population,
@@ -219,6 +220,9 @@ class ReportD33(Document):
 
     per_sensor: tuple[SensorLevel, ...] | None
     """Of several campaigns: one entry a campaign and sensor."""
+
+    per_campaign: tuple[CampaignLevel, ...] | None
+    """Of several campaigns: the array's, over the sensors that they share."""
 
     per_skin: tuple[SkinValue, ...] | None
     """Of a fleet: one entry a skin."""

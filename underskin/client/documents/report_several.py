@@ -7,6 +7,26 @@ from underskin.client.documents.document import Document
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class CampaignLevel(Document):
+    """d33 of the array in one of several campaigns, over the sensors that these share."""
+
+    campaign: str
+    """Name of the campaign."""
+
+    unit: str
+    """Of the three numbers."""
+
+    value: float | None
+    """Its estimate."""
+
+    low: float | None
+    """Lower end of its 95 % interval between campaigns."""
+
+    high: float | None
+    """Upper end of its 95 % interval between campaigns."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Contradiction(Document):
     """Kinds of recordings that are not of one material."""
 

@@ -8,6 +8,55 @@ from underskin.client.documents.document import Document
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class ArrayPoint(Document):
+    """One campaign's d33 of the array, over the sensors that the campaigns share."""
+
+    campaign_id: str
+    """The campaign."""
+
+    time: str
+    """When it was recorded, UTC."""
+
+    d33_pc_per_n: float
+    """d33 [pC/N]."""
+
+    d33_uncertainty_pc_per_n: float
+    """Its standard uncertainty between campaigns [pC/N]."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ArrayTrend(Document):
+    """What d33 of the array did: one change that all sensors share, with sensors that depart from it left out."""
+
+    points: tuple[ArrayPoint, ...]
+    """By time."""
+
+    sensors: tuple[str, ...]
+    """Those that it is pooled over."""
+
+    days: int
+    """From the first point to the last."""
+
+    change_percent: float
+    """Relative change between these [%]."""
+
+    change_low_percent: float
+    """Lower end of its 95 % interval [%]; of three dates or more it holds their common scatter."""
+
+    change_high_percent: float
+    """Upper end of its 95 % interval [%]."""
+
+    significant: bool
+    """Whether that interval leaves out 0."""
+
+    dead_since: Mapping[str, str]
+    """Sensors that show no charge beyond noise, with the time since when."""
+
+    statement: str
+    """The same in words, with the sensors that depart."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class JoinedSkin(Document):
     """A skin that counts as another."""
 
@@ -71,6 +120,23 @@ class TrendAnswer(Document):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class SensorDeparture(Document):
+    """The change of a sensor's d33 beside the array's, from its first campaign to its last."""
+
+    change_percent: float
+    """Relative change [%]."""
+
+    change_low_percent: float
+    """Lower end of its 95 % interval [%]."""
+
+    change_high_percent: float
+    """Upper end of its 95 % interval [%]."""
+
+    significant: bool
+    """Whether it is beyond chance, for the number of sensors (Holm, 5 %)."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SensorHistory(Document):
     """d33 of one sensor over time."""
 
@@ -85,6 +151,9 @@ class SensorHistory(Document):
 
     no_trend: str | None
     """Why there is none: fewer than three points, one timed by its arrival, or less than a day in all."""
+
+    departure: SensorDeparture | None
+    """Null with fewer than two points, or fewer than three sensors to tell it from the others."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -144,6 +213,9 @@ class History(Document):
 
     differences: tuple[str, ...]
     """What skins that count as one declare differently, in words; figures use each campaign's own."""
+
+    array: ArrayTrend | None
+    """d33 of the array; null where fewer than two campaigns with times, a day apart, share a sensor."""
 
     sensors: tuple[SensorHistory, ...]
     """By id."""

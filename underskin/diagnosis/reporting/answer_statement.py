@@ -121,8 +121,14 @@ def _answer(
     but += [f"these rivals remain: {listed}"] if listed else []
     but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
     misfit = f"what is certain is that {model} does not describe the recordings" if idle else ""
+    begin = f"best explained by {in_words(leader.names)} ({percent})"
+    if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
+        known = sum(answer.probability for answer in answers if answer.kind == leader.kind)
+        begin = (
+            f"known mechanisms explain this ({in_percent(known)} together), best {in_words(leader.names)} ({percent})"
+        )
     return (
-        f"best explained by {in_words(leader.names)} ({percent}), but {', and '.join(but)}",
+        f"{begin}, but {', and '.join(but)}",
         misfit,
         _law(tuple(mentioned)),
     )

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting.answer_statement import Around
 from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
@@ -52,9 +53,17 @@ def statement(
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
     if outweighed:
         also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
-    told = "" if altered or leading.is_constant else hint(acts_on, _hinted(leading))
+    certain = probability * _same_place(document) >= EXPLAINED and not outweighed
+    told = hint(acts_on, _hinted(leading)) if certain and not (altered or leading.is_constant) else ""
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
     return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
+
+
+def _same_place(document: Mapping[str, Any]) -> float:
+    """The share of laws of any form that act on the same and follow the same."""
+    same = (document["acts_on"], document["axis"])
+    rivals = (one["probability"] for one in document["rivals"] if (one["acts_on"], one["axis"]) == same)
+    return float(document["probability"] + sum(rivals))
 
 
 def _hinted(leading: LeadingLaw) -> str:

@@ -30,6 +30,7 @@ from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
+from underskin.diagnosis.reporting.sensors_apart import sensors_apart
 from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, StatedD33, stated_d33
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -180,7 +181,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
     around = Around(
-        slips=slips(findings),
+        slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
         contradictions=[entry["statement"] for entry in contradictory],
         reserves=reserves(findings),
         quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33.clause()],

@@ -57,7 +57,7 @@ def against_model(
     inside, beyond, findings = within_tables(campaign, entries, model, table, kept)
     inside |= beyond
     ratio, expected = _apparent(entries, model, inside & ~unresponsive)
-    lost, dead_findings = dead(entries, unresponsive & inside, variance, expected)
+    lost, dead_findings = dead(entries, unresponsive & inside, variance, np.where(inside, expected, 0.0))
     findings += dead_findings
     usable = inside & ~lost
     turned = np.where(_one_sided(entries), ratio, np.nan)

@@ -3,7 +3,9 @@
 The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
 values, which a resonance between a few of them does not reach.
 A recording shows no response where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which
-noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
+noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ². Nor does one
+whose charge does not follow the force, by its coherence, and is a small share of what the others let expect: noise that
+is strong at low frequencies, hum, or magnitudes without a phase, are larger in the mean than neighbours differ.
 """
 
 from collections.abc import Sequence
@@ -20,6 +22,7 @@ _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
 _WEAK = 0.1  # of the level to be expected: what a sensor without response in most recordings shows in the others
 _EXPECTED = 16.0  # of the response that the others let expect: only then is a recording without one left out
+_INCOHERENT = 0.5  # γ² below which a line's noise is larger than its response
 _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near a crossing of zero, and may be none
 
 
@@ -46,17 +49,17 @@ def dead(
     Each is a finding of its own, or its sensor is one, where that shows none in most of its recordings and a weak
     one in the others, which noise alone does.
     """
-    missing: Mask = unresponsive & (expected**2 > _EXPECTED * variance)
+    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
+    silent = unresponsive | (_incoherent(entries) & (level < _WEAK * expected))
+    missing: Mask = silent & (expected**2 > _EXPECTED * variance)
     findings = []
     sensors = np.array([entry.sensor for entry in entries])
-    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
     for name in dict.fromkeys(sensors[missing].tolist()):
         own = sensors == name
         if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
             missing = missing | own
-            first = entries[int(np.flatnonzero(own)[0])]
             arguments = {"recordings": int(own.sum()), "sensor": name}
-            findings.append(Finding(Reason.SILENT_SENSOR, first.id, "frf_re_pc_per_n", arguments))
+            findings.append(Finding(Reason.SILENT_SENSOR, "", "frf_re_pc_per_n", arguments))
             continue
         missing &= ~own | (expected > _PLAIN * expected.max())
         findings += [
@@ -64,3 +67,9 @@ def dead(
             for number in np.flatnonzero(missing & own).tolist()
         ]
     return missing, findings
+
+
+def _incoherent(entries: Sequence[FrfRecording]) -> Mask:
+    """Whether the noise of most of a recording's lines is larger than their response; False where nothing tells."""
+    known = [lines_of(entry).coherence for entry in entries]
+    return np.array([one is not None and float(np.nanmedian(one)) < _INCOHERENT for one in known])

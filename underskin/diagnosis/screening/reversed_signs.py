@@ -41,8 +41,7 @@ def signs_of(entries: Sequence[FrfRecording], turned: Floats, usable: Mask) -> S
     at_random = (negative & ~_of(entries, whole)).sum() > _LISTED
     for name in () if at_random else whole:
         own = _of(entries, (name,))
-        first = entries[int(np.flatnonzero(own)[0])]
-        findings.append(Finding(Reason.SENSOR_REVERSED, first.id, "frf_re_pc_per_n", {"sensor": name}))
+        findings.append(Finding(Reason.SENSOR_REVERSED, "", "frf_re_pc_per_n", {"sensor": name}))
         signs[own] *= -1.0
         negative, positive = np.where(own, positive, negative), np.where(own, negative, positive)
     few = negative.sum() <= max(_FEW * positive.sum(), 1) and positive.sum() > 1

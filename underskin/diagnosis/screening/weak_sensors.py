@@ -38,8 +38,7 @@ def weak_sensors(entries: Sequence[FrfRecording], levels: Levels) -> tuple[Mask,
         all_own = np.array([entry.sensor == name for entry in entries])
         weak |= all_own
         arguments = {"sensor": name, "share": float(np.exp(-np.median(gap))), "recordings": int(all_own.sum())}
-        first = entries[int(np.flatnonzero(all_own)[0])]
-        findings.append(Finding(Reason.WEAK_SENSOR, first.id, "frf_re_pc_per_n", arguments))
+        findings.append(Finding(Reason.WEAK_SENSOR, "", "frf_re_pc_per_n", arguments))
     if len(findings) > max(1.0, _MOST * len(numbers)):
         return np.zeros(len(entries), dtype=bool), []
     return weak, findings

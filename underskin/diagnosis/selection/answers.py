@@ -37,6 +37,21 @@ class Answer:
             return (NONE_OF_THESE,)
         return (*self.explanation.names, *self.alone) or (NOTHING_MISSING,)
 
+    @property
+    def kind(self) -> str:
+        """What it is one of: nothing missing, something without a name, or sets of known mechanisms ("")."""
+        return self.names[0] if self.names in ((NOTHING_MISSING,), (NONE_OF_THESE,)) else ""
+
+
+def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
+    """Answers, the most probable first, with the first one of the most probable kind before all others."""
+    of_kinds: dict[str, float] = {}
+    for answer in ranked:
+        of_kinds[answer.kind] = of_kinds.get(answer.kind, 0.0) + answer.probability
+    most = max(of_kinds, key=lambda kind: of_kinds[kind])
+    leader = next(answer for answer in ranked if answer.kind == most)
+    return [leader, *(answer for answer in ranked if answer is not leader)]
+
 
 @dataclass(frozen=True)
 class Search:
@@ -149,7 +164,10 @@ class Search:
 
     @cached_property
     def answers(self) -> list[Answer]:
-        """The rivals, the most probable first; their probabilities sum to 1.
+        """The rivals, the leading one first and then the most probable; their probabilities sum to 1.
+
+        Of nothing, all sets of known mechanisms, and what has no name, the most probable leads, and of sets the most
+        probable one: what many sets share is no reason to say that no known mechanism describes it.
 
         `none_of_these` is always one of them, with its evidence where a process shows, and at least with the share that
         stays for what neither laws nor processes here can be.
@@ -173,7 +191,7 @@ class Search:
         ]
         if self.beside is not None:
             answers = [one for answer in answers for one in self._with_own_of_curves(answer, self.beside)]
-        return sorted(answers, key=lambda answer: -answer.probability)
+        return leading_first(sorted(answers, key=lambda answer: -answer.probability))
 
     @staticmethod
     def _with_own_of_curves(answer: Answer, beside: Beside) -> list[Answer]:
@@ -226,9 +244,12 @@ class Search:
     def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
         """With at least the unlisted laws that the leading set imitates among `none_of_these`, the last: some of them
         were fitted."""
-        leader = int(np.argmax(probabilities))
-        if leader == len(kept):
+        rivals = [*kept, None]
+        order = np.argsort(-probabilities, kind="stable").tolist()
+        ranked = leading_first([Answer(rivals[number], float(probabilities[number])) for number in order])
+        if ranked[0].explanation is None:
             return probabilities
+        leader = next(number for number, entry in enumerate(kept) if entry is ranked[0].explanation)
         beside = probabilities.copy()
         beside[-1] = max(beside[-1], self.imitating.get(kept[leader].names, 0.0) * probabilities[leader])
         return np.asarray(beside / beside.sum())

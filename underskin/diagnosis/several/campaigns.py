@@ -11,10 +11,13 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, reported
 from underskin.diagnosis.several.dates import Dated, date_of, in_order
+from underskin.diagnosis.several.left_out import used_recordings
 from underskin.diagnosis.several.posteriors import Shared, values
 from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
 from underskin.diagnosis.several.together_report import together_report
@@ -100,7 +103,7 @@ def _with_changed_sensors(
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
     apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone, [0.0] * len(apart))
+    single = changes(apart, alone, [0.0] * len(apart), np.arange(len(apart), dtype=float))
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)
@@ -117,7 +120,7 @@ def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> Se
     """The sensors under the answer of the campaign alone, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
     strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
-    return sensors_of(campaign, strengths, table)
+    return sensors_of(campaign, strengths, table, used_recordings(result))
 
 
 def _of_one(explanation: Explanation, name: str) -> dict[str, float]:

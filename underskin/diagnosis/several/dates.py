@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 
 import numpy as np
 
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.time_zone import time_zone
+from underskin.units import Floats
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,27 @@ class Dated:
         time."""
         return self.dates[number] if self.ordered else None
 
+    @property
+    def times(self) -> Floats:
+        """When the campaigns were recorded, in days; where not all have a date of their own, their places in the
+        order."""
+        days = [date.fromisoformat(own).toordinal() for own in self.dates if own is not None]
+        ordered = self.ordered and days == sorted(days) and len(set(days)) == len(days)
+        return np.array(days if ordered else range(len(self.dates)), dtype=float)
+
+    def days(self, first: int, last: int) -> int | None:
+        """Between two campaigns; None where their order is not one of time."""
+        begin, end = self.dates[first], self.dates[last]
+        if begin is None or end is None or not self.ordered:
+            return None
+        return (date.fromisoformat(end) - date.fromisoformat(begin)).days
+
     def called(self, number: int) -> str:
         """A campaign by its date where that says which it is, else by its name: "campaign B (no date)"."""
-        date = self.dates[number]
-        if date is not None and self.ordered and self.dates.count(date) == 1:
-            return date
-        return f"campaign {self.names[number]} ({date or 'no date'})"
+        own = self.dates[number]
+        if own is not None and self.ordered and self.dates.count(own) == 1:
+            return own
+        return f"campaign {self.names[number]} ({own or 'no date'})"
 
     def order_clause(self) -> str:
         """That the order is not one of time; empty where it is."""

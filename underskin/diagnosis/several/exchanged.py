@@ -21,7 +21,7 @@ _LOG_PRIOR = float(np.log(0.2))  # of an exchange, where two sensors have change
 def with_exchanges(found: Sequence[Change], each: Sequence[SensorsOfCampaign | None]) -> list[Change]:
     """The changes, two of single sensors marked as an exchange where that is far more probable."""
     changes = list(found)
-    single = [place for place, change in enumerate(changes) if change.sensor is not None]
+    single = [place for place, change in enumerate(changes) if change.sensor is not None and change.is_step]
     odds = {
         (one, two): _log_odds(changes[one], changes[two], each)
         for one, two in combinations(single, 2)

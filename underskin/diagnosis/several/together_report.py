@@ -11,21 +11,27 @@ from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
 from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.selection.answers import UNTHOUGHT
-from underskin.diagnosis.several import quoted
+from underskin.diagnosis.several import change_words, left_out, quoted
 from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
 from underskin.diagnosis.several.dates import Dated
-from underskin.diagnosis.several.exchanged import changed_once, with_exchanges
 from underskin.diagnosis.several.exchanged import findings as exchanges
+from underskin.diagnosis.several.exchanged import with_exchanges
 from underskin.diagnosis.several.kinds import of_kinds
 from underskin.diagnosis.several.level import AGEING, causes, unsure_of_changes
 from underskin.diagnosis.several.posteriors import Shared, combined, values
-from underskin.diagnosis.several.sensors import Change, change_in_words, changes, per_sensor, sensors_of
+from underskin.diagnosis.several.sensors import (
+    ArrayOverDates,
+    Change,
+    array_over_dates,
+    changes,
+    per_sensor,
+    sensors_of,
+)
 from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 
 _ALTERNATIVES = 6
-_MOST_TOLD = 3  # changes of d33 in the statement
 _DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
 
 
@@ -53,20 +59,20 @@ def together_report(
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
-        sensors_of(campaigns[number], strengths[place], table)
+        sensors_of(campaigns[number], strengths[place], table, left_out.used_recordings(results[number]))
         if undescribed[place] <= _DESCRIBED
         else None  # whose levels no mechanism here explains
         for place, number in enumerate(usable)
     ]
     unsure = unsure_of_changes(candidates, leader)
-    changed = [
-        change
-        if change.sensor is not None
-        else replace(change, causes=causes(candidates[change.since], leader.sets[change.since], change))
-        for change in with_exchanges(changes(sensors, [alone[number] for number in usable], unsure), sensors)
-    ]
+    single = changes(sensors, [alone[number] for number in usable], unsure, dated.times)
+    changed = [_with_causes(change, candidates, leader) for change in with_exchanges(single, sensors)]
+    over = array_over_dates(sensors, unsure, dated.times)
+    if over is not None:
+        over = replace(over, change=_with_causes(over.change, candidates, leader))
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
+    faults = [left_out.faults(campaigns[number], results[number]) for number in usable]
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
     last_name, last = names[-1], reports[usable[-1]].d33
     findings = [
@@ -85,7 +91,15 @@ def together_report(
         "verdict": verdict,
         "probability": round(probability, 3),
         "statement": _statement(
-            verdict, probability, leader, undescribed, mechanisms, changed, dated, contradictory, of_d33
+            verdict,
+            probability,
+            leader,
+            undescribed,
+            mechanisms,
+            dated,
+            [*left_out.in_words(faults, sensors, dated), *contradictory],
+            change_words.in_statement(changed, over, dated),
+            of_d33,
         ),
         "location": {
             "axes": [],
@@ -102,12 +116,39 @@ def together_report(
         **by_kind,
         "fit": None,
         "power": [],
-        "d33": {**(last.document or {}), "quotable": False, "per_sensor": per_sensor(sensors)},
+        "d33": {
+            **(last.document or {}),
+            "quotable": False,
+            "per_sensor": per_sensor(sensors),
+            **_of_array(over, names),
+        },
         "next_experiment": None,
         "provenance": {
             **results[usable[-1]].provenance,
             "each": [{key: own.document[key] for key in ("campaign", "verdict", "probability")} for own in reports],
         },
+    }
+
+
+def _with_causes(change: Change, candidates: Sequence[Candidate], leader: Course) -> Change:
+    """With the mechanisms that would make it, of a change of the array."""
+    if change.sensor is not None:
+        return change
+    return replace(change, causes=causes(candidates[change.since], leader.sets[change.since], change))
+
+
+def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, Any]:
+    """`d33.per_campaign`: of the array over the sensors that the campaigns share."""
+    if over is None:
+        return {}
+    ends = over.d33[:, None] + SDS_OF_95 * np.outer(over.uncertainty, [0.0, -1.0, 1.0])
+    columns = ("value", "low", "high")
+    return {
+        "per_campaign": [
+            {"campaign": names[number], "unit": "pC/N"}
+            | {name: rounded(float(at)) for name, at in zip(columns, row, strict=True)}
+            for number, row in zip(over.numbers, ends, strict=True)
+        ]
     }
 
 
@@ -212,7 +253,7 @@ def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
                 ],
                 "explains_percent": None,
                 "scope": scope,
-                "statement": of_clauses([change_in_words(change, dated)]),
+                "statement": of_clauses([change_words.change_in_words(change, dated)]),
             }
         )
     return entries
@@ -253,17 +294,14 @@ def _statement(
     leader: Course,
     undescribed: Sequence[float],
     mechanisms: Sequence[dict[str, Any]],
-    changed: Sequence[Change],
     dated: Dated,
-    contradictory: Sequence[str],
+    decisive: Sequence[str],
+    of_levels: Sequence[str],
     of_d33: str,
 ) -> str:
+    """`decisive` are clauses that come before the verdict, `of_levels` those on d33 of array and sensors."""
     percent = in_percent(probability)
     names = dated.names
-    told = list(changed_once(changed))
-    said = [change_in_words(change, dated) for change in told[:_MOST_TOLD]]
-    if len(told) > _MOST_TOLD:
-        said.append(f"d33 of each sensor has {len(told) - _MOST_TOLD} further changes")
     parts = [
         _in_words(entry, names) for entry in mechanisms if entry["name"] in {n for own in leader.sets for n in own}
     ]
@@ -272,14 +310,14 @@ def _statement(
         stated = f"something is missing in {which} that no known mechanism describes ({percent})"
     elif verdict == "no_mismatch":
         agree = f"all {len(names)} campaigns and the paper's model agree within the noise"
-        stated = f"{agree}, with one d33 for each sensor ({percent})"
+        stated = f"{agree} ({percent})"
     elif not any(leader.sets):
         stated = f"within each campaign nothing is missing ({percent})"
     else:
         begin = "best explained so" if verdict == "ambiguous" else "the paper's model lacks"
         stated = f"{begin}: {', '.join(parts)} ({percent})"
-    first = [*contradictory, f"apart from that, {stated}"] if contradictory else [stated]
-    return of_clauses(first, said, [dated.order_clause(), of_d33], names=names)
+    first = [*decisive, f"apart from that, {stated}"] if decisive else [stated]
+    return of_clauses(first, of_levels, [dated.order_clause(), of_d33], names=names)
 
 
 def _in_words(entry: dict[str, Any], names: Sequence[str]) -> str:

@@ -1,0 +1,249 @@
+"""d33 of an array over several dates: what all sensors share, what each has besides, and how much either changed.
+
+ln |d33| of sensor s on date c is y_cs = a_c + μ_s + e_cs, e_cs ~ N(0, (f u_cs)²): a is the level that all sensors
+share, u the standard uncertainty, f by how much sensors scatter beyond it from date to date. Sensors that depart from
+the others take no part in a.
+
+The change between the first and the last date is that of a course with a gain error on each date,
+    a_c = m + b t_c + w(t_c) + ε_c,    w a random walk, Var w(t) = q² t, ε_c ~ N(0, g²),
+with t from 0 to 1, flat priors of m and b, and w for what the course is beside a straight line. It is b + w(1): g, the
+scatter of mounting and amplifier that all sensors of a date share, is no change, and widens the interval. (q, g) are
+marginalised on a grid: each is zero or half-Cauchy (Gelman 2006). Of two dates no scatter can be estimated: q = g = 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc, chdtri, ndtr, ndtri
+
+from underskin.inversion.beyond_chance import BY_CHANCE
+from underskin.units import Floats, Mask
+
+FEWEST_DATES = 3  # that tell scatter from change
+FEWEST_SENSORS = 3  # of which one can be told from the others
+_PRIOR_SENSORS = 4.0  # sensors that the stated uncertainties are worth beside the scatter that is seen
+# Priors of g and q: the probability of none, and the scale of the half-Cauchy one. Gains scatter by 1 to 5 %, of which
+# mounting and amplifier are a part (PHYSICS.md, section 8), and few chains are calibrated anew on each date; walks are
+# as wide as the sensors of an array are spread (mixed_model).
+_NO_GAIN, _GAIN_SCALE = 0.25, 0.01
+_NO_WALK, _WALK_SCALE = 0.6, 0.05
+_NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
+_LEAST_DEVIATION = 1e-6  # relative: values without noise
+_LEVEL = 0.95
+_POLISHES, _HALVINGS = 60, 60
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayLevels:
+    """Logarithms of d33 [C/N or pC/N, as given], of sensors over dates; NaN where nothing is known.
+
+    `level` and `deviation` (dates,) are the array's, of the sensors `pooled` (sensors,), whose mean it is;
+    `departure` (sensors, dates) is each sensor's beside the array and its own mean, `departure_deviation` its standard
+    deviation, scatter between dates included.
+    """
+
+    level: Floats
+    deviation: Floats
+    pooled: Mask
+    departure: Floats
+    departure_deviation: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """Of some courses (series,) between the first and the last date of each, as logarithms: mean, standard deviation,
+    95 % interval, and the two-sided p-value of none; NaN of a course with fewer than two dates."""
+
+    value: Floats
+    deviation: Floats
+    low: Floats
+    high: Floats
+    p_value: Floats
+
+
+def array_levels(value: Floats, deviation: Floats) -> ArrayLevels:
+    """The two-way decomposition of ln |d33| with its standard deviations, both (sensors, dates).
+
+    Levels start from medians, to which a few sensors that changed do nothing; sensors that depart beyond chance are
+    left out, and the weighted mean of the others is the array's. Dates that share no sensor with the others, directly
+    or through other dates, have no level.
+    """
+    known = np.isfinite(value) & np.isfinite(deviation)
+    joined = _joined_dates(known)
+    known &= joined & ((known & joined).sum(axis=1) > 1)[:, None]
+    u = np.where(known, np.maximum(deviation, _LEAST_DEVIATION), 1.0)
+    y = np.where(known, value, 0.0)
+    rest = _polished(y, known, known / u**2)
+    score, freedom = (rest**2 * known / u**2).sum(axis=1), known.sum(axis=1) - 1
+    scatter = _scatter_of_others(score, freedom)
+    counted = freedom > 0
+    departs = np.zeros(len(value), dtype=bool)
+    if counted.sum() >= FEWEST_SENSORS:
+        chance = chdtrc(np.maximum(freedom, 1), score / scatter**2)
+        departs = counted & (chance < BY_CHANCE / counted.sum())
+    pooled = counted & ~departs
+    level, of_level = _weighted(y, known & pooled[:, None], u * scatter[:, None])
+    has = known & np.isfinite(level)
+    off = np.where(has, y - np.where(has, level, 0.0), 0.0)
+    weight = has / u**2
+    mean = (weight * off).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300)
+    own = np.hypot(u * scatter[:, None], np.where(has, of_level, 0.0))
+    anchor = float(mean[pooled].mean()) if pooled.any() else 0.0
+    return ArrayLevels(
+        level + anchor,
+        of_level,
+        pooled,
+        np.where(has, off - mean[:, None], np.nan),
+        np.where(has, own, np.nan),
+    )
+
+
+def changes(time: Floats, value: Floats, deviation: Floats, *, gain_scatters: bool) -> Changes:
+    """Those of courses (series, dates), NaN where a course has no value, with standard deviations; `time` (dates,)
+    rises, in any unit. `gain_scatters`: whether dates have a gain error that the deviations do not hold, as those of
+    an array do; what a sensor has besides the array has none.
+
+    The random walk is a Kalman filter over y and the columns of m and b; the rest is generalised least squares.
+    """
+    known = np.isfinite(value) & np.isfinite(deviation)
+    enough = known.sum(axis=1) > 1
+    first = time[np.argmax(known, axis=1)]
+    last = time[len(time) - 1 - np.argmax(known[:, ::-1], axis=1)]
+    enough &= last > first
+    t = np.clip((time - first[:, None]) / np.where(enough, last - first, 1.0)[:, None], 0.0, 1.0)
+    weights, mean, spread = _posterior(
+        t, np.where(known, value, 0.0), np.where(known, deviation, 1.0), known, gain_scatters
+    )
+    centre = (weights * mean).sum(axis=1)
+    variance = (weights * (spread**2 + (mean - centre[:, None]) ** 2)).sum(axis=1)
+    low, high = (_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
+    below = (weights * ndtr(-mean / spread)).sum(axis=1)
+    columns = (centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below))
+    return Changes(*(np.where(enough, column, np.nan) for column in columns))
+
+
+def _joined_dates(known: Mask) -> Mask:
+    """Of the dates that are joined to one another by common sensors the largest group (dates,)."""
+    shared = (known.astype(float).T @ known.astype(float)) > 0
+    left, best = set(range(known.shape[1])), np.zeros(known.shape[1], dtype=bool)
+    while left:
+        group = np.zeros(known.shape[1], dtype=bool)
+        group[left.pop()] = True
+        while (wider := group | shared[group].any(axis=0)).sum() > group.sum():
+            group = wider
+        left -= set(np.flatnonzero(group).tolist())
+        best = group if group.sum() > best.sum() else best
+    return best
+
+
+def _polished(y: Floats, known: Mask, weight: Floats) -> Floats:
+    """What is left of y beside each date's weighted median and each sensor's weighted mean (sensors, dates)."""
+    rest = np.where(known, y, 0.0)
+    total = np.maximum(weight.sum(axis=1), 1e-300)
+    for _ in range(_POLISHES):
+        rest = np.where(known, rest - ((weight * rest).sum(axis=1) / total)[:, None], 0.0)
+        medians = np.array([_median(rest[own, date], weight[own, date]) for date, own in enumerate(known.T)])
+        rest = np.where(known, rest - medians, 0.0)
+        if np.abs(medians).max(initial=0.0) < _LEAST_DEVIATION:
+            break
+    return np.where(known, rest - ((weight * rest).sum(axis=1) / total)[:, None], 0.0)
+
+
+def _median(values: Floats, weights: Floats) -> float:
+    """That by weights: between values, at half of the weight; 0 of none."""
+    if not len(values):
+        return 0.0
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - weights[order] / 2
+    return float(np.interp(weights.sum() / 2, below, values[order]))
+
+
+def _scatter_of_others(score: Floats, freedom: Floats) -> Floats:
+    """By how much the other sensors scatter from date to date over their uncertainties (sensors,): these allow for a
+    gain that scatters as rigs' may, and sensors tell how much it does here. The median of squares, so that a second
+    sensor that departs tells nothing of the scatter."""
+    counted = freedom > 0
+    if counted.sum() < FEWEST_SENSORS:
+        return np.ones(len(score))
+    usual = np.where(counted, score / np.where(counted, chdtri(np.maximum(freedom, 1), 0.5), 1.0), np.nan)
+    typical = np.array([np.nanmedian(np.delete(usual, place)) for place in range(len(score))])
+    others = counted.sum() - 1
+    return np.sqrt((_PRIOR_SENSORS + others * typical) / (_PRIOR_SENSORS + others))
+
+
+def _weighted(y: Floats, known: Mask, deviation: Floats) -> tuple[Floats, Floats]:
+    """Each date's level, of mean 0 over dates, and its standard deviation by weighted least squares; NaN without a
+    sensor."""
+    weight = known / deviation**2
+    of_sensor = np.maximum(weight.sum(axis=1), 1e-300)
+    information = np.diag(weight.sum(axis=0)) - weight.T @ (weight / of_sensor[:, None])
+    mean = (weight * y).sum(axis=1) / of_sensor
+    inverse = np.linalg.pinv(information, hermitian=True)
+    level = inverse @ (weight * (y - mean[:, None])).sum(axis=0)
+    total = weight.sum(axis=0)
+    seen = np.flatnonzero(total > 0)
+    with np.errstate(divide="ignore"):
+        apart = np.where(total > 0, total**-0.5, np.nan)
+    if len(seen) > 1:  # as if dates were independent, with the contrast of the two ends as it is
+        ends = seen[[0, -1]]
+        contrast = float(np.array([-1.0, 1.0]) @ inverse[np.ix_(ends, ends)] @ np.array([-1.0, 1.0]))
+        apart *= np.sqrt(contrast / float((apart[ends] ** 2).sum()))
+    return np.where(total > 0, level, np.nan), apart
+
+
+def _posterior(
+    t: Floats, value: Floats, deviation: Floats, known: Mask, gain_scatters: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Weight, mean and standard deviation of the change at each node of (q, g), (series, nodes) each."""
+    gains = _NODES if gain_scatters else _NODES[:1]
+    walk, gain = (grid.ravel() for grid in np.meshgrid(_NODES, gains, indexing="ij"))
+    columns = np.stack([value, np.ones_like(value), t], axis=2)
+    series = len(value)
+    at = np.zeros((series, len(walk), 3))
+    variance, log_volume = np.zeros((series, len(walk))), np.zeros((series, len(walk)))
+    products = np.zeros((series, len(walk), 3, 3))
+    for date in range(value.shape[1]):
+        if date:
+            variance = variance + walk**2 * (t[:, date] - t[:, date - 1])[:, None]
+        total = variance + gain**2 + np.maximum(deviation[:, [date]], _LEAST_DEVIATION) ** 2
+        weight = known[:, [date]] / total
+        innovation = columns[:, date, None, :] - at
+        products += (weight[..., None] * innovation)[..., None] * innovation[..., None, :]
+        log_volume += known[:, [date]] * np.log(total)
+        towards = variance * weight
+        at = at + towards[..., None] * innovation
+        variance = variance * (1 - towards)
+    information, moment = products[..., 1:, 1:] + 1e-9 * np.eye(2), products[..., 1:, 0]
+    inverse = np.linalg.inv(information)
+    line = np.einsum("snij,snj->sni", inverse, moment)
+    contrast = np.array([0.0, 1.0]) - at[..., 1:]
+    squares = products[..., 0, 0] - (moment * line).sum(axis=2)
+    density = -0.5 * (log_volume + np.linalg.slogdet(information)[1] + squares) + _log_prior(walk, gain)
+    plain = (walk == 0) & (gain == 0)
+    density = np.where((known.sum(axis=1) < FEWEST_DATES)[:, None] & ~plain, -np.inf, density)
+    weights = np.exp(density - density.max(axis=1, keepdims=True))
+    spread = variance + np.einsum("sni,snij,snj->sn", contrast, inverse, contrast)
+    mean = at[..., 0] + (line * contrast).sum(axis=2)
+    return weights / weights.sum(axis=1, keepdims=True), mean, np.sqrt(np.maximum(spread, 1e-18))
+
+
+def _log_prior(walk: Floats, gain: Floats) -> Floats:
+    """ln of the prior weight of each node, the cells of the grid included."""
+    total = np.zeros(len(walk))
+    for at, scale, none in ((walk, _WALK_SCALE, _NO_WALK), (gain, _GAIN_SCALE, _NO_GAIN)):
+        cells = np.gradient(_NODES) / (1 + (_NODES / scale) ** 2)
+        cells *= (1 - none) / cells[1:].sum()
+        cells[0] = none
+        total += np.log(cells[np.searchsorted(_NODES, at)])
+    return total
+
+
+def _quantile(weights: Floats, mean: Floats, deviation: Floats, probability: float) -> Floats:
+    """That of each mixture of normals (series, nodes), by bisection."""
+    reach = float(ndtri(1 - 1e-9)) * deviation
+    low, high = (mean - reach).min(axis=1), (mean + reach).max(axis=1)
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        below = (weights * ndtr((middle[:, None] - mean) / deviation)).sum(axis=1) < probability
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray((low + high) / 2)
