@@ -52,7 +52,11 @@ def statement(
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
     if outweighed:
         also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
-    told = "" if altered or leading.is_constant else hint(acts_on, _hinted(leading))
+    told = (
+        ""
+        if altered or leading.is_constant
+        else hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
+    )
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
     return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
 

@@ -24,7 +24,7 @@ from underskin.diagnosis.reporting.answer_statement import (
     insufficient_statement,
     left_by,
 )
-from underskin.diagnosis.reporting.caveats import reserves, slips
+from underskin.diagnosis.reporting.caveats import not_tried, reserves, slips
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
@@ -38,6 +38,7 @@ from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
+from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
 from underskin.recordings.campaign import Campaign
@@ -182,7 +183,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     around = Around(
         slips=slips(findings),
         contradictions=[entry["statement"] for entry in contradictory],
-        reserves=reserves(findings),
+        reserves=[*reserves(findings), *_not_tried(stated, search, problem, findings)],
         quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33.clause()],
     )
     if leading is not None and law is not None:
@@ -228,6 +229,16 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         },
     }
     return Reported(whole, d33)
+
+
+def _not_tried(
+    stated: str, search: Search, problem: FittingProblem, findings: Sequence[Mapping[str, str]]
+) -> list[str]:
+    """What was not tried, where something remains that it could explain."""
+    remains = stated in ("unexplained", "ambiguous") or any(
+        entry["code"] == FindingCode.REMAINDER for entry in findings
+    )
+    return not_tried(search.unsupported, problem.kind) if remains else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
