@@ -102,6 +102,8 @@ def _diagnosed(
             return replace(begun, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign
+    if kinds and "frf" not in kinds and not curves:
+        return replace(begun, lacking=Lacking(Lack.NO_CURVE))
     if "frf" in kinds or not curves:
         return _of_frf(begun, campaign, table, mechanisms, Others(curves, table, mechanisms.without), progress, limits)
     kind = next(iter(curves))

@@ -193,11 +193,11 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
     elif thickness is None:
         like += ", or on a thin layer whose thickness is not declared"
     allowed = (
-        f"grows with the depth to the power {power:.2g}, {like}; a sphere has 1.5, and its law misses by "
-        f"{100 * fit.left / span:.2g} % of the force, {fit.left / max(noise, 1e-300):.2g} times the noise: no modulus "
-        "follows. Look at the tip, and press a block of known modulus"
+        f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.left / span:.2g} % of the force, "
+        f"{fit.left / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
+        "of known modulus"
     )
-    return Tip(power, unusable("force_n", None, allowed))
+    return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed))
 
 
 def loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from underskin.diagnosis.reporting.sentences import clause
 from underskin.findings.codes import FindingCode
-from underskin.mechanisms.base import Kind
+from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.registry import CATALOGUE
 
 _SLIPS = (
@@ -62,5 +62,10 @@ def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
     return [
         f"{name.replace('_', ' ')} was not tried: {reason}"
         for name, reason in unsupported.items()
-        if name in CATALOGUE and kind in CATALOGUE[name].kinds and kind != "frf"
+        if kind != "frf" and name in CATALOGUE and kind in CATALOGUE[name].kinds and _is_physics(CATALOGUE[name])
     ]
+
+
+def _is_physics(mechanism: Mechanism) -> bool:
+    """Whether it is more than another value of what is declared, which curves without a declared value have free."""
+    return mechanism.stage is not Stage.DECLARED

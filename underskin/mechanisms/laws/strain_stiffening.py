@@ -98,8 +98,8 @@ class StrainStiffening(Mechanism):
     """A modulus that grows with strain."""
 
     name = "strain_stiffening"
-    plain = """The elastomer gets stiffer the more it is deformed, so at high loads the force rises more, and a contact
-    grows less, than a constant modulus would have it."""
+    plain = """The elastomer's modulus changes with its strain, and mostly grows, so at high loads the force rises more,
+    and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
     together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
     compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
@@ -138,6 +138,11 @@ class StrainStiffening(Mechanism):
         power = 1.0 + bend * grown
         factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / bend)
         return {"stiffening": (neo_hookean * factor - 1.0) / _COMPARED}
+
+    def told(self, values: Mapping[str, float]) -> str:
+        """Of a compression, that it is softer than a neo-Hookean solid where it is."""
+        softer = values.get("second_over_first", 0.0) < 0
+        return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Stiffen each contact by its own strain."""
