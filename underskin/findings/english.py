@@ -134,8 +134,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.UNUSUAL_MAGNITUDE: sentences.unusual,
     Reason.UNUSUAL_MEDIAN_FRF: lambda **arguments: f"FRF, median of the recordings: {sentences.unusual(**arguments)}",
     Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
-    Reason.ROWS_REVERSED: "its rows begin where it is deepest and end in the air, and no time is stated: they were "
-    "read from the last to the first",
+    Reason.ROWS_REVERSED: sentences.rows_reversed,
     Reason.FORCE_SATURATES: sentences.force_saturates,
     Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
     "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "

@@ -58,6 +58,12 @@ def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> s
     return f"{negative}{unless}{more_alike(more, 'recording')}"
 
 
+def rows_reversed(is_timed: bool) -> str:
+    """A curve whose rows begin at its deep end."""
+    times = ", without its times, since a way out alone does not tell what relaxes" if is_timed else ""
+    return f"its rows begin where it is deepest and end in the air: it was read from the last row to the first{times}"
+
+
 def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> str:
     """Where a force channel is at the end of its range."""
     limits = " or ".join(f"{limit:.4g} N" for limit in limits_n)

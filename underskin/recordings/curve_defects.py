@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from underskin.recordings.curve_signs import turning_points
+from underskin.recordings.curve_signs import TRAVEL, falling, turning_points
 from underskin.units import Floats, Indices, Mask
 
 _EQUAL = 5  # samples in a row, at least, that read the same where a force saturates
 _MOVED = 0.02  # of the range of travel, at least, over which they do
 _LONGER = 4.0  # times as far as any other value is read on end: steps of a converter are as long everywhere
-_OFF_AIR = 0.2  # of the range of force, at least, between the air and where it saturates
-_SHALLOW = 0.1  # of the samples: the shallowest, which tell the air's level
+_DEEP = 0.8  # of the other samples lie less deep than those that saturate
 _AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there, up to which means lie in the air
 _FEWEST = 24  # samples there at least
 _PERIODS = 1.5  # in the air, at least: less is a drift
@@ -50,23 +49,23 @@ class PeriodicError:
         return np.asarray(self.cosine * np.cos(phase) + self.sine * np.sin(phase))
 
 
-def saturated(travel: Floats, force: Floats) -> Mask:
-    """Which samples (samples,) read the largest, or the least, force of all while the sphere or platen moves on."""
+def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
+    """Which samples (samples,) read the largest, or the least, force of all while a sphere or a platen moves on, and
+    lie deeper than the others: the air may read one value as well."""
     found = np.zeros(len(force), dtype=bool)
-    span = float(np.ptp(force))
-    if not span or not np.ptp(travel):
+    if not np.ptp(force) or not np.ptp(travel):
         return found
-    shallow = np.argsort(travel, kind="stable")[: max(1, int(_SHALLOW * len(travel)))]
-    air = float(np.median(force[shallow]))
     runs = _runs(travel, force)
     for extreme in (float(force.max()), float(force.min())):
-        own = [(rows, moved) for rows, moved in runs if force[rows[0]] == extreme]
-        others = [moved for rows, moved in runs if abs(force[rows[0]] - air) > _OFF_AIR * span and moved > 0]
-        longest = max((moved for _, moved in own), default=0.0)
-        usual = max((moved for moved in others if moved < longest), default=0.0)
-        if abs(extreme - air) < _OFF_AIR * span or longest < max(_MOVED * np.ptp(travel), _LONGER * usual):
+        longest = max((moved for rows, moved in runs if force[rows[0]] == extreme), default=0.0)
+        usual = max((moved for rows, moved in runs if force[rows[0]] != extreme), default=0.0)
+        at_limit = force == extreme
+        if longest < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
             continue
-        found |= force == extreme
+        others = travel[~at_limit]
+        sign = -1.0 if TRAVEL in falling(force[~at_limit], others, sphere=sphere) else 1.0
+        if np.median(sign * travel[at_limit]) > np.quantile(sign * others, _DEEP):
+            found |= at_limit
     return found
 
 

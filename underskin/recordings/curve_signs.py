@@ -7,7 +7,7 @@ sphere on its way out, a lift before it is pressed, or the first of the rows tel
 pulled: that force and displacement have one sign is all that its curve tells, and which it was, the sign of the force.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
 from underskin.recordings.curve_jumps import roughness
 from underskin.units import Floats, Indices
 
-_FORCE, _TRAVEL = "force_n", "displacement_mm"
+FORCE, TRAVEL = "force_n", "displacement_mm"
 _LEAST = 8  # samples: fewer tell nothing of how a curve goes
 _BLOCKS = 200  # of a curve, whose means are compared
 _CHANGE, _BEYOND_NOISE = 2e-3, 4.0  # of the range of force, and standard deviations: a change that counts
@@ -78,7 +78,7 @@ def _oriented(force: Floats, travel: Floats, *, sphere: bool) -> Orientation:
         return Orientation(_of_block(force, travel, together), turns, is_known=True)
     deep = _deep_side(force, travel, turns, together)
     side = deep or _first_movement(travel)
-    negative = ((_FORCE, together * side < 0), (_TRAVEL, side < 0))
+    negative = ((FORCE, together * side < 0), (TRAVEL, side < 0))
     return Orientation(tuple(name for name, falls in negative if falls), turns, is_known=deep != 0)
 
 
@@ -90,8 +90,8 @@ def _of_block(force: Floats, travel: Floats, together: int) -> tuple[str, ...]:
     low, high = float(force.min()), float(force.max())
     pulled = low < 0 and high < _ONE_WAY * -low
     if together > 0:
-        return (_FORCE, _TRAVEL) if pulled and not _softens(-force, -travel) else ()
-    return (_FORCE,) if pulled else (_TRAVEL,)
+        return (FORCE, TRAVEL) if pulled and not _softens(-force, -travel) else ()
+    return (FORCE,) if pulled else (TRAVEL,)
 
 
 def _softens(force: Floats, strain: Floats) -> bool:
@@ -173,16 +173,13 @@ def findings(campaign: Campaign) -> list[Finding]:
     by_fields: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     for recording in _curves(campaign).values():
         by_fields.setdefault((recording.kind, counted_negative(recording)), []).append(recording.id)
-    return [
-        Finding(
-            Reason.CURVE_COUNTED_NEGATIVE,
-            ids[0],
-            fields[0],
-            {"fields": list(fields), "more": len(ids) - 1, "may_be_pulled": may_be_pulled(kind, fields)},
-        )
-        for (kind, fields), ids in by_fields.items()
-        if fields
-    ]
+    return [finding(kind, fields, ids) for (kind, fields), ids in by_fields.items() if fields]
+
+
+def finding(kind: str, fields: tuple[str, ...], ids: Sequence[str]) -> Finding:
+    """On curves of a kind that count these columns negative."""
+    arguments = {"fields": list(fields), "more": len(ids) - 1, "may_be_pulled": may_be_pulled(kind, fields)}
+    return Finding(Reason.CURVE_COUNTED_NEGATIVE, ids[0], fields[0], arguments)
 
 
 def may_be_pulled(kind: str, fields: tuple[str, ...]) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
+from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.physics.sphere_law import PARABOLOID, SphereLaw
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.curve_jumps import roughness
@@ -142,10 +143,10 @@ def require_depth(found: IndentationModulus) -> None:
             "Press less deep, or a larger sphere"
         )
         raise unusable("displacement_mm", f"a depth of {depth_mm:.3g} mm", allowed)
-    if found.thickness is None:
+    if found.declared_thickness is None:
         return
-    of_thickness = found.depth / found.thickness
-    layer = SphereLaw(found.radius, found.thickness, 0.5)
+    of_thickness = found.depth / found.declared_thickness
+    layer = SphereLaw(found.radius, found.declared_thickness, INCOMPRESSIBLE)
     if of_thickness > _DEEPEST_OF_THICKNESS or found.depth >= layer.deepest:
         allowed = (
             f"is {of_thickness:.2g} of the declared thickness, where the linear layer's law does not hold (at most "

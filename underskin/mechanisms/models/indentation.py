@@ -177,7 +177,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
             columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
             try:
                 modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
-                estimates.append(modulus)
+                estimates.append(modulus if modulus > 0 else _secant_modulus(entry, skin.poisson_ratio))
             except InvalidInput as refusal:
                 refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
@@ -193,6 +193,13 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     if not estimates:
         required_modulus(skin)
     return [modulus_parameter(skin, estimates), *thickness, *contact_points]
+
+
+def _secant_modulus(entry: IndentationRecording, poisson_ratio: float) -> float:
+    """Of a curve that does not load: Hertz's modulus [Pa] of the range of force over the range of travel."""
+    force, travel = (float(np.ptp(to_si(name, getattr(entry, name)))) for name in ("force_n", "displacement_mm"))
+    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    return max(0.75 * (1 - poisson_ratio**2) * force / (np.sqrt(radius) * max(travel, 1e-300) ** 1.5), 1e-300)
 
 
 @lru_cache(maxsize=1024)  # a diagnosis composes some dozen models of the same recordings
