@@ -1,4 +1,5 @@
-"""A cylinder compressed between platens: area · u/H, stiffer with strain and friction, softer while a wedge closes.
+"""A cylinder compressed between platens: area · (λ⁻² − λ)/3 of an incompressible neo-Hookean solid, λ = 1 − u/H;
+stiffer with strain and friction, softer while a wedge closes.
 
 Its force on a body of unit modulus, F₁(u), relaxes as  F(t) = ∫₀^t E(t − s) dF₁(u(s)).
 """
@@ -33,7 +34,8 @@ def _elastic(on: Mapping[str, Values], shape: Mapping[str, float], shortening: F
     if wedge:
         closing = np.clip(shortening, 0, wedge)
         touched = np.where(shortening > 0, shortening - closing + closing**2 / (2 * wedge), shortening)
-    force = np.pi / 4 * diameter**2 * held * touched / height
+    stretch = 1 - touched / height
+    force = np.pi / 4 * diameter**2 * held * (stretch**-2 - stretch) / 3
     if "strain_stiffening" in on:
         force = force * stiffening(on["strain_stiffening"], np.abs(shortening) / height)
     return np.asarray(force)

@@ -1,10 +1,10 @@
 """Visibility of effects in force–displacement curves: χ² of the base model's best fit less that of the truth.
 
-Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = E A (u − z)/H. Plain weighted least
-squares with the rig's own noise refit the modulus, which is free, and what every curve has: its zero of displacement z
-and, of an indentation, its zero of force, a linear drift (in travel where the rig drifts so, else in time) and the
-gain of the cell within its scatter. The truth is refitted alike, but for z. Effects that are `known` act in the base
-model at their true strength, along the recorded displacement.
+Base models: indentation F = (4/3) E/(1 − ν²) √R (u − z)^(3/2), compression F = (E A/3)(λ⁻² − λ) with λ = 1 − (u − z)/H.
+Plain weighted least squares with the rig's own noise refit the modulus, which is free, and what every curve has: its
+zero of displacement z and, of an indentation, its zero of force, a linear drift (in travel where the rig drifts so,
+else in time) and the gain of the cell within its scatter. The truth is refitted alike, but for z. Effects that are
+`known` act in the base model at their true strength, along the recorded displacement.
 
 A factor on E shows as a departure from the declared modulus alone: under modulus_error and compressible_layer, and in
 compression, a declared modulus is known within 2 %.
@@ -32,6 +32,7 @@ _STEP = 1e-4  # of the largest displacement
 _POINTS = 200  # of a course along the recorded displacement
 _JUMP = 0.02  # of the largest force, between neighbouring samples
 _LEAST_NOISE = 1e-6  # of the largest force
+_LEAST_STRETCH = 0.02  # of λ, for a fit that goes astray
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,7 @@ class _Base:
     def law(self) -> Law:
         """Force at ln E over the true modulus and a shift of the zero of displacement."""
         if self.experiment.kind != INDENTATION:
-            return self._hooke
+            return self._neo_hookean
         return self._course if self.on else self._hertz
 
     def _displacement(self, number: int, shift: float) -> Floats:
@@ -128,10 +129,11 @@ class _Base:
     def _modulus(self, log_modulus: float) -> float:
         return true_modulus(self.experiment) * float(np.exp(log_modulus))
 
-    def _hooke(self, number: int, log_modulus: float, shift: float) -> Floats:
+    def _neo_hookean(self, number: int, log_modulus: float, shift: float) -> Floats:
         entry = self.recorded[number].entry
         area = np.pi / 4 * entry["sample_diameter_mm"] ** 2
-        return self._modulus(log_modulus) * area * self._displacement(number, shift) / entry["sample_height_mm"]
+        stretch = np.maximum(1 - self._displacement(number, shift) / entry["sample_height_mm"], _LEAST_STRETCH)
+        return self._modulus(log_modulus) * area * (stretch**-2 - stretch) / 3
 
     def _hertz(self, number: int, log_modulus: float, shift: float) -> Floats:
         depth = np.maximum(self._displacement(number, shift), 0)

@@ -46,6 +46,7 @@ from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE, Known
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
+from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -75,7 +76,7 @@ def diagnose(
 
     Raises InvalidInput where one of those is not in it.
     """
-    diagnosis = _diagnosed(campaign, table, progress, limits, Known(without))
+    diagnosis = _diagnosed(prepared(campaign).campaign, table, progress, limits, Known(without))
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
@@ -101,6 +102,8 @@ def _diagnosed(
             return replace(begun, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign
+    if kinds and "frf" not in kinds and not curves:
+        return replace(begun, lacking=Lacking(Lack.NO_CURVE))
     if "frf" in kinds or not curves:
         return _of_frf(begun, campaign, table, mechanisms, Others(curves, table, mechanisms.without), progress, limits)
     kind = next(iter(curves))
@@ -207,6 +210,7 @@ def _work_out(
     if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
         groups = held_out(problem, result, showing, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
+    result = _beside_other_tip(begun, result)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
@@ -263,6 +267,14 @@ def _beside_unlisted(
         arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
         begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
     return begun, replace(result, imitating={leader.names: found.odds})
+
+
+def _beside_other_tip(begun: DiagnosisResult, result: Search) -> Search:
+    """Where a tip looks like a cone: as probable beside the leading set is that it is one, which no mechanism lists."""
+    leader = result.answers[0].explanation
+    if leader is None or all(finding.reason is not Reason.TIP_SHAPE for finding in begun.findings):
+        return result
+    return replace(result, imitating={**result.imitating, leader.names: 1.0})
 
 
 def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:

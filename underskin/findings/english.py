@@ -133,8 +133,13 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
     Reason.UNUSUAL_MAGNITUDE: sentences.unusual,
     Reason.UNUSUAL_MEDIAN_FRF: lambda **arguments: f"FRF, median of the recordings: {sentences.unusual(**arguments)}",
-    Reason.CURVE_REVERSED: "its force falls as it is pressed, where compression counts positive: reversed",
     Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
+    Reason.ROWS_REVERSED: sentences.rows_reversed,
+    Reason.FORCE_SATURATES: sentences.force_saturates,
+    Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
+    "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
+    "screw or an encoder); it was subtracted",
+    Reason.TIP_SHAPE: "{refusal}",
     Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
     Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "
     "inverts)",
@@ -196,8 +201,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,
-    Reason.THICKNESS_UNKNOWN: "the thickness of the sample is not declared, so that a thin layer on a stiff base "
-    "(layered contact) was not tried, which stiffens a curve much like {answer}: declare thickness_mm",
+    Reason.THICKNESS_UNKNOWN: sentences.thickness_unknown,
     Reason.LINE_NOISE_LEVEL: sentences.line_noise,
     Reason.REMAINDER: "a smooth part of about {percent:.2g} % of the largest force, {times:.0f} times a sample's "
     "noise, is left that no mechanism here describes",

@@ -45,13 +45,43 @@ def defects_left_out(kind: DefectKind, channel: str, samples: int, first_sample:
     return f"{defect(kind, channel, samples, first_sample)}{others}: those parts were left out"
 
 
-def counted_negative(fields: Sequence[str], more: int) -> str:
+def counted_negative(fields: Sequence[str], more: int, may_be_pulled: bool) -> str:
     """Force, displacement or both fall while a curve is pressed."""
     named = " and ".join({"force_n": "force", "displacement_mm": "displacement"}[name] for name in fields)
-    both = "are", ": right for a sample that is pulled, else reverse the signs of both channels"
-    are, unless = both if len(fields) > 1 else ("is", "; reverse the sign of that channel")
+    are, channel = ("are", "those channels") if len(fields) > 1 else ("is", "that channel")
     negative = f"{named} {are} counted negative as it is pressed, where compression and depth count positive"
+    unless = (
+        ": right for a sample that is pulled, else reverse the signs of both channels"
+        if may_be_pulled
+        else f"; turned round here, reverse the sign of {channel}"
+    )
     return f"{negative}{unless}{more_alike(more, 'recording')}"
+
+
+def rows_reversed(is_timed: bool) -> str:
+    """A curve whose rows begin at its deep end."""
+    times = ", without its times, since a way out alone does not tell what relaxes" if is_timed else ""
+    return f"its rows begin where it is deepest and end in the air: it was read from the last row to the first{times}"
+
+
+def force_saturates(percent: float, samples: int, limits_n: Sequence[float]) -> str:
+    """Where a force channel is at the end of its range."""
+    limits = " or ".join(f"{limit:.4g} N" for limit in limits_n)
+    return (
+        f"the force channel saturates: {samples} samples, {percent:.2g} % of all, read {limits} while the travel goes "
+        "on; they were left out (record with a larger range)"
+    )
+
+
+def thickness_unknown(answer: str, is_tried: bool) -> str:
+    """What a thickness that nobody declared leaves open."""
+    layer = "a thin layer on a stiff base (layered contact)"
+    undeclared = "the thickness of the sample is not declared"
+    if answer == "layered contact":
+        alike = "a thick sample that stiffens with strain can look alike"
+        return f"{undeclared}: that of {layer} was fitted, and {alike}; declare thickness_mm"
+    tried = "whose thickness was fitted" if is_tried else "which was not tried"
+    return f"{undeclared}, and {layer}, {tried}, stiffens a curve much like {answer}: declare thickness_mm"
 
 
 def size(too_large: bool) -> str:

@@ -161,6 +161,11 @@ class Mechanism:
         """The mechanism for the recordings of one campaign and their parts; itself where it needs no campaign."""
         return self
 
+    def follows_from_declared(self, conditions: Conditions, kind: Kind) -> bool:
+        """Whether it is no guess but what declared facts say, without a free parameter: then it stands beside its
+        absence with equal prior odds inside every hypothesis."""
+        return False
+
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """What the campaign lacks to support it, in words; None where nothing is lacking."""
         return None

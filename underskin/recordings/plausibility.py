@@ -1,5 +1,5 @@
-"""Findings on the times of recordings, the places of sensors and the signs of curves that a campaign states; all are
-used all the same.
+"""Findings on the times of recordings and the places of sensors that a campaign states, which are used all the same,
+and on what is changed of its curves before anything is read from them (curve_preparation).
 
 They are the same with the d33 of a campaign, on its import and in its diagnosis. The clock is only used to see whether
 a recording lies in the future by more than time zones differ. No statement holds today's date, so that a campaign whose
@@ -14,9 +14,9 @@ from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings import curve_signs
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.conditions import Sensor
+from underskin.recordings.curve_preparation import prepared
 from underskin.units import Floats
 
 _EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)  # clocks that were never set begin in 1904, 1970 or 1980
@@ -26,8 +26,8 @@ _LARGEST_IN_METRES_MM = 0.1
 
 
 def implausible(campaign: Campaign) -> list[Finding]:
-    """Times that no recording has, sensors that would lie in each other, and curves that count pressing negative."""
-    return [*_times(campaign), *overlapping_sensors(campaign), *curve_signs.findings(campaign)]
+    """Times that no recording has, sensors that would lie in each other, and what is put right of curves."""
+    return [*_times(campaign), *overlapping_sensors(campaign), *prepared(campaign).findings]
 
 
 def _times(campaign: Campaign) -> Iterator[Finding]:

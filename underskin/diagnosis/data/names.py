@@ -9,7 +9,7 @@ NOTHING_MISSING, NONE_OF_THESE = "nothing_missing", "none_of_these"
 SIMPLEST: Mapping[Kind, str] = {  # what the model to which nothing is added is called, of each kind of recording
     "frf": "the paper's model",
     "indentation": "Hertz's law",
-    "compression": "Hooke's law",
+    "compression": "the neo-Hookean law",
 }
 
 

@@ -43,11 +43,12 @@ def parts(evidence: Evidence, place: int) -> list[Part]:
     logs = np.array([entry.log_evidence for entry in found])
     shares = np.exp(logs - np.logaddexp.reduce(logs))
     mean_places = np.array(evidence.hypothesis.mean_places)
-    free = np.flatnonzero(mean_places != open_place)
+    free, cell = np.flatnonzero(mean_places != open_place), int(np.flatnonzero(mean_places == open_place)[0])
     each = []
     for share, entry in zip(shares.tolist(), found, strict=True):
         covariance = np.zeros_like(evidence.covariance)
         covariance[np.ix_(free, free)] = entry.covariance
+        covariance[cell, cell] = ((high - low) / _CELLS) ** 2 / 12  # anywhere in its cell
         each.append(Part(share, entry.point.fit, covariance))
     return each
 

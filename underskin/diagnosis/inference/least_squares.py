@@ -245,11 +245,12 @@ def _solved(
     def jacobian_at(moved: Floats) -> Floats:
         return jacobian(start + unit * (moved - 1)) * unit
 
+    lowest, highest = 1 + (low - start) / unit, 1 + (high - start) / unit
     result = least_squares(
         residuals_at,
-        np.ones(len(start)),  # scipy's first trust region is as large as that
+        np.clip(1.0, lowest, highest),  # scipy's first trust region is as large as that; rounding may leave the bounds
         jacobian_at,
-        bounds=(1 + (low - start) / unit, 1 + (high - start) / unit),
+        bounds=(lowest, highest),
         x_scale="jac",
         ftol=tolerance,
         xtol=_STEP * tolerance,

@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 
 from underskin.diagnosis.reporting.sentences import clause
 from underskin.findings.codes import FindingCode
+from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.registry import CATALOGUE
 
 _SLIPS = (
     *(FindingCode.NO_RESPONSE, FindingCode.IMPOSSIBLE_GEOMETRY, FindingCode.NO_FINITE_LINE, FindingCode.REFUSED),
@@ -17,10 +19,14 @@ _SLIPS = (
         FindingCode.GAIN_STEPS,
     ),
     FindingCode.WARM_UP,
+    *(FindingCode.FORCE_SATURATES, FindingCode.PERIODIC_ERROR),
     *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
     *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
 )
-_RESERVES = (FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED)
+_RESERVES = (
+    *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
+    *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED),
+)
 _MOST = 2  # findings that are quoted; the others are counted
 
 
@@ -48,3 +54,18 @@ def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCo
 def _quoted(entry: Mapping[str, str]) -> str:
     text = clause(entry["statement"])
     return f"recording {entry['recording']!r}: {text}" if entry["recording"] else text
+
+
+def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
+    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be what is
+    missing. Mechanisms of other kinds of recordings are none of it."""
+    return [
+        f"{name.replace('_', ' ')} was not tried: {reason}"
+        for name, reason in unsupported.items()
+        if kind != "frf" and name in CATALOGUE and kind in CATALOGUE[name].kinds and _is_physics(CATALOGUE[name])
+    ]
+
+
+def _is_physics(mechanism: Mechanism) -> bool:
+    """Whether it is more than another value of what is declared, which curves without a declared value have free."""
+    return mechanism.stage is not Stage.DECLARED

@@ -13,12 +13,16 @@ from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.unnamed.curve_laws import CurveLaw
 from underskin.mechanisms.unnamed.laws import in_plain_words
 
-_STIFFENS = ("strain_stiffening", "compressible_layer")  # with depth, as a layer on a stiff base does
+_STIFFENS = (
+    "strain_stiffening",
+    "compressible_layer",
+    "layered_contact",
+)  # with depth, as a layer on a stiff base does
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
-    lines' own, and a layer that could not be tried."""
+    lines' own, and a thickness that only the curves tell."""
     found = [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
     return [*found, *_kept(problem, explanation), *_of_unknown_thickness(problem, explanation)]
 
@@ -86,8 +90,11 @@ def _of_unknown_thickness(problem: FittingProblem, explanation: Explanation) -> 
         return []
     mechanisms = [problem.lines.mechanisms[name] for name in explanation.names]
     alike = [one for one in mechanisms if one.name in _STIFFENS or _of_depth(one)]
+    if not alike:
+        return []
     answer = in_words([in_plain_words(one) for one in alike])
-    return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", {"answer": answer})] if alike else []
+    is_tried = "layered_contact" in problem.lines.mechanisms.named
+    return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", {"answer": answer, "is_tried": is_tried})]
 
 
 def _of_depth(mechanism: Mechanism) -> bool:

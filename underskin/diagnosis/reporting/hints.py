@@ -5,6 +5,8 @@ The same table stands in docs/unnamed.md.
 
 from collections.abc import Mapping
 
+from underskin.mechanisms.base import Kind
+
 _ANY = ""
 TURNED = "time_s, on the way back"
 CONSTANT_PHASE = "frequency_hz, the same angle"
@@ -82,8 +84,35 @@ HINTS: Mapping[tuple[str, str], str] = {
     ("frequency_response", "recorded_at"): "A clock or filter that drifts would do this.",
     ("frequency_response", _ANY): "Electronics or a frame that follow this axis would do this.",
 }
+OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sample is compressed or pulled
+    (
+        "modulus",
+        "displacement_mm",
+    ): "Another law of stress and strain than the known one, or a sample that slips in its "
+    "grips or at its platens, would do this; measure the strain on the sample itself.",
+    (
+        "modulus",
+        "force_n",
+    ): "Another law of stress and strain than the known one, or a sample that slips in its grips or "
+    "at its platens, would do this; measure the strain on the sample itself.",
+    (
+        "position",
+        "displacement_mm",
+    ): "Ends that are not even, grips that slip, or an encoder with a periodic error would do "
+    "this; measure the strain on the sample itself.",
+    (
+        "modulus",
+        TURNED,
+    ): "A sample that softens as it is strained, or friction at its platens, would do this; repeat the cycle.",
+    (
+        "position",
+        TURNED,
+    ): "Play of the machine, or a sample that does not come back, would do this; compress a stiff block.",
+}
 
 
-def hint(acts_on: str, axis: str) -> str:
+def hint(acts_on: str, axis: str, kind: Kind) -> str:
     """A sentence, or none."""
+    if kind == "compression" and (acts_on, axis) in OF_BLOCKS:
+        return OF_BLOCKS[acts_on, axis]
     return HINTS.get((acts_on, axis), HINTS.get((acts_on, _ANY), ""))

@@ -54,7 +54,9 @@ def statement(
     if outweighed:
         also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
     certain = probability * _same_place(document) >= EXPLAINED and not outweighed
-    told = hint(acts_on, _hinted(leading)) if certain and not (altered or leading.is_constant) else ""
+    told = ""
+    if certain and not (altered or leading.is_constant):
+        told = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
     return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
 

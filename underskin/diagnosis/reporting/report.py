@@ -4,6 +4,7 @@ Four significant digits for values, three decimals for probabilities and p-value
 gives the same report on one machine; on a processor that rounds differently a last digit may differ.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -24,7 +25,7 @@ from underskin.diagnosis.reporting.answer_statement import (
     insufficient_statement,
     left_by,
 )
-from underskin.diagnosis.reporting.caveats import reserves, slips
+from underskin.diagnosis.reporting.caveats import not_tried, reserves, slips
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
@@ -35,17 +36,23 @@ from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, StatedD33, st
 from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.kinds_together import Joined
+from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding
 from underskin.diagnosis.validation.power import Power
+from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_digits
 from underskin.findings.lacking import Lacking
-from underskin.recordings.campaign import Campaign
+from underskin.mechanisms.models.curves import CurveModel
+from underskin.physics.sphere_law import PARABOLOID
+from underskin.recordings.campaign import Campaign, IndentationRecording
 
 SCHEMA = "report/1"
 _ALTERNATIVES = 6
 _LEAST_PROBABILITY = 0.005
+_STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,22 @@ def verdict(diagnosis: DiagnosisResult) -> str:
     if leader.explanation is None:
         return "unexplained"
     certain = leader.probability >= EXPLAINED and not _idle(diagnosis, leader.explanation)
+    certain = certain and not _may_be_the_other(diagnosis.search, leader.explanation)
     return "explained" if certain else "ambiguous"
+
+
+def _may_be_the_other(search: Search, explanation: Explanation) -> bool:
+    """Whether a thickness that nobody declared leaves open which of a thin layer and a stiffening sample stiffens a
+    curve with depth: the one in place of the other is no less probable than a law of contact that idealises may be."""
+    lines = explanation.best.hypothesis.lines
+    if lines.kind != "indentation" or lines.campaign.skin.thickness_mm is not None:
+        return False
+    evidence = {frozenset(entry.names): entry.log_evidence for entry in search.explanations}
+    least = explanation.log_evidence - least_evidence(explanation)
+    names = frozenset(explanation.names)
+    own = names & _STIFFER_WITH_DEPTH
+    others = [names - own | {other} for other in _STIFFER_WITH_DEPTH - own] if len(own) == 1 else []
+    return any(evidence.get(other, -math.inf) > least for other in others)
 
 
 def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
@@ -183,8 +205,13 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     around = Around(
         slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
         contradictions=[entry["statement"] for entry in contradictory],
-        reserves=reserves(findings),
-        quoted=[of_kinds, "" if alike is None else averaged.alike_clause(alike), d33.clause()],
+        reserves=[*reserves(findings), *_not_tried(stated, search, problem, findings)],
+        quoted=[
+            of_kinds,
+            _depths_clause(problem, shown),
+            "" if alike is None else averaged.alike_clause(alike),
+            d33.clause(),
+        ],
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
@@ -229,6 +256,32 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         },
     }
     return Reported(whole, d33)
+
+
+def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
+    """How deep spheres were pressed, over their radius and the declared thickness; empty of other recordings."""
+    model, lines = explanation.model, problem.lines
+    if lines.kind != "indentation" or not isinstance(model, CurveModel):
+        return ""
+    curves = [one for one in lines.campaign.recordings if isinstance(one, IndentationRecording)]
+    contacts = explanation.point.fit[model.contact_points].tolist()
+    depths = [float(one.displacement_mm.max()) - at for one, at in zip(curves, contacts, strict=True)]
+    over = max(depth / one.indenter_radius_mm for depth, one in zip(depths, curves, strict=True))
+    said = f"pressed to {in_digits(over, 2)} of the radius"
+    if over > PARABOLOID:
+        said += " (by the law of the whole sphere)"
+    thickness = lines.campaign.skin.thickness_mm
+    return said if thickness is None else f"{said}, {in_digits(max(depths) / thickness, 2)} of the thickness"
+
+
+def _not_tried(
+    stated: str, search: Search, problem: FittingProblem, findings: Sequence[Mapping[str, str]]
+) -> list[str]:
+    """What was not tried, where something remains that it could explain."""
+    remains = stated in ("unexplained", "ambiguous") or any(
+        entry["code"] == FindingCode.REMAINDER for entry in findings
+    )
+    return not_tried(search.unsupported, problem.kind) if remains else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:

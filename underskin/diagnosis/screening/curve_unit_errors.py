@@ -1,4 +1,4 @@
-"""Curves that contradict the others, or what rubber can be: copies, reversed forces, units off by 1000.
+"""Curves that contradict the others, or what rubber can be: copies, units off by 1000.
 
 What is compared is the apparent modulus: of a cylinder (F/A)/(u/height) at the largest force, u from the first sample;
 of a sphere 3 (1 − ν²) F/(4 √R u^1.5) at the deepest sample, u from the end of the air. It need not be right, only of
@@ -25,11 +25,10 @@ _RUBBER_MPA = 0.003, 300.0
 _IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
 _DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli
 _FAR = 100.0  # times the declared modulus, or the other curves'
-_REVERSED = -0.5  # correlation of force and displacement
 
 
 def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
-    """The curves of one kind that agree with each other, reversed forces put right; findings for the others.
+    """The curves of one kind that agree with each other; findings for the others.
 
     Copies and single curves of other magnitudes are left out. Where all curves contradict what is declared nothing is
     lacking only if `units_checked` confirms it.
@@ -40,7 +39,7 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
         if isinstance(entry, IndentationRecording | CompressionRecording) and entry.kind == kind
     ]
     curves, findings = list(recorded), []
-    for step in (_upright, _once, _within_range, partial(_like_others, skin=campaign.skin)):
+    for step in (_once, _within_range, partial(_like_others, skin=campaign.skin)):
         curves, step_findings = step(curves)
         findings += step_findings
     left = replace(campaign, recordings=tuple(curves))
@@ -51,22 +50,6 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     if shared:
         return Inspected(replace(left, recordings=()), findings, Lacking(Lack.CURVES_CONTRADICT))
     return Inspected(left, findings, None if curves else Lacking(Lack.NO_CURVE))
-
-
-def is_reversed(entry: CurveRecording) -> bool:
-    """Whether the force falls as it is pressed."""
-    finite = np.isfinite(entry.displacement_mm) & np.isfinite(entry.force_n)
-    place, force = entry.displacement_mm[finite], entry.force_n[finite]
-    if len(place) < 2 or not np.ptp(place) or not np.ptp(force):
-        return False
-    return float(np.corrcoef(place, force)[0, 1]) <= _REVERSED
-
-
-def _upright(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
-    """All curves, those whose force falls as they are pressed with the sign reversed."""
-    turned = {entry.id for entry in curves if is_reversed(entry)}
-    findings = [Finding(Reason.CURVE_REVERSED, entry.id, "force_n") for entry in curves if entry.id in turned]
-    return [replace(entry, force_n=-entry.force_n) if entry.id in turned else entry for entry in curves], findings
 
 
 def _once(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:

@@ -1,46 +1,67 @@
-"""Curves that nothing can be fitted to are named, and left out of a diagnosis."""
+"""Curves that nothing can be fitted to are named, and left out of a diagnosis; so are those that no law of a sphere can
+describe."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.screening.curve_unit_errors import is_reversed
 from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
-from underskin.recordings import elastomer
+from underskin.recordings.block_modulus import of_compression
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.sphere_modulus import estimate, require_depth, tip_of
+from underskin.units import to_si
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
-    """The campaign without the curves of one kind that have too few samples or do not load, and a finding on each."""
+    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law;
+    and a finding on each, and on those under a tip that looks like a cone."""
     thinned = {entry.id: entry for entry in curve_lines(campaign, kind).campaign.recordings}
     findings, usable = [], []
     for entry in campaign.recordings:
-        lacking = None
+        lacking, doubt = None, None
         if entry.kind == kind:
-            lacking = _lacking(thinned.get(entry.id), campaign.skin.poisson_ratio)
+            lacking, doubt = _lacking(thinned.get(entry.id), campaign.skin)
         if lacking is None:
             usable.append(entry)
         else:
             findings.append(Finding(Reason.CURVE_NOT_USABLE, entry.id, lacking.field, {"refusal": lacking}))
+        if doubt is not None:
+            findings.append(Finding(Reason.TIP_SHAPE, entry.id, doubt.field, {"refusal": doubt}))
     return replace(campaign, recordings=tuple(usable)), findings
 
 
-def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:
+def _lacking(entry: object, skin: SkinDescription) -> tuple[InvalidInput | None, InvalidInput | None]:
+    """Why nothing can be concluded from a curve, and why its tip may be no sphere."""
     if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
-        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change")
+        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change"), None
     try:
+        doubt = None
         if isinstance(entry, IndentationRecording):
-            modulus = elastomer.of_indentation(entry, poisson_ratio).modulus
+            modulus, doubt = _of_sphere(entry, skin)
         elif isinstance(entry, CompressionRecording):
-            modulus = elastomer.of_compression(entry).modulus
+            modulus = of_compression(entry).modulus
         else:
-            return too_few("force_n", "too few finite samples", "must have at least 5")
+            return too_few("force_n", "too few finite samples", "must have at least 5"), None
     except InvalidInput as refusal:
-        return refusal
-    if modulus > 0 or is_reversed(entry):
-        return None
-    return unusable("force_n", "does not rise as it is pressed", "must rise")
+        return refusal, None
+    return (None if modulus > 0 else unusable("force_n", "does not rise as it is pressed", "must rise")), doubt
+
+
+def _of_sphere(entry: IndentationRecording, skin: SkinDescription) -> tuple[float, InvalidInput | None]:
+    """E [Pa] of the law, and why the tip may be no sphere; raises InvalidInput where no law of a sphere holds."""
+    thickness = None if skin.thickness_mm is None else float(to_si("thickness_mm", skin.thickness_mm))
+    travel, force = to_si("displacement_mm", entry.displacement_mm), to_si("force_n", entry.force_n)
+    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    found = estimate(travel, force, radius, skin.poisson_ratio, thickness)
+    if not found.modulus > 0:
+        return found.modulus, None
+    require_depth(found)
+    tip = tip_of(travel, force, radius, skin.poisson_ratio, thickness)
+    if tip is not None and tip.is_blunt:
+        raise tip.refusal
+    return found.modulus, None if tip is None else tip.refusal

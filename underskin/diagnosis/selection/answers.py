@@ -11,7 +11,14 @@ from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
 from underskin.diagnosis.selection.other_kinds import Beside
-from underskin.diagnosis.selection.priors import least_evidence, log_prior, log_prior_beneath
+from underskin.diagnosis.selection.priors import (
+    declared_laws,
+    guesses,
+    least_evidence,
+    log_prior_beneath_of,
+    log_prior_of,
+    must_gain,
+)
 from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
@@ -106,21 +113,23 @@ class Search:
         known = explanation.best.hypothesis.lines.mechanisms
         laws = [known[name] for name in explanation.names if name not in known.named]
         if not laws:
-            return log_prior(len(explanation.names), self.supported)
-        prior = log_prior_beneath(len(explanation.names) - 1, self.supported)
+            return log_prior_of(explanation, self.supported)
+        prior = log_prior_beneath_of(explanation, self.supported, laws=1)
         return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
 
     def log_prior_beneath(self, explanation: Explanation) -> float:
         """The logarithm of the prior of a law that nobody listed on top of a set."""
-        return log_prior_beneath(len(explanation.names), self.supported) + math.log(_OF_LAWS)
+        return log_prior_beneath_of(explanation, self.supported) + math.log(_OF_LAWS)
 
     def shows(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
         no more than the smaller one, which stands for both."""
         evidence = {frozenset(entry.names): entry.log_evidence for entry in (*self.explanations, *self.laws)}
         whole = frozenset(explanation.names)
-        smaller = [evidence.get(whole - {name}, -math.inf) for name in whole]
-        return all(explanation.log_evidence > without + least_evidence(explanation) for without in smaller)
+        return all(
+            explanation.log_evidence > evidence.get(whole - {name}, -math.inf) + must_gain(explanation, name)
+            for name in whole
+        )
 
     def shown_or_nothing(self, answer: Answer) -> Explanation:
         """The explanation that an answer stands on: for `none_of_these` the best law that nobody listed, or else the
@@ -133,7 +142,7 @@ class Search:
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
     def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
-        prior = log_prior_beneath(len(explanation.names), self.supported) + math.log(1 - _OF_LAWS)
+        prior = log_prior_beneath_of(explanation, self.supported) + math.log(1 - _OF_LAWS)
         return process.log_evidence + prior
 
     @cached_property
@@ -173,7 +182,8 @@ class Search:
         stays for what neither laws nor processes here can be.
         """
         kept = [entry for entry in self.explanations if self.shows(entry)]
-        weights = without_occam(kept, [self.log_weight(entry) for entry in kept]).tolist()
+        sizes = [guesses(entry) for entry in kept]
+        weights = without_occam(kept, [self.log_weight(entry) for entry in kept], sizes).tolist()
         for entry, weight in self._possible_beside(kept, weights):
             kept.append(entry)
             weights.append(weight)
@@ -223,15 +233,18 @@ class Search:
         if self.explanations[0].best.hypothesis.lines.kind != "indentation":
             return []
         evidence = {frozenset(entry.names): entry.log_evidence for entry in self.explanations}
-        own = {frozenset(entry.names): weight for entry, weight in zip(kept, weights, strict=True)}
+        own = {frozenset(entry.names): (entry, weight) for entry, weight in zip(kept, weights, strict=True)}
+        declared = declared_laws(kept[0].best.hypothesis.lines)
         possible = []
         for entry in self.explanations:
             whole = frozenset(entry.names)
-            smaller = [whole - {name} for name in whole if whole - {name} in own]
+            smaller = [whole - {name} for name in whole - declared if whole - {name} in own]
             if whole in own or not smaller or any(evidence[less] >= entry.log_evidence for less in smaller):
                 continue
-            more = self.log_prior(entry) - log_prior(len(whole) - 1, self.supported)
-            possible.append((entry, max(own[less] for less in smaller) + more))
+            each = [
+                weight + self.log_prior(entry) - self.log_prior(less) for less, weight in map(own.__getitem__, smaller)
+            ]
+            possible.append((entry, max(each)))
         return possible
 
     def _left_to(self, explanation: Explanation) -> float:

@@ -30,26 +30,27 @@ def fit_and_plausibility(explanation: Explanation) -> float:
     return -explanation.best.cost - sum(entry.log_prior(entry.start) for entry in own)
 
 
-def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[float]) -> Floats:
-    """The weights, those of the leader's equals in size raised to what fit and plausibility say of them."""
+def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[float], sizes: Sequence[int]) -> Floats:
+    """The weights, those of the leader's equals in size raised to what fit and plausibility say of them; `sizes` count
+    the mechanisms that are guesses."""
     weights = np.array(log_weights)
-    first = _leader(explanations, weights)
+    first = _leader(explanations, weights, sizes)
     leader = explanations[first]
     weights[first] = weights.max()
     for number, rival in enumerate(explanations):
-        if rival.names and len(rival.names) == len(leader.names) and number != first:
+        if sizes[number] and sizes[number] == sizes[first] and number != first:
             gap = fit_and_plausibility(rival) - fit_and_plausibility(leader)
             raised = max(weights[number], weights[first] + gap)
             weights[number] = min(raised, weights[first] - _BEHIND)
     return weights
 
 
-def _leader(explanations: Sequence[Explanation], weights: Floats) -> int:
+def _leader(explanations: Sequence[Explanation], weights: Floats, sizes: Sequence[int]) -> int:
     """The place of the one of largest weight, or among its equals in weight and size of the best fit."""
     first = int(np.argmax(weights))
     equals = [
         number
         for number in np.flatnonzero(weights > weights[first] - _ACCURACY).tolist()
-        if explanations[number].names and len(explanations[number].names) == len(explanations[first].names)
+        if sizes[number] and sizes[number] == sizes[first]
     ]
     return max(equals, key=lambda number: fit_and_plausibility(explanations[number]), default=first)

@@ -24,6 +24,7 @@ from underskin.units import Floats, to_si
 _INFORMED = 0.8  # of a prior's deviation, above which a posterior's says nothing
 _ASKED_FOR, _BEHIND = 3, 12.0  # sets of a kind of curves, and how far behind the best one in nats
 _MODULUS_SD = 1.5  # of the logarithm of a modulus that nobody declared
+_LEAST_CORRELATION = 1e-11  # eigenvalue of correlations: less is rounding
 
 # Of a prior as a normal one: mean, variance, whether it is flat (then the variance is that of one as high), and by how
 # much the logarithm of its density at the curves' mean exceeds that normal one's
@@ -193,7 +194,7 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * widest)
     if not known.any():
         return Knowledge(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
-    after = np.linalg.inv(told.covariance[np.ix_(known, known)])
+    after = _inverse(told.covariance[np.ix_(known, known)])
     centre, variance, flat = centre[known], variance[known], flat[known]
     before = np.diag(np.where(flat, 0.0, 1 / variance))
     precision = _definite(after - before)
@@ -210,6 +211,13 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     height -= 0.5 * np.linalg.slogdet(loose)[1]
     tolerant: Floats = np.linalg.solve(loose, precision).astype(np.float64)
     return Knowledge.of(matrix, offset, mean, tolerant, float(height))
+
+
+def _inverse(covariance: Floats) -> Floats:
+    """Of a covariance, whose correlations may be nearly singular: quantities that are known as a ratio alone."""
+    deviation = np.sqrt(np.diag(covariance))
+    values, vectors = np.linalg.eigh(covariance / np.outer(deviation, deviation))
+    return np.asarray((vectors / np.maximum(values, _LEAST_CORRELATION)) @ vectors.T / np.outer(deviation, deviation))
 
 
 def _definite(precision: Floats) -> Floats:

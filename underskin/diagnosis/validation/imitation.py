@@ -23,7 +23,7 @@ from underskin.diagnosis.data.names import NONE_OF_THESE
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.taken_up import beside, force_and_slopes, information, precision_of
-from underskin.diagnosis.selection.priors import PRIORS, least_evidence, log_prior
+from underskin.diagnosis.selection.priors import PRIORS, guesses, least_evidence, log_prior
 from underskin.diagnosis.validation.power import least_chi2
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.recordings.conditions import CurveConditions
@@ -77,8 +77,7 @@ def imitation(explanation: Explanation, null: Explanation, supported: int) -> Im
     imitated = strength * _left(whole, every, precision)[:-1][laws] < least
     for own in own_places(explanation.names, hypothesis.lines).values():
         imitated &= strength * _left(whole, np.delete(every, own), precision)[:-1][laws] > least
-    size = len(explanation.names)
-    odds = _odds(int(imitated.sum()), int(laws.sum()), size, supported)
+    odds = _odds(int(imitated.sum()), int(laws.sum()), guesses(explanation), supported)
     return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0))
 
 

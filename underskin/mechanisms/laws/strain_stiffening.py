@@ -75,7 +75,7 @@ _YEOH = (
         high=2.0,
         prior=Normal(0.0, 0.3),
         scale="linear",
-        limit=None,
+        limit=0.0,
         shown=0.1,
         reason="c2 of the silicones of docs/mechanisms.md: -0.03 to 0.09 over their range, -0.2 to 0.6 below 40 %",
     ),
@@ -86,7 +86,7 @@ _YEOH = (
         high=1.0,
         prior=Normal(0.0, 0.1),
         scale="linear",
-        limit=None,
+        limit=0.0,
         shown=0.02,
         reason="c3 of the silicones of docs/mechanisms.md: 0 to 0.03 over their range, -0.4 to 0.1 below 40 %",
     ),
@@ -98,15 +98,16 @@ class StrainStiffening(Mechanism):
     """A modulus that grows with strain."""
 
     name = "strain_stiffening"
-    plain = """The elastomer gets stiffer the more it is deformed, so at high preloads and under small spheres the
-    contact grows less, and the force rises more, than a constant modulus would have it."""
+    plain = """The elastomer's modulus changes with its strain, and mostly grows, so at high loads the force rises more,
+    and a contact grows less, than a constant modulus would have it."""
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
     together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
     compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
     a sphere f = (1 + q c J)^(1/q), the secant ratio at ε multiplying the modulus."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
-    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0, or c = 0,
-    a curve is neo-Hookean, not a straight line: the base model is recovered at small strain."""
+    strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a
+    compression is neo-Hookean, as the base model is; under a sphere c = 0 is neo-Hookean too, and the base model is
+    recovered at small strain."""
     source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
     Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
@@ -137,6 +138,11 @@ class StrainStiffening(Mechanism):
         power = 1.0 + bend * grown
         factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / bend)
         return {"stiffening": (neo_hookean * factor - 1.0) / _COMPARED}
+
+    def told(self, values: Mapping[str, float]) -> str:
+        """Of a compression, that it is softer than a neo-Hookean solid where it is."""
+        softer = values.get("second_over_first", 0.0) < 0
+        return "As it is strained, the sample gets softer than a neo-Hookean solid (c2 is negative)." if softer else ""
 
     def on_material(self, contacts: Contacts, values: Values) -> None:
         """Stiffen each contact by its own strain."""

@@ -1,6 +1,7 @@
 """The force of compression (or tension) curves, sample by sample, under a set of mechanisms.
 
-Base model: one modulus, F = E A (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
+Base model: one modulus E of an incompressible neo-Hookean solid between smooth platens, F = (E A/3)(λ⁻² − λ) with
+λ = 1 − (d − d0)/H, compression positive. Stages: declared value → nominal stress of the
 material → friction at the platens → relaxation.
 """
 
@@ -17,12 +18,13 @@ from underskin.mechanisms.models.nuisances import contact_point, modulus_paramet
 from underskin.mechanisms.models.relaxation import memories
 from underskin.mechanisms.parameter import Parameter
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings import elastomer
+from underskin.recordings.block_modulus import of_compression
 from underskin.recordings.campaign import CompressionRecording
 from underskin.recordings.conditions import CompressionConditions, Conditions, SkinDescription
 from underskin.units import Floats, Mask, to_si
 
 _CONTACT_SD, _CONTACT_BOUND = 0.01, 0.1  # of the sample's height: the contact point's prior and bounds
+_LEAST_STRETCH = 0.02  # of λ: curves that are pressed to 0.15 are left out
 
 
 class CompressionModel(CurveModel):
@@ -61,16 +63,16 @@ class CompressionModel(CurveModel):
     def _relative_stress(self, curve: Curve, strain: Floats) -> Floats:
         """Nominal stress over E, compression positive.
 
-        Stiffening: (λ⁻² − λ)(1 + 2 c2 J + 3 c3 J²)/3, J = 3 (I/3)^(m/2), I = I1 − 3; Yeoh's law at m = 2.
+        Neo-Hookean, (λ⁻² − λ)/3; what stiffens has that times 1 + 2 c2 J + 3 c3 J², J = 3 (I/3)^(m/2), I = I1 − 3:
+        Yeoh's law at m = 2.
         """
-        stress = strain
+        stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
+        stress = (1.0 / (stretch * stretch) - stretch) / 3.0
         if curve.yeoh is not None:
             second, third, exponent = map(numbers, curve.yeoh)
-            stretch = 1.0 - strain
             invariant = stretch * stretch + 2.0 / stretch - 3.0
-            neo_hookean = 1.0 / (stretch * stretch) - stretch
             grown = 3.0 * (np.maximum(invariant, 0.0) / 3.0) ** (0.5 * exponent)
-            stress = neo_hookean * (1.0 + 2.0 * second * grown + 3.0 * third * grown * grown) / 3.0
+            stress = stress * (1.0 + 2.0 * second * grown + 3.0 * third * grown * grown)
         if curve.platen_friction is None:
             return stress
         return np.asarray(stress * (1.0 + 2.0 * self._shape_factor**2 * numbers(curve.platen_friction)))
@@ -84,7 +86,7 @@ def _nuisances(recordings: Sequence[CompressionConditions], skin: SkinDescriptio
         begins = 0.0
         if isinstance(entry, CompressionRecording):
             try:
-                estimates.append(elastomer.of_compression(entry).modulus)
+                estimates.append(of_compression(entry).modulus)
             except InvalidInput as refusal:
                 raise refusal.at(f"recordings[{entry.id}].{refusal.field}") from refusal
             unloaded = int(np.abs(entry.force_n).argmin())

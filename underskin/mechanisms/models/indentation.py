@@ -1,8 +1,9 @@
 """The force of indentation curves, sample by sample, under a set of mechanisms.
 
 Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
-declared, E free. Stages: declared value → material → contact radius, depth and force together with the stage's give,
-through the body's history where it relaxes. What the load cell adds, a zero, a drift and a gain, stands in the
+declared, E free; under a sphere that is pressed deep, Sneddon's law of the whole sphere in its place. Stages: declared
+value → material → contact radius, depth and force together with the stage's give, through the body's history where it
+relaxes. What the load cell adds, a zero, a drift and a gain, stands in the
 covariance (diagnosis/noise).
 """
 
@@ -28,10 +29,11 @@ from underskin.mechanisms.models.sphere_contact import (
     layer_ratios,
 )
 from underskin.mechanisms.parameter import Parameter
-from underskin.recordings import elastomer
+from underskin.physics.sphere_law import PARABOLOID
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
 from underskin.recordings.curve_course import course, touch
+from underskin.recordings.sphere_modulus import estimate
 from underskin.units import Floats, Mask, to_si
 
 _CONTACT_SD, _CONTACT_BOUND = 0.1, 0.8  # of the range of displacement: the contact point's prior and bounds
@@ -53,6 +55,9 @@ class IndentationModel(CurveModel):
         known = [entry.stage_stiffness_n_per_mm for entry in recordings]
         self._give = np.array([0.0 if stage is None else 1e-3 / stage for stage in known])[:, None]  # m/N
         self._radius = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in recordings])[:, None]
+        middles = np.array([nuisance.start for nuisance in nuisances[len(nuisances) - len(recordings) :]])
+        deepest = self.displacement.max(axis=1) - 1e-3 * middles
+        self._whole = (deepest > PARABOLOID * self._radius[:, 0]).astype(float)[:, None]
 
     def _curve(self, own: dict[str, Values], nuisances: Values) -> Curve:
         thickness = self._skin.thickness_mm
@@ -133,7 +138,8 @@ class IndentationModel(CurveModel):
             layers = Layers(numbers(curve.thickness), [layer_ratios(value) for value in alike])
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         give = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
-        return Sphere(numbers(curve.modulus) / (1 - poisson_ratio**2), self._radius, layers, stiffening, give)
+        reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
+        return Sphere(reduced, self._radius, layers, stiffening, give, self._whole)
 
 
 def _adhesion(curve: Curve) -> Adhesion | None:
@@ -171,7 +177,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
             columns = [np.asarray(column, dtype=float).tobytes() for column in (entry.displacement_mm, force)]
             try:
                 modulus, begins = _hertz(*columns, entry.indenter_radius_mm, skin.poisson_ratio)
-                estimates.append(modulus)
+                estimates.append(modulus if modulus > 0 else _secant_modulus(entry, skin.poisson_ratio))
             except InvalidInput as refusal:
                 refused = refusal.at(f"recordings[{entry.id}].{refusal.field}")
                 # A curve that does not load begins where it shows least force.
@@ -189,10 +195,17 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     return [modulus_parameter(skin, estimates), *thickness, *contact_points]
 
 
+def _secant_modulus(entry: IndentationRecording, poisson_ratio: float) -> float:
+    """Of a curve that does not load: Hertz's modulus [Pa] of the range of force over the range of travel."""
+    force, travel = (float(np.ptp(to_si(name, getattr(entry, name)))) for name in ("force_n", "displacement_mm"))
+    radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
+    return max(0.75 * (1 - poisson_ratio**2) * force / (np.sqrt(radius) * max(travel, 1e-300) ** 1.5), 1e-300)
+
+
 @lru_cache(maxsize=1024)  # a diagnosis composes some dozen models of the same recordings
 def _hertz(displacement_mm: bytes, force_n: bytes, radius_mm: float, poisson_ratio: float) -> tuple[float, float]:
     """Modulus [Pa] and contact point [m] of the base model's own fit."""
-    fit = elastomer.indentation_modulus(
+    fit = estimate(
         to_si("displacement_mm", np.frombuffer(displacement_mm)),
         to_si("force_n", np.frombuffer(force_n)),
         float(to_si("indenter_radius_mm", radius_mm)),

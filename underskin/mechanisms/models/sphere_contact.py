@@ -7,6 +7,8 @@ Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E
 representative strain 0.2 a/R (Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904). What the stage commands is
 δ + F/k.
 
+Pressed deep, the sphere is no paraboloid: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47).
+
 Under a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least
 depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one. The functions of a are compiled
 (sphere_kernel).
@@ -103,6 +105,7 @@ class Sphere:
     layers: Layers | None = None
     stiffening: Stiffening | None = None
     give: Floats | float = 0.0
+    whole: Floats | float = 0.0  # 1 where it is pressed so deep that it is no paraboloid (curves, 1), else 0
 
     def at(self, a: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """F, δ and K without adhesion at radii a, and ℓ/√w of the adhesive stretch."""
@@ -129,7 +132,7 @@ class Sphere:
         depth = np.maximum(travel, _SMALLEST)
         root = np.sqrt(self.radius * depth)
         start = root if self.layers is None else self.layers.radius_of(root)
-        if work is None and not np.any(self.give):
+        if work is None and not np.any(self.give) and not np.any(self.whole):
             return start
         if work is None:
             work = np.zeros((1, 1, 1))
@@ -157,7 +160,7 @@ class Sphere:
         thickness = 0.0 if self.layers is None else self.layers.thickness
         law = self.stiffening
         stiffening = (-1.0, 0.0, 0.0) if law is None else (law.coefficient, law.form, law.exponent)
-        columns = (self.modulus, self.radius, self.give, thickness, *stiffening)
+        columns = (self.modulus, self.radius, self.give, thickness, *stiffening, self.whole)
         whole = np.empty((*np.broadcast_shapes(*map(np.shape, columns)), len(columns)))
         for number, column in enumerate(columns):
             whole[..., number] = column

@@ -1,7 +1,8 @@
 """Compiled: the contact of a sphere as a function of its radius, and the radius at a travel; see sphere_contact.
 
-Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 7) holds the reduced modulus E', the
-sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), and of stiffening c (−1: none), q and m.
+Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 8) holds the reduced modulus E', the
+sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, and 1
+where the sphere is pressed so deep that it is no paraboloid (else 0).
 `cubics` (layers, cells, powers, 4) are a layer's ratios over a/h from 0 to `LARGEST_A_OVER_H`, highest power first, of
 each point or one for all.
 """
@@ -18,11 +19,12 @@ _LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
 _STEPS = 60
 _TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
 _NO_CONTACT = 1e-15  # m, which stands for no radius
+_EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
 _BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
 _HALVINGS = 40
 _LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
 
-Own = tuple[float, float, float, float, float, float, float]  # a body's numbers
+Own = tuple[float, float, float, float, float, float, float, float]  # a body's numbers
 Four = tuple[float, float, float, float]
 
 _ROWS = "float64[:, :, ::1]"
@@ -55,14 +57,32 @@ def _secant_ratio(strain: float, coefficient: float, form: float, exponent: floa
 @compiled()
 def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
     own = body[point, curve, min(sample, body.shape[2] - 1)]
-    return own[0], own[1], own[2], own[3], own[4], own[5], own[6]
+    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7]
+
+
+@compiled()
+def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
+    """F/E', δ and dδ/da of a sphere that is no paraboloid (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
+
+    Where a is nearly R the depth goes on in a straight line: no contact is wider.
+    """
+    x = min(a / radius, _EQUATOR)
+    if x < _PARABOLIC:
+        square = x * x
+        depth, slope = radius * square * (1.0 + square / 3.0), 2.0 * x * (1.0 + 2.0 * square / 3.0)
+        return 4.0 / 3.0 * radius**2 * x * square * (1.0 + 0.4 * square), depth, slope
+    turned = math.atanh(x)
+    slope = turned + x / (1.0 - x * x)
+    beyond = a - x * radius
+    force = radius**2 * ((1.0 + x * x) * turned - x) + 2.0 * x * radius * slope * beyond
+    return force, radius * x * turned + slope * beyond, slope
 
 
 @compiled()
 def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
     """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
     by a."""
-    modulus, radius, _, thickness, coefficient, form, exponent = own
+    modulus, radius, _, thickness, coefficient, form, exponent, whole = own
     growth, inverse = 0.0, 1.0 / a
     if coefficient >= 0:
         strain = _STRAIN * a / radius
@@ -73,6 +93,9 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
     force, stretch = 2.0 / 3.0 * stiffness * depth, math.sqrt(2.0 * math.pi * a / modulus)
     by_force, by_depth, by_stiffness = 3.0 * inverse + growth, 2.0 * inverse, inverse + growth
     by_stretch = 0.5 * (inverse - growth)
+    if whole > 0:
+        force, depth, slope = _whole_sphere(a, radius)
+        force, by_force, by_depth = modulus * force, stiffness * slope / (modulus * force) + growth, slope / depth
     if thickness > 0:
         cells = cubics.shape[0]
         place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
@@ -194,7 +217,7 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
                 low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
                 if thickness > 0:
                     low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
-                if own[2] == 0 and thickness == 0 and own[4] < 0:
+                if own[2] == 0 and thickness == 0 and own[4] < 0 and own[7] == 0:
                     low = high = _LAST * unit
                 for _ in range(_HALVINGS if low < high else 0):
                     middle = math.sqrt(low * high)

@@ -1,0 +1,89 @@
+"""Curves are read whatever way they were stored: sign, direction and order, saturation, an error that is periodic."""
+
+import numpy as np
+import pytest
+
+from tests.support.sphere_curves import campaign, hertz, pressed, ways
+from underskin.errors import InvalidInput
+from underskin.findings.finding import Finding
+from underskin.recordings import elastomer
+from underskin.recordings.campaign import Campaign
+from underskin.recordings.curve_signs import falling
+from underskin.recordings.plausibility import implausible
+
+
+def modulus_mpa(read: Campaign) -> float:
+    (found,) = elastomer.of_campaign(read)
+    assert not isinstance(found.result, InvalidInput), found.result
+    return found.result.modulus / 1e6
+
+
+def only(read: Campaign) -> Finding:
+    (finding,) = implausible(read)
+    return finding
+
+
+@pytest.mark.parametrize("force", [1, -1])
+@pytest.mark.parametrize("travel", [1, -1])
+@pytest.mark.parametrize("start_mm", [0.0, 0.02])
+def test_a_lift_before_the_press_tells_no_sign(start_mm: float, force: int, travel: int) -> None:
+    """The tip is lifted first, from the air or from a preload: each column's sign is told from the whole curve."""
+    depth = ways(start_mm, -0.03, 0.25, -0.05)
+    expected = [name for name, sign in (("force_n", force), ("displacement_mm", travel)) if sign < 0]
+    assert list(falling(force * pressed(depth), travel * depth, sphere=True)) == expected
+    read = campaign(travel * depth, force * pressed(depth))
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+    assert [one.arguments["fields"] for one in implausible(read)] == ([expected] if expected else [])
+
+
+def test_a_rounded_lift_tells_no_sign() -> None:
+    """The stage turns smoothly at both ends of the lift."""
+    phase = np.linspace(0.0, np.pi, 150)
+    lift = -0.03 * np.sin(phase / 2) ** 2
+    depth = np.concatenate([lift, -0.03 + 0.28 * np.sin(phase / 2) ** 2, 0.25 - 0.3 * np.sin(phase / 2) ** 2])
+    assert falling(pressed(depth), depth, sphere=True) == ()
+    assert falling(-pressed(depth), -depth, sphere=True) == ("force_n", "displacement_mm")
+
+
+def test_rows_from_the_deepest_to_the_air_are_read_backwards() -> None:
+    """Without times, rows of one way may have been stored in either order; nothing is called negative."""
+    depth = ways(0.3, -0.1, samples=400)
+    read = campaign(depth, pressed(depth), timed=False)
+    assert only(read).code == "rows_reversed"
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("corners", [(-0.1, 0.3), (-0.1, 0.3, -0.1)])
+def test_samples_of_a_saturated_channel_are_left_out_and_named(corners: tuple[float, ...]) -> None:
+    """The force reads one number while the sphere goes on: it is no property of the sample."""
+    depth = ways(*corners)
+    force = np.minimum(pressed(depth), 0.75 * hertz(np.array(0.3)))
+    finding = only(campaign(depth, force))
+    assert finding.code == "force_saturates"
+    assert finding.arguments["samples"] == int((force == force.max()).sum())
+    assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
+
+
+def test_steps_of_a_converter_and_a_hold_are_no_saturation() -> None:
+    depth = ways(-0.1, 0.3, 0.3, -0.1)
+    steps = hertz(np.array(0.3)) / 60
+    assert implausible(campaign(depth, np.round(pressed(depth) / steps) * steps)) == []
+    assert implausible(campaign(depth, pressed(depth, noise=0.0))) == []
+
+
+@pytest.mark.parametrize("period_mm", [0.02, 0.045])
+def test_a_periodic_error_is_told_with_its_period_and_subtracted(period_mm: float) -> None:
+    """Interference of 3 % of the largest force, in the air as well as in contact."""
+    depth = ways(-0.1, 0.3, -0.1, samples=400)
+    force = pressed(depth)
+    read = campaign(depth, force + 0.03 * force.max() * np.sin(2 * np.pi * depth / period_mm + 0.4))
+    finding = only(read)
+    assert finding.code == "periodic_error"
+    assert finding.arguments["period_mm"] == pytest.approx(period_mm, rel=0.01)
+    assert finding.arguments["percent"] == pytest.approx(3.0, rel=0.1)
+    assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_drift_in_the_air_is_no_periodic_error() -> None:
+    depth = ways(-0.1, 0.3, -0.1, samples=400)
+    assert implausible(campaign(depth, pressed(depth) + 0.2 * depth**2)) == []

@@ -1,0 +1,73 @@
+"""A rigid sphere pressed into an elastic half space or a bonded layer without adhesion, as deep as it is round. SI.
+
+On the half space, with the contact radius a and E' = E/(1 − ν²) (Sneddon, Int. J. Eng. Sci. 3 (1965) 47):
+
+    δ = (a/2) ln((R + a)/(R − a)),   F = (E'/2) [(a² + R²) ln((R + a)/(R − a)) − 2aR]
+
+For small a/R these are Hertz's δ = a²/R and F = 4E'a³/(3R); at a given depth the force is lower than Hertz's by about a
+tenth of δ/R. On a layer of thickness h, δ is multiplied by the layer's ratio B(a/h), and F = ∫ k dδ with the stiffness
+k = 2E'a S(a/h) of the flat punch (contact_curves).
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.elastic_layer import Layer
+from underskin.units import Floats
+
+_NODES = 4001
+_WIDEST = 0.999  # of R, up to which the contact radius is tabulated
+_PARABOLOID_TO = 10.0  # of R, the same of a paraboloid, which a fit that goes astray may ask for
+PARABOLOID = 0.4  # of R: pressed less deep, a paraboloid's force is within 4 % of the sphere's
+
+
+class SphereLaw:
+    """F/E' [m²] over the depth [m] under a sphere; `thickness` is that of the layer, None on a half space.
+
+    A paraboloid stands for the sphere unless it is `whole`.
+
+    Attributes
+    ----------
+    deepest : float
+        Depth [m] up to which the law is known: on a layer that at a/h = LARGEST_A_OVER_H.
+    """
+
+    def __init__(self, radius: float, thickness: float | None, poisson_ratio: float, *, whole: bool = False) -> None:
+        """Tabulate the law."""
+        widest = (_WIDEST if whole else _PARABOLOID_TO) * radius
+        if thickness is not None:
+            widest = min(widest, LARGEST_A_OVER_H * thickness)
+        a = widest * np.linspace(0.0, 1.0, _NODES)
+        depth, stiffness = (a * np.arctanh(a / radius) if whole else a**2 / radius), 2 * a
+        if thickness is not None:
+            ratio = _ratios(poisson_ratio)(a / thickness)
+            depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
+        steps = np.diff(depth) * (stiffness[1:] + stiffness[:-1]) / 2
+        self._depth, self._root = depth, np.cbrt(np.append(0.0, np.cumsum(steps))) ** 2
+        self._contact_radius = a
+        self.deepest = float(depth[-1])
+
+    def __call__(self, depth: Floats) -> Floats:
+        """F/E' at depths (samples,), 0 out of contact; beyond `deepest` that of the last depth."""
+        return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._root) ** 1.5)
+
+    def contact_radius(self, depth: Floats) -> Floats:
+        """a [m] at depths (samples,)."""
+        return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._contact_radius))
+
+
+class _Ratios:
+    """A layer's force, depth and stiffness over the half space's, of a/h."""
+
+    def __init__(self, poisson_ratio: float) -> None:
+        self._curves = CurveGrid(np.ones(1)).curves(Layer(poisson_ratio))
+
+    def __call__(self, alpha: Floats) -> Floats:
+        return self._curves.ratios_at(np.maximum(alpha, 1e-9))
+
+
+@lru_cache(maxsize=64)
+def _ratios(poisson_ratio: float) -> _Ratios:
+    return _Ratios(poisson_ratio)
