@@ -1,7 +1,7 @@
 """Recordings without a response above their own noise: a sensor that is dead, or not connected.
 
 The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
-values, which a resonance between a few of them does not reach.
+values without a delay, which a resonance between a few of them does not reach.
 A recording shows no response where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which
 noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ².
 """
@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Floats, Mask
 
 _LEAST_LINES = 4
@@ -26,8 +26,7 @@ _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near 
 def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
     """Which recordings show none, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
     unresponsive, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
-    for number, entry in enumerate(entries):
-        values = lines_of(entry).values
+    for number, values in enumerate(aligned_lines(entries)):
         lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
@@ -49,7 +48,7 @@ def dead(
     missing: Mask = unresponsive & (expected**2 > _EXPECTED * variance)
     findings = []
     sensors = np.array([entry.sensor for entry in entries])
-    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
+    level = np.array([float(np.abs(np.nanmean(values))) for values in aligned_lines(entries)])
     for name in dict.fromkeys(sensors[missing].tolist()):
         own = sensors == name
         if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
