@@ -71,7 +71,13 @@ EFFECTS: dict[str, Effect] = {
         (FRF,),
         {"tip_mass_g": (0, 500), "damping": (1e-3, 2)},
     ),
-    "amplifier_high_pass": Effect("iωτ/(1 + iωτ)", (FRF,), {"corner_hz": (0, 100)}),
+    "amplifier_high_pass": Effect("iωτ/(1 + iωτ)", (FRF,), {"corner_hz": (0, 1000)}),
+    "amplifier_low_pass": Effect(
+        "one pole, 1/(1 + iωτ), or Butterworth's two, 1/(1 + √2 iωτ − (ωτ)²)",
+        (FRF,),
+        {"corner_hz": (1e-2, 1e5)},
+        ("first_order", "second_order"),
+    ),
     "sensor_relaxation": Effect(
         "a ladder of Debye terms, nearly (iω/ω30)^(−n) from 0.1 Hz to 10 kHz, or one step 1 + s/(1 + iω/ω_s)",
         (FRF,),

@@ -91,6 +91,8 @@ def electrical(on: Mapping[str, Values], preload_n: float) -> list[Filter]:
         chain.append(_relaxation(on["sensor_relaxation"]))
     if "amplifier_high_pass" in on:
         chain.append(_high_pass(effects.of(on, "amplifier_high_pass", "corner_hz")))
+    if "amplifier_low_pass" in on:
+        chain.append(_low_pass(on["amplifier_low_pass"]))
     if "preload_leak" in on:
         power = effects.of(on, "preload_leak", "power")
         chain.append(_high_pass(effects.of(on, "preload_leak", "corner_hz") * preload_n**power))
@@ -113,6 +115,13 @@ def electrical(on: Mapping[str, Values], preload_n: float) -> list[Filter]:
 
 def _high_pass(corner_hz: float) -> Filter:
     return [([0.0, 1.0], [2 * math.pi * corner_hz, 1.0])]
+
+
+def _low_pass(values: Values) -> Filter:
+    time_s = 1 / (2 * math.pi * float(values["corner_hz"]))
+    if values["law"] == "first_order":
+        return [([1.0], [1.0, time_s])]
+    return [([1.0], [1.0, math.sqrt(2) * time_s, time_s**2])]
 
 
 def _relaxation(values: Values) -> Filter:

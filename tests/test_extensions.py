@@ -229,7 +229,7 @@ from underskin.mechanisms import CATALOGUE, compose
 from underskin.parallel import processes
 from underskin.prediction.adopted_model import adopted
 
-name, values = "amplifier_low_pass", {"amplifier_high_pass": (1.0,), "amplifier_low_pass": (800.0,)}
+name, values = "sample_averaging", {"amplifier_high_pass": (1.0,), "sample_averaging": (0.4,)}
 if __name__ == "__main__":
     names = list(CATALOGUE)
     assert names[names.index(name) - 1] == "timing_delay", names
@@ -255,7 +255,7 @@ def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_pr
     shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
     (site / "lab_skin-1.0.dist-info").mkdir()
     (site / "lab_skin-1.0.dist-info" / "METADATA").write_text("Name: lab-skin\nVersion: 1.0\n")
-    entry = f"[{GROUP}]\namplifier_low_pass = lab_skin.mechanisms:AmplifierLowPass\n"
+    entry = f"[{GROUP}]\nsample_averaging = lab_skin.mechanisms:SampleAveraging\n"
     (site / "lab_skin-1.0.dist-info" / "entry_points.txt").write_text(entry)
     (tmp_path / "use.py").write_text(USE, encoding="utf-8")
     path = [str(site), str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]

@@ -1,5 +1,7 @@
 """What a `report/1` says in numbers of its fit: parameters with intervals, errors before and after, the noise."""
 
+from typing import Literal
+
 from pydantic import BaseModel, Field
 
 
@@ -11,6 +13,9 @@ class Parameter(BaseModel):
     value: float | None = Field(description="Its most probable value.")
     low: float | None = Field(description="Lower end of its 95 % interval.")
     high: float | None = Field(description="Upper end of its 95 % interval.")
+    at_bound: Literal["low", "high"] | None = Field(
+        default=None, description="The end of its search that the value lies at or beyond: it is no result then."
+    )
 
 
 class FitScore(BaseModel):

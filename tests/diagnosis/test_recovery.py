@@ -43,6 +43,7 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
         {"tip_mass_g": 3.0, "damping": 0.05}, {"tip_mass": "tip_mass_g", "damping_ratio": "damping"}
     ),
     ("frf", "amplifier_high_pass"): Hidden({"corner_hz": 1.0}, {"corner": "corner_hz"}),
+    ("frf", "amplifier_low_pass"): Hidden({"corner_hz": 250.0}, {"low_pass_corner": "corner_hz"}),
     ("frf", "sensor_relaxation"): Hidden({"exponent": 0.04}, {"exponent": "exponent"}),
     ("frf", "contact_creep"): Hidden(
         {"fraction": 0.5, "time_s": 20.0}, {"relaxed_fraction": "fraction", "relaxation_time": "time_s"}

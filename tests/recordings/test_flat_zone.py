@@ -14,6 +14,7 @@ from underskin.recordings.frf import summary
 from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone
+from underskin.recordings.frf.line_choice import usable_lines
 from underskin.recordings.frf.stacks import stacked
 from underskin.units import Complexes, Floats
 
@@ -85,6 +86,7 @@ def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[flo
         Frf(frequency, np.where(follows, one.values, 0.3e-12 * (1 + noise)), np.where(follows, 0.99, 0.1))
         for one in frfs
     ]
+    idle = [one.frf for one in usable_lines(idle)]
     zone = flat_zone(stacked(idle), conditions)
     assert zone.low_hz == pytest.approx(frequency[follows][0], rel=0.2)
     assert zone.high_hz == pytest.approx(frequency[follows][-1], rel=0.2)
@@ -106,6 +108,7 @@ def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
         Frf(frequency, np.where(sines, one.values, apart), np.where(sines, 0.99, low))
         for one, apart, low in zip(frfs, noise, coherence, strict=True)
     ]
+    idle = [one.frf for one in usable_lines(idle)]
     zone = flat_zone(stacked(idle), conditions)
     assert (zone.low_hz, zone.high_hz) == (20.0, 300.0)
     assert zone.holds(frequency).sum() == 15
@@ -125,6 +128,7 @@ def test_a_sine_at_the_mains_beside_idle_lines_is_no_pick_up_and_low_sines_are_i
         noise = generator.normal(size=(len(frequency), 2)) @ [1e-12, 1e-12j]
         coherence = np.where(sines, 1.0, generator.uniform(0.0, 0.2, len(frequency)))
         frfs.append(Frf(frequency, np.where(sines, 7.4e-12, noise), coherence))
+    frfs = [one.frf for one in usable_lines(frfs)]
     zone = flat_zone(stacked(frfs), [(4.0, 1.0), (4.0, 2.0)] * 2)
     assert (zone.low_hz, zone.high_hz, zone.left_out_hz) == (5.0, 110.0, ())
     assert "high-pass" not in zone.reason
@@ -138,6 +142,7 @@ def test_where_the_charge_follows_the_force_nowhere_all_lines_count() -> None:
     """As of a dead sensor."""
     frfs, conditions = recorded(LOG_GRID, "")
     dead = [Frf(LOG_GRID, one.values, np.full(len(LOG_GRID), 0.05)) for one in frfs]
+    dead = [one.frf for one in usable_lines(dead)]
     assert flat_zone(stacked(dead), conditions).high_hz == LOG_GRID[-1]
 
 

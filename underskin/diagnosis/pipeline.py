@@ -131,7 +131,7 @@ def _of_frf(
         if kept == inspected.beyond:
             break
         inspected = inspect(replace(campaign, recordings=frf), table, kept)
-    begun = begun.with_findings(*inspected.findings)
+    begun = replace(begun.with_findings(*inspected.findings), level_unsure=inspected.unsure)
     if joined is None or inspected.lacking:
         return replace(begun, lacking=inspected.lacking)
     problem, result = joined.problem, joined.search

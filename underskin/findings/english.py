@@ -198,6 +198,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "single sweep or blow: the lowest lines are left out, and those beside a sharp resonance are off by parts of a "
     "percent; a drive that repeats itself at least four times gives them all",
     Reason.MAINS_IN_CHARGE: sentences.mains_in_charge,
+    Reason.NOISE_IN_FRF: sentences.noise_in_frf,
+    Reason.BEHIND_FILTER: sentences.behind_filter,
     Reason.CONSTANT_AXIS: "{axis} is the same in all recordings",
     Reason.ONE_LINE: "one line a recording: nothing can be said about frequency",
     Reason.PARAMETER_AT_BOUND: sentences.parameter_at_bound,

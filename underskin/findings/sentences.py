@@ -246,7 +246,7 @@ def lines_left_out(faint: int, measured: int, recordings: int, beside: int) -> s
     """Lines where the force has little power."""
     of = "one recording" if recordings == 1 else f"{recordings} recordings"
     beyond = f"; so are {beside} whose noise the next line shares" if beside else ""
-    why = "the force has little power there, and the charge does not follow it"
+    why = "the force has little power there, or the charge does not follow it"
     return f"{faint} of {measured} lines of {of} are left out: {why}{beyond}"
 
 
@@ -258,10 +258,30 @@ def mains_in_charge(affected: int, recordings: int, mains_hz: float, charge_pc: 
     )
 
 
+def noise_in_frf(percent: float, estimator: str, unsure_percent: float) -> str:
+    """Noise that biases an estimator."""
+    channel = {"H1": "the force", "H2": "the charge", "Hv": "force and charge"}[estimator]
+    size = "small" if percent < 0 else "large"
+    text = f"noise in {channel} makes {estimator} too {size} by {in_digits(abs(percent), 2)} %: that was taken off"
+    return f"{text}; ± {in_digits(unsure_percent, 2)} % of the FRFs stays open" if unsure_percent >= 0.1 else text
+
+
+def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_hz: float, high_hz: float) -> str:
+    """A band behind filters."""
+    filters = [f"a high-pass of about {in_digits(high_pass_hz, 2)} Hz"] if high_pass_hz > 0 else []
+    filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
+    return (
+        f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {' and '.join(filters)}, and does not "
+        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis "
+        "takes the filter into account, or record a band further off its corner"
+    )
+
+
 def parameter_at_bound(mechanism: str, parameter: str, low: float, high: float, unit: str) -> str:
     """A parameter at the end of its range."""
     limits = f"{low:g} to {high:g} {unit.strip('-')}".rstrip()
-    return f"{mechanism}: {parameter.replace('_', ' ')} lies at an end of what is held possible ({limits})"
+    called = parameter.replace("_", " ")
+    return f"{mechanism}: {called} lies at or beyond an end of its search ({limits}), which is no result"
 
 
 def line_noise(level: float) -> str:

@@ -1,9 +1,10 @@
 """d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
 for the campaign (Seminara 2018, section 3.2 and equation 15).
 
-Each recording's Re FRF is averaged over the flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed
-model then says how far the recordings scatter, and so how well each d33 is known. Intervals hold for the skin as
-declared and the base model as it stands: `declared_percent` says by how much d33 would move with E 2 % and h 1 % off.
+Each recording's Re FRF, without the delay that all share and the bias by noise in its channels, is averaged over the
+flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then says how far the recordings
+scatter, and so how well each d33 is known. Intervals hold for the skin as declared and the base model as it stands:
+`declared_percent` says by how much d33 would move with E 2 % and h 1 % off.
 """
 
 from collections.abc import Sequence
@@ -15,8 +16,9 @@ import numpy as np
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
-from underskin.inversion.findings import findings_of
+from underskin.inversion.findings import findings_of, of_roll_off
 from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.inversion.outliers import outlying
 from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
@@ -27,8 +29,11 @@ from underskin.prediction.domain_checks import usable
 from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.band_halves import lower_half
+from underskin.recordings.frf.delay import common_delay, without_delay
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
+from underskin.recordings.frf.line_choice import usable_lines
+from underskin.recordings.frf.roll_off import roll_off
 from underskin.recordings.frf.stacks import stacked
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import positioned_sigma
@@ -101,6 +106,12 @@ class Inversion:
     findings: tuple[Finding, ...]  # what looks wrong and is used all the same
     declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
 
+    def wider(self, relative: float) -> "Inversion":
+        """With an uncertainty that all its d33 share, relative, besides."""
+        array = None if self.campaign_d33 is None else self.campaign_d33.wider(relative)
+        cells = replace(self.cells, d33=self.cells.d33.wider(relative))
+        return replace(self, cells=cells, sensors=self.sensors.wider(relative), campaign_d33=array)
+
 
 def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
@@ -133,9 +144,11 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
+    delay = common_delay(frfs)
+    frfs = without_delay(frfs, delay)
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
-    zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise))
+    zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
     contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
@@ -162,9 +175,19 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         d33_uncertainty=np.where(inside, uncertainty, np.nan),
         inside=inside,
     )
-    inversion = _estimated(ids, rows, contact, zone)
-    findings = (*implausible(campaign), *findings_of(recorded, measured, level, inversion.campaign_d33))
+    unsure = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
+    inversion = _estimated(ids, rows, contact, zone).wider(unsure)
+    filtered = of_roll_off(roll_off(frfs, zone, level), zone)
+    findings = (*implausible(campaign), *filtered, *findings_of(recorded, measured, level, inversion.campaign_d33))
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
+
+
+def _delayed(delay: float) -> str:
+    """In words, the delay [s] that was taken off; empty without one."""
+    if delay == 0.0:
+        return ""
+    late = "charge" if delay > 0 else "force"
+    return f"; the {late} comes {in_digits(1e3 * abs(delay), 3)} ms late, which is taken off"
 
 
 def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
@@ -177,7 +200,7 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
 
 
 def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[Finding]]:
-    """The FRF of each recording that has one, those recordings, and findings on the others."""
+    """The usable lines of each recording that has an FRF, those recordings, and findings on the others."""
     frfs, with_frf, left_out = [], [], []
     for recording in recorded:
         try:
@@ -185,7 +208,7 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
             with_frf.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return frfs, with_frf, left_out
+    return [one.frf for one in usable_lines(frfs)], with_frf, left_out
 
 
 class _Contact:

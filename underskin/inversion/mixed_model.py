@@ -27,6 +27,7 @@ POSITIONS = np.array([0.0, POSITION_RANGE[0], 0.1e-3, 0.15e-3, 0.2e-3, 0.25e-3, 
 _GAIN_FACTOR = 2.0  # of the log-normal prior about USUAL_GAIN
 _NO_SPREAD, _SPREAD_SCALE = 0.6, 0.05
 _LEVEL = 0.95
+_HALF_WIDTH = float(ndtri((1 + _LEVEL) / 2))  # of its interval, in standard deviations of a normal distribution
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,12 @@ class Estimate:
     uncertainty: Floats
     low: Floats
     high: Floats
+
+    def wider(self, relative: float) -> "Estimate":
+        """With a further standard uncertainty, relative to the value."""
+        further = relative * np.abs(self.value)
+        low, high = (np.hypot(side, _HALF_WIDTH * further) for side in (self.value - self.low, self.high - self.value))
+        return Estimate(self.value, np.hypot(self.uncertainty, further), self.value - low, self.value + high)
 
     def d33_rows(self) -> list[list[float]]:
         """Value, uncertainty, low and high of each d33 [pC/N]."""
@@ -193,7 +200,7 @@ def _mixture(weights: Floats, means: Floats, deviations: Floats) -> Estimate:
     kept = weights > 1e-7 * weights.max()
     weight, mean, deviation = weights[kept] / weights[kept].sum(), means[kept], deviations[kept]
     low, high = (_quantile(weight, mean, deviation, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
-    uncertainty = (high - low) / (2 * ndtri((1 + _LEVEL) / 2))
+    uncertainty = (high - low) / (2 * _HALF_WIDTH)
     return Estimate(np.array(weight @ mean), np.array(uncertainty), np.array(low), np.array(high))
 
 

@@ -1,6 +1,8 @@
 """A parameter of a mechanism: its bounds, the coordinate on which it is fitted, and the prior on that coordinate."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -9,6 +11,7 @@ from scipy.special import gammaln, ndtr, ndtri, stdtr, stdtrit
 
 # What a parameter changes: the predicted mean; the spread of the sensors' gains; the variance of single lines.
 ActsOn = Literal["mean", "gain_spread", "line_variance"]
+_AT_BOUND = 1e-6  # of the range of fit coordinates: where a bounded fit stops
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,9 @@ class Parameter:
     A parameter `relative_to` another one of its mechanism is fitted as a multiple of it: `low`, `high`, `limit` and
     the prior are of the multiple, while laws and reports have the product, in `unit`.
 
+    A bound in `closed` is no end of a search: nothing lies beyond it (a fraction of 1, a law of its own), so that a
+    value there is a result. So is one at `limit`.
+
     `starts` are values, within the bounds, at which fits begin, where not at quantiles of the prior; of a parameter
     `relative_to` another one, multiples.
     """
@@ -106,6 +112,7 @@ class Parameter:
     proportional: bool = False
     relative_to: str | None = None
     starts: tuple[float, ...] = ()
+    closed: tuple[float, ...] = ()
 
     @property
     def moves_covariance(self) -> bool:
@@ -139,6 +146,19 @@ class Parameter:
         if self.limit is None or (self.scale == "log" and not 0 < self.limit < np.inf):
             return None
         return self.to_fit(self.limit)
+
+    def ends_search(self, fit: float) -> Literal["low", "high"] | None:
+        """The end of the search that a fit coordinate lies at; None within it, and at the limit or a closed bound."""
+        low, high = self.bounds
+        at_low = fit - low < high - fit
+        beyond = self.low if at_low else self.high
+        if min(fit - low, high - fit) > _AT_BOUND * (high - low) or beyond in (*self.closed, self.limit):
+            return None
+        return "low" if at_low else "high"
+
+    def up_to(self, high: float) -> Parameter:
+        """The same with a lower upper bound."""
+        return replace(self, high=min(self.high, max(high, 2 * self.low)))
 
     def to_fit(self, value: float) -> float:
         """The fit coordinate of a value."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from underskin.client.documents.document import Document
 
@@ -83,6 +84,9 @@ class Parameter(Document):
 
     high: float | None
     """Upper end of its 95 % interval."""
+
+    at_bound: Literal["low", "high"] | None
+    """The end of its search that the value lies at or beyond: it is no result then."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

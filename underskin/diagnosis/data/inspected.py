@@ -13,7 +13,8 @@ from underskin.units import Floats
 class Inspected:
     """The recordings that can be used and the findings; what is `lacking` where nothing can be concluded from them.
 
-    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `beyond` are the ids of
+    `uneven` is how uneven the noise of the lines of time series is, by the recording's id; `unsure` the relative
+    uncertainty that noise in their channels leaves of all levels; `beyond` are the ids of
     those whose contacts lie beyond the tables as declared, and within them by a plausible modulus.
     """
 
@@ -21,4 +22,5 @@ class Inspected:
     findings: Sequence[Finding]
     lacking: Lacking | None = None
     uneven: Mapping[str, Floats] = field(default_factory=dict)
+    unsure: float = 0.0
     beyond: frozenset[str] = frozenset()

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from underskin.diagnosis.data.names import EXPLAINED, SIMPLEST, in_words
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.reporting.sentences import of_clauses, small
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.power import Power
@@ -45,11 +45,13 @@ class OfAnswer:
     """What is known of the leading answer beside its probability.
 
     `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
+    `at_bounds` the parameters at an end of their search,
     `mechanisms` those of the report, and `told` is what their values mean together.
     """
 
     groups: Sequence[Mapping[str, Any]] = ()
     idle: Sequence[str] = ()
+    at_bounds: Sequence[str] = ()
     mechanisms: Sequence[Mapping[str, Any]] = ()
     told: Sequence[str] = ()
 
@@ -112,15 +114,17 @@ def _answer(
         return f"{model} lacks {lacking}", *([by_sets] if by_mechanism else []), means
     idle = of_answer.idle
     certain = [group for group in of_answer.groups if group["probability"] >= EXPLAINED]
-    if certain and not idle:
+    if certain and not idle and not of_answer.at_bounds:
         named = " and ".join(_group_in_words(group) for group in certain)
         if any(len(group["mechanisms"]) > 1 for group in certain):
             return f"{named}: these recordings cannot tell which", by_sets
         return f"{model} lacks {named}, but these recordings cannot tell what else", by_sets, _law(tuple(mentioned))
-    but = [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
+    but = list(of_answer.at_bounds)
+    but += [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
     but += [f"these rivals remain: {listed}"] if listed else []
     but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
-    misfit = f"what is certain is that {model} does not describe the recordings" if idle else ""
+    doubtful = bool(idle or of_answer.at_bounds) and leader.names != (NOTHING_MISSING,)
+    misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
     begin = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
         known = sum(answer.probability for answer in answers if answer.kind == leader.kind)
@@ -178,7 +182,8 @@ def parameter_in_words(entry: Mapping[str, Any]) -> str:
     """Name, value and interval of a parameter: "tip mass of 6.02 g (5.9 to 6.1)"."""
     value, low, high = (in_digits(entry[key], 3) for key in ("value", "low", "high"))
     unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
-    return f"{entry['name'].replace('_', ' ')} of {value}{unit} ({low} to {high})"
+    interval = "at or beyond the end of its search" if entry.get("at_bound") else f"{low} to {high}"
+    return f"{entry['name'].replace('_', ' ')} of {value}{unit} ({interval})"
 
 
 def _reserve(fit: Mapping[str, Any]) -> str:

@@ -88,9 +88,10 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
     return pairs
 
 
-def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
+def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[str, Any] | None:
     """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
-    may be there besides without showing; None where what no answer explains is more probable than all of them."""
+    may be there besides without showing; None where what no answer explains is more probable than all of them. `unsure`
+    is a further relative standard uncertainty."""
     by_explanation: dict[int, tuple[float, Explanation]] = {}  # curves' own mechanisms do not change d33
     for probability, entry in (pair for answer in search.answers for pair in _stand_on(search, answer)):
         by_explanation[id(entry)] = (probability + by_explanation.get(id(entry), (0.0, entry))[0], entry)
@@ -102,8 +103,9 @@ def d33(search: Search, problem: FittingProblem) -> dict[str, Any] | None:
         [_d33_under(search, problem, explanation, probability).times(probability) for probability, explanation in each]
     )
     shares = mixture.share / mixture.share.sum()
+    deviation = np.hypot(mixture.deviation, unsure)
     levels = {"value": 0.5, "low": 0.025, "high": 0.975}
-    ends = {key: mixture_quantile(level, shares, mixture.mean, mixture.deviation) for key, level in levels.items()}
+    ends = {key: mixture_quantile(level, shares, mixture.mean, deviation) for key, level in levels.items()}
     unit = each[0][1].model.parameters[place_of(each[0][1], "d33")].unit
     return {"name": "d33", "unit": unit, **{key: rounded(float(np.exp(at))) for key, at in ends.items()}}
 

@@ -4,8 +4,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.reporting.numbers import multiple_of
+from underskin.diagnosis.reporting.at_bounds import at_bounds
 from underskin.diagnosis.validation.residual_noise import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -23,24 +22,12 @@ _STIFFENS = (
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
     """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
     lines' own, and a thickness that only the curves tell."""
-    found = [*_at_bounds(explanation), *_beyond_tables(problem, explanation), *_noisy(problem, explanation)]
+    found = [
+        *(one.finding for one in at_bounds(explanation)),
+        *_beyond_tables(problem, explanation),
+        *_noisy(problem, explanation),
+    ]
     return [*found, *_kept(problem, explanation), *_of_unknown_thickness(problem, explanation)]
-
-
-def _at_bounds(explanation: Explanation) -> list[Finding]:
-    findings = []
-    lines = explanation.best.hypothesis.lines
-    for name, place in own_places(explanation.names, lines).items():
-        for entry, fit in zip(explanation.model.parameters[place], explanation.point.fit[place], strict=True):
-            if lines.curves and entry.unit == "-" and entry.limit is None:  # a law's form: its ends are laws themselves
-                continue
-            if min(abs(fit - bound) for bound in entry.bounds) < 1e-9:
-                scale = multiple_of(explanation, entry)
-                bounds = {"low": scale * entry.low, "high": scale * entry.high, "unit": entry.unit}
-                known = in_plain_words(lines.mechanisms[name])
-                arguments = {"mechanism": known, "parameter": entry.name.removeprefix("law_"), **bounds}
-                findings.append(Finding(Reason.PARAMETER_AT_BOUND, "", entry.name, arguments))
-    return findings
 
 
 def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:

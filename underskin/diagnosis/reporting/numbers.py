@@ -56,7 +56,8 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way.
 
     Where these reach the value at which a mechanism does nothing, and the profile of the posterior falls off before it,
-    the interval ends where the profile does.
+    the interval ends where the profile does. `at_bound` is the end of its search that it lies at or beyond, `low` or
+    `high`, where it does.
     """
     best, point = explanation.best, explanation.point
     entry = explanation.model.parameters[place]
@@ -79,7 +80,13 @@ def parameter(explanation: Explanation, place: int) -> dict[str, Any]:
     if entry.relative_to is not None:
         values = _absolute(explanation, place, values)
     stated = zip(("value", "low", "high"), values, strict=True)
-    return {"name": entry.name, "unit": entry.unit, **{key: rounded(float(value)) for key, value in stated}}
+    at_bound = entry.ends_search(middle)
+    return {
+        "name": entry.name,
+        "unit": entry.unit,
+        **{key: rounded(float(value)) for key, value in stated},
+        **({} if at_bound is None else {"at_bound": at_bound}),
+    }
 
 
 def multiple_of(explanation: Explanation, entry: Parameter) -> float:

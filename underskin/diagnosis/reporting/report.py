@@ -25,6 +25,7 @@ from underskin.diagnosis.reporting.answer_statement import (
     insufficient_statement,
     left_by,
 )
+from underskin.diagnosis.reporting.at_bounds import at_bounds
 from underskin.diagnosis.reporting.caveats import not_tried, reserves, slips
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
@@ -63,6 +64,7 @@ class DiagnosisResult:
     findings: Sequence[Finding]
     provenance: Mapping[str, Any]
     skin_d33_pc_per_n: float | None = None  # as the skin declares it
+    level_unsure: float = 0.0  # relative uncertainty of all FRFs that noise in their channels leaves
     lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
     few: Search | None = None  # in its place where recordings agree with the model but are too few to say so alone
@@ -96,15 +98,18 @@ class DiagnosisResult:
 def verdict(diagnosis: DiagnosisResult) -> str:
     """The verdict that the probabilities give, as docs/diagnosis.md explains it.
 
-    A set of mechanisms explains nothing while one of them may as well have no effect.
+    A set of mechanisms explains nothing while one of them may as well have no effect, or has a parameter at the bound
+    of its search; nor does the base model with d33 or a free modulus there.
     """
     if diagnosis.search is None:
         return "insufficient_data"
     leader = diagnosis.search.answers[0]
-    if leader.names == (NOTHING_MISSING,):
-        return "no_mismatch"
     if leader.explanation is None:
         return "unexplained"
+    if at_bounds(leader.explanation):
+        return "ambiguous"
+    if leader.names == (NOTHING_MISSING,):
+        return "no_mismatch"
     certain = leader.probability >= EXPLAINED and not _idle(diagnosis, leader.explanation)
     certain = certain and not _may_be_the_other(diagnosis.search, leader.explanation)
     return "explained" if certain else "ambiguous"
@@ -192,6 +197,9 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         diagnosis.shifts,
         stands=stands,
         contradictory=bool(contradictory),
+        at_bounds=[one.words for one in at_bounds(shown)],
+        law=leading,
+        unsure=diagnosis.level_unsure,
         skin_pc_per_n=diagnosis.skin_d33_pc_per_n,
     )
     alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
@@ -223,6 +231,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         of_answer = OfAnswer(
             groups=present,
             idle=_idle(diagnosis, named) if named is not None else (),
+            at_bounds=[one.words for one in at_bounds(named)] if named is not None else (),
             mechanisms=mechanisms,
             told=_told(problem, mechanisms) if named is not None else (),
         )

@@ -10,6 +10,7 @@ from underskin.diagnosis.data.names import in_words
 from underskin.diagnosis.inference.explanation import FittingProblem
 from underskin.diagnosis.reporting import averaged
 from underskin.diagnosis.reporting.statements import CONFOUNDED, listed
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.validation.hidden_shift import HiddenShift
 from underskin.diagnosis.validation.identifiability import Confounding, Likeness
@@ -114,15 +115,20 @@ def stated_d33(
     *,
     stands: bool,
     contradictory: bool,
+    at_bounds: Sequence[str],
+    law: LeadingLaw | None,
+    unsure: float,
     skin_pc_per_n: float | None,
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
-    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, d33 is plausible, the answer fits the
-    recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
-    show here would move d33 beyond its interval. `skin_pc_per_n`: the skin's declared one.
+    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
+    search (`at_bounds`, in words), no unlisted `law` over frequency acts within the band, d33 is plausible, the answer
+    fits the recordings to their noise, which is a fifth of the response at most, and no wrong declared number
+    that would not show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that
+    noise in their channels leaves. `skin_pc_per_n`: the skin's declared one.
     """
-    d33 = None if problem.lines.curves else averaged.d33(search, problem)
+    d33 = None if problem.lines.curves else averaged.d33(search, problem, unsure)
     if d33 is None:
         return StatedD33(None)
     half_width = float(np.log(d33["high"] / d33["low"])) / 2
@@ -132,6 +138,8 @@ def stated_d33(
     against = {
         _ANSWERS: not stands,
         "kinds of recordings contradict each other": contradictory,
+        " and ".join(at_bounds): bool(at_bounds),
+        "a law over frequency that is in no list acts within the band that d33 is read from": _acts_in_band(law),
         "no PVDF has such a value": implausible is not None,
         f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
             error <= REACHES_NOISE * floor
@@ -145,6 +153,16 @@ def stated_d33(
     quotable = {**d33, "quotable": not why_not}
     stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
     return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
+
+
+def _acts_in_band(law: LeadingLaw | None) -> bool:
+    """Whether an unlisted law changes the size of the response over all of the band: any over frequency but a peak, a
+    notch, and a turn of the phase."""
+    return (
+        law is not None
+        and law.law.spoken.axis == "frequency_hz"
+        and not (law.is_phase or law.law.spoken.form == "peak")
+    )
 
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:

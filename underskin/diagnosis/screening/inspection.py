@@ -44,13 +44,18 @@ def inspect(campaign: Campaign, table: SigmaTable, kept: Collection[str] | None 
     series = as_lines(recorded, units_checked=campaign.units_checked)
     if series.doubtful:
         return _inspected(campaign, [], series.doubtful, _impossible(series.doubtful, confirmable=True))
-    inspected = _inspect_lines(campaign, series.entries, table, kept)
+    imported = {entry.id for entry in recorded if entry.sample_rate_hz is None}
+    inspected = _inspect_lines(campaign, series.entries, imported, table, kept)
     findings = as_given(recorded, [*series.findings, *inspected.findings])
-    return replace(inspected, findings=findings, uneven=series.uneven)
+    return replace(inspected, findings=findings, uneven=series.uneven, unsure=series.unsure)
 
 
 def _inspect_lines(
-    campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable, kept: Collection[str] | None
+    campaign: Campaign,
+    recorded: Sequence[FrfRecording],
+    imported: Collection[str],
+    table: SigmaTable,
+    kept: Collection[str] | None,
 ) -> Inspected:
     with_lines, of_lines = _with_lines(recorded)
     entries, copies = _without_copies(with_lines)
@@ -67,7 +72,7 @@ def _inspect_lines(
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)
         return _inspected(campaign, [], findings, lacking)
     findings += [*_constant_axes(entries), *faint_oscillation(entries)]
-    entries, of_phase = in_one_convention(entries)
+    entries, of_phase = in_one_convention(entries, imported)
     entries, of_sensors = without_exchanges(campaign, entries, table)
     entries, silent = without_silent_pair(entries)
     consistent = against_model(campaign, entries, table, kept)

@@ -1,6 +1,7 @@
 """Single recordings against the base model before any fit: no response, off by 1000, reversed.
 
-Only the level of each recording over the prediction of the base model is compared: its apparent d33. Recordings without
+Only the level of each recording over the prediction of the base model is compared, without a delay that the chain has:
+its apparent d33. Recordings without
 a response, or where little is predicted (near a zero crossing), have none.
 """
 
@@ -10,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.diagnosis.screening.no_response import dead, no_response
 from underskin.diagnosis.screening.reversed_signs import signs_of
 from underskin.diagnosis.screening.table_domain import within_tables
@@ -79,7 +81,7 @@ def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[
     """Each recording's level over the base model's, NaN where it says nothing; and the level to be expected [C/N]."""
     predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
     shape = predicted[np.searchsorted(model.recording, np.arange(len(entries)))].real
-    level = np.array([float(np.nanmedian(lines_of(entry).values.real)) for entry in entries])
+    level = np.array([float(np.nanmedian(values.real)) for values in aligned_lines(entries)])
     telling = usable & (np.abs(shape) > _LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
     ratio = np.where(telling, level / np.where(shape == 0, 1.0, shape), np.nan)
     usual = float(np.nanmedian(np.abs(ratio))) if telling.any() else 0.0
@@ -109,9 +111,8 @@ def _one_sided(entries: list[FrfRecording]) -> Mask:
     """Whether a recording's lowest lines are on the same side of zero as all of it: above a resonance charge is in
     antiphase, which reverses nothing."""
     sides = []
-    for entry in entries:
-        measured = lines_of(entry)
-        real, frequency = measured.values.real, measured.frequency
+    for entry, values in zip(entries, aligned_lines(entries), strict=True):
+        real, frequency = values.real, lines_of(entry).frequency
         low = int((frequency <= np.cbrt(frequency[0] ** 2 * frequency[-1])).sum())
         lowest = real[: max(1, min(1 + (len(real) - 1) // _LOWEST, low))]
         sides.append(float(np.nanmedian(lowest)) * float(np.nanmedian(real)) > 0)

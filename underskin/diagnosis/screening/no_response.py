@@ -1,7 +1,7 @@
 """Recordings without a response above their own noise: a sensor that is dead, or not connected.
 
 The noise of a line is read from how much neighbouring lines differ, σ² = median |z_j+1 − z_j|²/(2 ln 2) of the complex
-values, which a resonance between a few of them does not reach.
+values without a delay, which a resonance between a few of them does not reach.
 A recording shows no response where its mean over n lines is no larger than noise makes it, n |mean|²/σ² < 9 (which
 noise alone exceeds once in 8000 recordings), and its lines are no larger than noise, mean |z|² < 3 σ². Nor does one
 whose charge does not follow the force, by its coherence, and is a small share of what the others let expect: noise that
@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
@@ -29,8 +30,7 @@ _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near 
 def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
     """Which recordings show none, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
     unresponsive, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
-    for number, entry in enumerate(entries):
-        values = lines_of(entry).values
+    for number, values in enumerate(aligned_lines(entries)):
         lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
@@ -49,7 +49,7 @@ def dead(
     Each is a finding of its own, or its sensor is one, where that shows none in most of its recordings and a weak
     one in the others, which noise alone does.
     """
-    level = np.array([float(np.abs(np.nanmean(lines_of(entry).values))) for entry in entries])
+    level = np.array([float(np.abs(np.nanmean(values))) for values in aligned_lines(entries)])
     silent = unresponsive | (_incoherent(entries) & (level < _WEAK * expected))
     missing: Mask = silent & (expected**2 > _EXPECTED * variance)
     findings = []

@@ -1,4 +1,4 @@
-"""FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
+"""Imported FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
 Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
 best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
@@ -7,7 +7,7 @@ the conjugated course (`phase_laws`), and neither they nor a vibrating part the 
 force channel explains the course as well, both readings are stated and nothing is changed.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import product
 from math import comb, log
@@ -38,8 +38,19 @@ _STILL = 1.5e-3  # rad
 _QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, which go as (force · radius)^(1/6)
 
 
-def in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings with conjugated ones put right, and the finding on them."""
+def in_one_convention(
+    entries: Sequence[FrfRecording], imported: Collection[str]
+) -> tuple[list[FrfRecording], list[Finding]]:
+    """The recordings with conjugated ones put right, and the finding on them; of those `imported` as FRFs (ids) alone:
+    FRFs that were computed here are in the convention."""
+    foreign, findings = _in_one_convention([entry for entry in entries if entry.id in imported])
+    right = {entry.id: entry for entry in foreign}
+    return [right.get(entry.id, entry) for entry in entries], findings
+
+
+def _in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+    if not entries:
+        return [], []
     courses = phase_courses(entries)
     if not courses.telling.any():
         return list(entries), []

@@ -1,9 +1,10 @@
 """How near the listed mechanisms come to a course of ln FRF over frequency, in the convention e^(+iωt).
 
-ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A relaxation, −n ln(if) + ln(1 + s/(1 +
-if/f_s)), lags where it falls. A delay −iωt0 lags. The resonance of a tip on its contact, −ln(1 − r² + 2iζr), lags where
-it rises. A conjugated FRF contradicts each of them. Strengths have the catalogue's priors, so that no relaxation far
-below the band, of a size that nothing has, stands for a conjugated high pass; a delay is one of the charge, t0 ≥ 0.
+ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A low pass, −ln(1 + if/f_c), lags where it does,
+and so does a relaxation, −n ln(if) + ln(1 + s/(1 + if/f_s)). A delay −iωt0 lags. The resonance of a tip on its contact,
+−ln(1 − r² + 2iζr), lags where it rises. A conjugated FRF contradicts each of them. Strengths have the catalogue's
+priors, so that no relaxation far below the band, of a size that nothing has, stands for a conjugated high pass; a delay
+is one of the charge, t0 ≥ 0.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,6 +43,10 @@ def _high_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
     return -np.log(1 + _exp(fit[0]) / (1j * frequency))
 
 
+def _low_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -np.log(1 + 1j * frequency / _exp(fit[0]))
+
+
 def _relaxation(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
     step = np.abs(fit[1]) / (1 + 1j * frequency / _exp(fit[2]))
     return -np.abs(fit[0]) * np.log(1j * frequency) + np.log(1 + step)
@@ -67,11 +72,14 @@ def _loose_part(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
 
 _DELAY = _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,))
 _LEAD = replace(_DELAY, value=_lead)
-# As the mechanisms' own files have them: corner 0.5 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05. Where a tip resonates
-# depends on contact and mass, 1 kHz within a factor of 10.
+# As the mechanisms' own files have them: corner 0.5 Hz, upper corner 300 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05.
+# Where a tip resonates depends on contact and mass, 1 kHz within a factor of 10.
 _LAWS: Mapping[str, _Law] = {
     "amplifier_high_pass": _Law(
         _high_pass, lambda f: ((np.log(f[0] / 20),), (np.log(f[0]),)), (-0.7,), (1.5,)
+    ),
+    "amplifier_low_pass": _Law(
+        _low_pass, lambda f: ((np.log(f[-1]),), (np.log(3 * f[-1]),)), (5.7,), (1.5,)
     ),
     "sensor_relaxation": _Law(
         _relaxation,

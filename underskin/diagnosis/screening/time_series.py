@@ -5,13 +5,14 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
-from underskin.diagnosis.screening.select_lines import Choice, choose_lines
 from underskin.diagnosis.screening.time_series_units import contradiction_of
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.channel_noise import noise_findings
+from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.line_choice import Usable, usable_lines
 from underskin.units import Floats, to_lab
 
 _ALONE = 0.25  # of the recordings at most
@@ -24,17 +25,19 @@ class Estimated:
     """The recordings as FRFs, and the findings on their time series.
 
     `doubtful`: the findings where the forces of many recordings contradict what is declared; then there are no
-    entries. `uneven`: how uneven the noise of the lines is, by the recording's id.
+    entries. `uneven`: how uneven the noise of the lines is, by the recording's id. `unsure`: the relative
+    uncertainty of all levels that noise in the channels leaves.
     """
 
     entries: list[FrfRecording]
     findings: list[Finding]
     doubtful: Sequence[Finding] = ()
     uneven: Mapping[str, Floats] = field(default_factory=dict)
+    unsure: float = 0.0
 
 
 def as_lines(entries: Sequence[FrfRecording], *, units_checked: bool) -> Estimated:
-    """The recordings as FRFs, without single ones whose force contradicts what is declared.
+    """The recordings with the lines that say something, without single ones whose force contradicts what is declared.
 
     With `units_checked` contradictions are findings and nothing is left out.
     """
@@ -48,20 +51,25 @@ def as_lines(entries: Sequence[FrfRecording], *, units_checked: bool) -> Estimat
         findings = [replace(finding, arguments={**finding.arguments, "left_out": True}) for finding in contradictions]
         off = {finding.recording for finding in contradictions}
         entries = [entry for entry in entries if entry.id not in off]
-    usable, choices, uneven = [], {}, {}
-    for entry in entries:
-        if entry.sample_rate_hz is None:
-            usable.append(entry)
+    measured, of_estimates = _measured(entries)
+    findings += of_estimates
+    chosen = dict(zip(measured, usable_lines(list(measured.values())), strict=True))
+    usable, series = list[FrfRecording](), dict[str, Usable]()
+    for entry in [entry for entry in entries if entry.id in chosen]:
+        own = chosen[entry.id]
+        if entry.sample_rate_hz is not None and not len(own.choice.lines):
+            findings.append(_unusable(entry, own))
             continue
-        estimated, choice, own_findings = _estimated(entry)
-        findings += own_findings
-        if estimated is not None and choice is not None:
-            usable.append(estimated)
-            choices[entry.id] = choice
-            if choice.uneven is not None:
-                uneven[entry.id] = choice.uneven
-    findings += [*_left_out(choices), *_once(choices), *_mains(choices)]
-    return Estimated(usable, findings, uneven=uneven)
+        usable.append(_with_lines(entry, own))
+        if entry.sample_rate_hz is not None:
+            series[entry.id] = own
+    frfs = [own.frf for own in series.values()]
+    findings += [*_left_out(list(chosen.values())), *_once(series), *_mains(series), *noise_findings(frfs)]
+    uneven = {
+        name: own.choice.uneven[own.choice.apart] for name, own in series.items() if own.choice.uneven is not None
+    }
+    unsure = float(np.median([frf.bias_unsure for frf in frfs])) if frfs else 0.0
+    return Estimated(usable, findings, uneven=uneven, unsure=unsure)
 
 
 def as_given(entries: Sequence[FrfRecording], findings: Sequence[Finding]) -> list[Finding]:
@@ -84,67 +92,79 @@ def _together(contradictions: list[Finding], recordings: int) -> list[Finding]:
     return contradictions
 
 
-def _estimated(entry: FrfRecording) -> tuple[FrfRecording | None, Choice | None, list[Finding]]:
-    """The recording with the usable lines of its time series, None where there are none; their choice; findings."""
-    try:
-        measured = lines_of(entry)
-    except InvalidInput as refusal:
-        return None, None, [Finding(Reason.SERIES_NOT_USABLE, entry.id, refusal.field, {"refusal": refusal})]
-    findings = []
-    if measured.defects:
-        first, *others = measured.defects
-        arguments = {**asdict(first), "more": len(others)}
-        findings.append(Finding(Reason.DEFECTS_LEFT_OUT, entry.id, first.channel, arguments))
-    choice = choose_lines(measured)
-    chosen = choice.lines
-    if not chosen:
-        if choice.mains is None:
-            unusable = Finding(Reason.INCOHERENT, entry.id, "charge_pc")
-        else:
-            unusable = Finding(Reason.MAINS_SPOIL_ALL, entry.id, "charge_pc", {"mains_hz": choice.mains.mains_hz})
-        return None, None, [*findings, unusable]
-    values = to_lab("frf_pc_per_n", measured.values[chosen].real), to_lab("frf_pc_per_n", measured.values[chosen].imag)
-    estimated = replace(
+def _measured(entries: Sequence[FrfRecording]) -> tuple[dict[str, Frf], list[Finding]]:
+    """The FRFs of the recordings that have one, by their ids, and findings on their time series."""
+    measured, findings = dict[str, Frf](), list[Finding]()
+    for entry in entries:
+        try:
+            frf = lines_of(entry)
+        except InvalidInput as refusal:
+            findings.append(Finding(Reason.SERIES_NOT_USABLE, entry.id, refusal.field, {"refusal": refusal}))
+            continue
+        measured[entry.id] = frf
+        if frf.defects:
+            first, *others = frf.defects
+            arguments = {**asdict(first), "more": len(others)}
+            findings.append(Finding(Reason.DEFECTS_LEFT_OUT, entry.id, first.channel, arguments))
+    return measured, findings
+
+
+def _unusable(entry: FrfRecording, own: Usable) -> Finding:
+    """Why no line of a time series can be used."""
+    if own.choice.mains is None:
+        return Finding(Reason.INCOHERENT, entry.id, "charge_pc")
+    return Finding(Reason.MAINS_SPOIL_ALL, entry.id, "charge_pc", {"mains_hz": own.choice.mains.mains_hz})
+
+
+def _with_lines(entry: FrfRecording, own: Usable) -> FrfRecording:
+    """The recording with the lines that are used, of a time series those whose noise is independent."""
+    if entry.sample_rate_hz is None and own.frf.used_or_all.all():
+        return entry
+    frf = own.frf.at(np.flatnonzero(own.frf.used_or_all)[own.choice.apart])
+    return replace(
         entry,
-        frequency_hz=measured.frequency[chosen],
-        frf_re_pc_per_n=values[0],
-        frf_im_pc_per_n=values[1],
-        coherence=None if measured.coherence is None else measured.coherence[chosen],
+        frequency_hz=frf.frequency,
+        frf_re_pc_per_n=to_lab("frf_pc_per_n", frf.values.real),
+        frf_im_pc_per_n=to_lab("frf_pc_per_n", frf.values.imag),
+        coherence=frf.coherence,
         sample_rate_hz=None,
         force_n=None,
         charge_pc=None,
+        estimator=None,
     )
-    return estimated, choice, findings
 
 
-def _left_out(choices: Mapping[str, Choice]) -> list[Finding]:
-    """How many lines are left out because the force has little power there, where they are many."""
-    counts = {
-        name: sum(getattr(choice, name) for choice in choices.values()) for name in ("measured", "faint", "beside")
-    }
-    if counts["faint"] <= _MANY * counts["measured"]:
+def _left_out(chosen: Sequence[Usable]) -> list[Finding]:
+    """How many lines are left out because the force has little power there, or none that the charge follows, where they
+    are many."""
+    choices = [own.choice for own in chosen]
+    faint, used = (sum(len(getattr(choice, name)) for choice in choices) for name in ("idle", "lines"))
+    beside = used - sum(len(choice.apart) for choice in choices)
+    measured = sum(len(own.choice.lines) + len(own.choice.idle) for own in chosen)
+    if faint <= _MANY * measured:
         return []
+    counts = {"measured": measured, "faint": faint, "beside": beside}
     return [Finding(Reason.LINES_LEFT_OUT, "", "force_n", {**counts, "recordings": len(choices)})]
 
 
-def _once(choices: Mapping[str, Choice]) -> list[Finding]:
+def _once(series: Mapping[str, Usable]) -> list[Finding]:
     """Where the force passes through its band once."""
-    names = [name for name, choice in choices.items() if choice.once]
+    names = [name for name, own in series.items() if own.choice.once]
     if not names:
         return []
-    arguments = {"affected": len(names), "recordings": len(choices)}
+    arguments = {"affected": len(names), "recordings": len(series)}
     return [Finding(Reason.FORCE_ACTS_ONCE, names[0] if len(names) == 1 else "", "force_n", arguments)]
 
 
-def _mains(choices: Mapping[str, Choice]) -> list[Finding]:
+def _mains(series: Mapping[str, Usable]) -> list[Finding]:
     """Where charge stands out at the mains' multiples and force does not, within the band or beside it."""
-    pickups = {name: choice.mains for name, choice in choices.items() if choice.mains is not None}
+    pickups = {name: own.choice.mains for name, own in series.items() if own.choice.mains is not None}
     findings = []
     for mains in sorted({entry.mains_hz for entry in pickups.values()}):
         own = {name: entry.charge for name, entry in pickups.items() if entry.mains_hz == mains}
         arguments = {
             "affected": len(own),
-            "recordings": len(choices),
+            "recordings": len(series),
             "mains_hz": mains,
             "charge_pc": float(to_lab("charge_pc", np.median(list(own.values())))),
         }

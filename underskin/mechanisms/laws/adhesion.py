@@ -31,6 +31,7 @@ _SEPARATION = Parameter(
     limit=None,
     shown=2.0,
     relative_to="work_of_adhesion",
+    closed=(1.0,),
     reason="a rolling or receding edge costs more than an advancing one: twice on silicones, tens of times on gels",
 )
 _RETURN = 0.05  # of the range of displacement, that a way back covers

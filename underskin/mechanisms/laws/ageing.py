@@ -36,7 +36,7 @@ class Ageing(Mechanism):
     parameters_stated = (
         Parameter("loss", "-", 0.0, 0.95, HeavyTailed(0.0, 0.3), "linear", limit=0.0, shown=0.15, reason=_LOSS),
         Parameter("onset", "cycles", 1.0, 1e6, Normal(6.9, 2.0), "log", limit=None, shown=1000.0, reason=_ONSET),
-        Parameter("saturation", "-", 0.0, 0.95, Uniform(), "linear", limit=None, shown=0.0, reason=_SATURATION),
+        Parameter("saturation", "-", 0.0, 0.95, Uniform(), "linear", None, _SATURATION, shown=0.0, closed=(0.0, 0.95)),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

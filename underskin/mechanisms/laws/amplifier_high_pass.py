@@ -6,7 +6,7 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
 
-_REASON = "charge amplifiers have corners of 0.01 to some Hz; 0.5 Hz within a factor of 4.5"
+_REASON = "charge amplifiers have corners of 0.01 to some Hz, 0.5 Hz within a factor of 4.5; probes up to some hundred"
 
 
 class AmplifierHighPass(Mechanism):
@@ -23,7 +23,7 @@ class AmplifierHighPass(Mechanism):
     order = 30
     axes = ("frequency_hz", "phase")
     parameters_stated = (
-        Parameter("corner", "Hz", 1e-3, 100.0, HeavyTailed(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=_REASON),
+        Parameter("corner", "Hz", 1e-3, 1e3, HeavyTailed(-0.7, 1.5), "log", limit=0.0, shown=1.0, reason=_REASON),
     )
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:

@@ -32,7 +32,9 @@ class AmplitudeNonlinearity(Mechanism):
     needs = "dynamic_force_n below preload_n in every recording"
     needs_fields = ("dynamic_force_n",)
     parameters_stated = (
-        Parameter("edge_mobility", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON),
+        Parameter(
+            "edge_mobility", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON, closed=(1.0,)
+        ),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:

@@ -32,8 +32,12 @@ _TWO_PAIRS = (
     Parameter(
         "relaxation_time", "s", _SHORTEST, 5e4, Normal(2.0, 2.5), "log", limit=None, shown=40.0, reason=_CURVE_TIME
     ),
-    Parameter("time_spread", "-", 0.0, 6.0, Normal(0.0, 1.5), "linear", limit=None, shown=0.0, reason=_SPREAD),
-    Parameter("first_share", "-", 0.05, 0.95, Uniform(), "linear", limit=None, shown=0.5, reason=_SHARE),
+    Parameter(
+        "time_spread", "-", 0.0, 6.0, Normal(0.0, 1.5), "linear", limit=None, shown=0.0, reason=_SPREAD, closed=(0.0,)
+    ),
+    Parameter(
+        "first_share", "-", 0.05, 0.95, Uniform(), "linear", limit=None, shown=0.5, reason=_SHARE, closed=(0.05, 0.95)
+    ),
 )
 
 

@@ -27,7 +27,9 @@ class MovingContactEdge(Mechanism):
     order = 10
     axes = ("preload_n", "indenter_radius_mm", "position_mm")
     parameters_stated = (
-        Parameter("mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON),
+        Parameter(
+            "mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON, closed=(1.0,)
+        ),
     )
 
     def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:

@@ -30,7 +30,7 @@ class PlatenFriction(Mechanism):
     axes = ("sample_height_mm", "sample_diameter_mm")
     figure = ("displacement_mm",)
     parameters_stated = (
-        Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=_REASON),
+        Parameter("friction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=0.5, reason=_REASON, closed=(1.0,)),
     )
 
     def hidden_in_modulus(self, conditions: Conditions) -> Sequence[float]:

@@ -39,6 +39,7 @@ _EXPONENT = Parameter(
     limit=None,
     shown=2.0,
     starts=(1.0, 2.0),
+    closed=(1.0, 2.0),
     reason="m of J = 3 (I/3)^(m/2): 2 for most elastomers, 1 where the modulus grows with the strain itself",
 )
 _SPHERE = (
@@ -51,6 +52,7 @@ _SPHERE = (
         scale="log",
         limit=None,
         shown=5.0,
+        closed=(1e-2,),
         reason="c of (1 + q c J)^(1/q): 0.1 for a silicone (2 C20/C10), 1/Jm of Gent's law, 40 for tissue-like gels",
     ),
     Parameter(
@@ -63,6 +65,7 @@ _SPHERE = (
         limit=None,
         shown=1.0,
         starts=(-1.0, 1.0),
+        closed=(-2.0, 2.0),
         reason="q of (1 + q c J)^(1/q): 1 is Yeoh's law, 0 an exponential, -1 Gent's",
     ),
     _EXPONENT,

@@ -1,14 +1,24 @@
 """The mechanism `timing_delay`."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from underskin.autodiff import Differentiated, exp
-from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import Conditions
+from underskin.recordings.frf.delay import common_delay
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.stacks import stacked
+from underskin.weak_cache import cached_while_alive
 
-_REASON = "multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s"
+_REASON = """multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s; converters of high
+resolution by some 40 samples, and two recorders start tenths of a second apart"""
+_LARGEST_US = 1e6
 
 
 class TimingDelay(Mechanism):
@@ -18,7 +28,8 @@ class TimingDelay(Mechanism):
     plain = """Charge and force are not sampled at the same instant, so the phase goes off in proportion to frequency
     while the size of the response stays."""
     law = "FRF · exp(−iωt0), t0 the delay."
-    assumptions = "one constant delay for all recordings; positive where the charge comes later than the force."
+    assumptions = """one constant delay for all recordings; positive where the charge comes later than the force,
+    negative where the force does."""
     source = """a shift in time is a phase linear in frequency (Bendat & Piersol, Random Data, 4th ed., 2010, section
     5.1)."""
     stage = Stage.LINES
@@ -27,10 +38,23 @@ class TimingDelay(Mechanism):
     figure = ("phase",)
     parameters_stated = (
         Parameter(
-            "delay", "µs", -5000.0, 5000.0, HeavyTailed(0.0, 300.0), "linear", limit=0.0, shown=300.0, reason=_REASON
+            "delay", "µs", -_LARGEST_US, _LARGEST_US, HeavyTailed(0.0, 300.0), "linear", limit=0.0, shown=300.0,
+            reason=" ".join(_REASON.split()),
         ),
-    )
+    )  # fmt: skip
+
+    def guesses(self, conditions: Conditions, kind: Kind) -> Sequence[Sequence[float]]:
+        """The delay that the phases of all recordings show: beyond a turn over the band no fit finds it from afar."""
+        return _shown(conditions)
 
     def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
         """exp(−iωt0)."""
         return exp(-2e-6j * np.pi * design.line_frequency * values["delay"])
+
+
+@cached_while_alive  # a diagnosis composes dozens of models of one campaign
+def _shown(conditions: Conditions) -> list[tuple[float]]:
+    """The delay [µs]."""
+    measured = [lines_of(entry) for entry in conditions.recordings if isinstance(entry, FrfRecording)]
+    delay = common_delay(stacked(measured)) if measured else 0.0
+    return [(1e6 * delay,)] if delay else []

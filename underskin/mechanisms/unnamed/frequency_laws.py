@@ -101,7 +101,9 @@ def _over_band(low: float, high: float, count: int) -> list[float]:
 
 def _phases(middle: float) -> list[_Law]:
     """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses; a delay alone is one more."""
-    exponent = Parameter("law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴")
+    exponent = Parameter(
+        "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
+    )
 
     def factor(frequency: Floats, values: Values) -> Differentiated:
         return exp(values["law_lag"] * exp(values["law_exponent"] * np.log(frequency / middle)) * -1j)

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.errors import not_finite, out_of_range, too_few, unequal_lengths, unusable
+from underskin.errors import InvalidInput, not_finite, out_of_range, too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.delay import advanced, lag_between
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.periodic import period_of, without_drift
 from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
@@ -83,7 +84,8 @@ def broadband(
     """The FRF of a broadband force: Welch's average over blocks.
 
     The straight line through each block (preload, DC and drift) is removed. The lines at 0 Hz and at half the sample
-    rate, which carry no phase, are left out, as are the blocks that a defect touches.
+    rate, which carry no phase, are left out, as are the blocks that a defect touches. Where γ² rises by it, a lag of
+    one signal behind the other is taken off first and put back into the phase: beside a block it would lower H1.
 
     Parameters
     ----------
@@ -123,7 +125,33 @@ def broadband(
     step = max(1, round(size * (1 - overlap)))
     taper = _taper(window, size)
     blocks = Blocks(taper, step, slice(1, (size + 1) // 2), without_line)
-    return replace(averaged(force, charge, sample_rate, blocks, estimator), independent=False)
+    frf = replace(averaged(force, charge, sample_rate, blocks, estimator), independent=False)
+    lag = lag_between(force, charge, size)
+    if not lag:
+        return frf
+    try:
+        aligned = replace(averaged(*_aligned(force, charge, lag), sample_rate, blocks, estimator), independent=False)
+    except InvalidInput:  # the lag leaves no undamaged block
+        return frf
+    return _as_recorded(aligned, lag, sample_rate) if _coherence(aligned) > _coherence(frf) else frf
+
+
+def _coherence(frf: Frf) -> float:
+    """The mean γ², by the power of the force."""
+    assert frf.force_power is not None
+    return float(frf.force_power @ frf.coherence_or_nan) / float(frf.force_power.sum())
+
+
+def _aligned(force: Floats, charge: Floats, lag: int) -> tuple[Floats, Floats]:
+    """Both without a lag of the charge by so many samples."""
+    return (force[: len(force) - lag], charge[lag:]) if lag >= 0 else (force[-lag:], charge[:lag])
+
+
+def _as_recorded(aligned: Frf, lag: int, sample_rate: float) -> Frf:
+    """The FRF of signals that were aligned with their lag in its phase, and their defects where they were recorded."""
+    cut = {"charge_pc": max(lag, 0), "force_n": max(-lag, 0)}
+    defects = tuple(replace(one, first_sample=one.first_sample + cut[one.channel]) for one in aligned.defects)
+    return replace(aligned, values=advanced(aligned.values, aligned.frequency, -lag / sample_rate), defects=defects)
 
 
 def periodic(force: Floats, charge: Floats, sample_rate: float, *, estimator: Estimator = "H1") -> Frf:

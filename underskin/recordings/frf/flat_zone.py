@@ -4,10 +4,12 @@ Re FRF of each recording, over its own level, is gathered in bins of equal width
 recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
 bins in which no condition leaves, beyond its noise, a power law common to all of them (a sensor's relaxation falls
 slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines at the mains and its harmonics that
-stand out of their neighbours are left out, and so are lines at which the charge does not follow the force: noise that
-was not excited there may be flat, too (`excitation`).
+stand out of their neighbours are left out, and so are lines that are not used (`line_choice`): noise that was not
+excited there may be flat, too. A delay that all recordings share is taken off before (`delay`): Re FRF is the response
+where the charge is in phase with the force.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,7 +17,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
-from underskin.recordings.frf.excitation import bin_of, edges_over, excited_lines
+from underskin.recordings.frf.excitation import bin_of, edges_over
 from underskin.recordings.frf.flat_zone_reason import Idle, levels_of, reason_of
 from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
 from underskin.recordings.frf.stacks import Stack
@@ -78,8 +80,8 @@ def flat_zone(
     """
     frequencies = np.unique(np.concatenate([stack.frequency for stack in stacks]))
     edges = edges_over(frequencies)
-    excited = excited_lines(stacks, frequencies)
-    followed = [stack.at(np.isin(stack.frequency, frequencies[excited])) for stack in stacks]
+    followed = [stack.at(np.asarray(stack.used.any(axis=0))) for stack in stacks]
+    excited = np.isin(frequencies, np.concatenate([stack.frequency for stack in followed]))
     mains = _mains_lines(followed)
     if band_hz is not None:
         inside = (frequencies >= band_hz[0]) & (frequencies <= band_hz[1])
@@ -133,15 +135,15 @@ def band_average(stacks: Sequence[Stack], zone: FlatZone) -> tuple[Floats, Float
         inside = zone.holds(stack.frequency)
         if not inside.any():
             continue
-        real = stack.values.real[:, inside]
-        typical = np.median(real, axis=1, keepdims=True)
+        real, used = stack.values.real[:, inside], stack.used[:, inside]
+        typical = _medians(real, used)
         distance = np.abs(real - typical)
-        near = distance <= 6 * 1.4826 * np.median(distance, axis=1, keepdims=True) + 1e-30
-        weight = near * _line_weights(stack.coherence[:, inside])
+        near = distance <= 6 * 1.4826 * _medians(distance, used) + 1e-30
+        weight = near * stack.weights[:, inside]
         total = weight.sum(axis=1)
-        value = (weight * real).sum(axis=1) / total
-        rest = real - value[:, None]
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            value = (weight * real).sum(axis=1) / total
+            rest = real - value[:, None]
             effective = total**2 / (weight**2).sum(axis=1)
             unbiased = effective / (effective - 1)
             mean[stack.rows] = value
@@ -158,10 +160,13 @@ def _where_one_line(mean: Floats, uncertainty: Floats, scatter: Floats) -> Float
     return np.where(alone, usual * np.abs(mean), uncertainty)
 
 
-def _line_weights(coherence: Floats) -> Floats:
-    """γ²/(1 − γ²), which line noise goes by; rounding of γ² near 1 is kept from ruling."""
-    weight = coherence / np.maximum(1 - coherence, 1e-3)
-    return np.where(np.isfinite(coherence), np.maximum(weight, 1e-9), 1.0)
+def _medians(values: Floats, used: Mask) -> Floats:
+    """The median over the lines that are used of each recording (recordings, 1); NaN where there are none."""
+    if used.all():
+        return np.asarray(np.median(values, axis=1, keepdims=True))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of recordings without a line
+        return np.asarray(np.nanmedian(np.where(used, values, np.nan), axis=1, keepdims=True))
 
 
 def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
@@ -189,15 +194,16 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
     for stack in stacks:
         if not len(stack.frequency):
             continue
-        real = stack.values.real
-        level = np.median(real, axis=1)
-        noise = np.median(np.abs(np.diff(real, axis=1)), axis=1) if real.shape[1] > 1 else np.zeros(len(real))
+        real, used = stack.values.real, stack.used
+        level, noise = _medians(real, used)[:, 0], np.zeros(len(real))
+        if real.shape[1] > 1:
+            noise = _medians(np.abs(np.diff(real, axis=1)), used[:, 1:] & used[:, :-1])[:, 0]
         plain = np.abs(level) > 2 * noise  # a dead sensor has no level
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
         bins = bin_of(stack.frequency, edges)
         for number in np.unique(bins[kept]):
-            lines = real[np.ix_(plain, kept & (bins == number))]
-            ratio[stack.rows[plain], number] = np.median(lines / level[plain, None], axis=1)
+            lines = np.ix_(plain, kept & (bins == number))
+            ratio[stack.rows[plain], number] = _medians(real[lines] / level[plain, None], used[lines])[:, 0]
     return ratio
 
 
@@ -247,7 +253,10 @@ def _widest(log_frequency: Floats, curves: Floats, noise: Floats) -> tuple[int, 
             if _is_flat(log_frequency[part], curves[:, part], noise[:, part], slope):
                 best, width = (first, last, slope), float(log_frequency[last] - log_frequency[first])
                 break
-    return best
+    if width > 0 or bins < 2:
+        return best
+    flattest = int(np.nanargmin(np.abs(np.diff(curves[-1]) / curves[-1, 1:])))  # of a flank
+    return flattest, flattest + 1, 0.0
 
 
 def _slope(log_frequency: Floats, curve: Floats) -> float:

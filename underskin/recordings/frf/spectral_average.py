@@ -1,7 +1,7 @@
 """The FRF from spectra averaged over blocks of two signals."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from underskin.errors import unusable
 from underskin.findings import sentences
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
 from underskin.recordings.frf.signal_checks import Defect, damaged, defects_of_pair
-from underskin.units import Complexes, Floats
+from underskin.units import Complexes, Floats, Indices, Mask
 
 _TINY = float(np.finfo(float).tiny)
 
@@ -42,7 +42,9 @@ class Frf:
     `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
     was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
     `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
-    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is.
+    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is. `used`: the lines that say
+    something (`line_choice`), None where nobody looked. `bias` is what noise made of the `estimator` and was taken
+    off, and `bias_unsure` what that leaves open, relative and about the same for all lines (`channel_noise`).
     """
 
     frequency: Floats
@@ -54,11 +56,26 @@ class Frf:
     charge_power: Floats | None = None
     independent: bool = True
     passes: Floats | None = None
+    estimator: Estimator = "H1"
+    used: Mask | None = None
+    bias: float = 0.0
+    bias_unsure: float = 0.0
 
     @property
     def coherence_or_nan(self) -> Floats:
         """γ² of each line, NaN where it is not known."""
         return np.full(len(self.values), np.nan) if self.coherence is None else self.coherence
+
+    def at(self, lines: Indices) -> "Frf":
+        """The same at some of the lines."""
+        columns = ("frequency", "values", "coherence", "averages", "force_power", "charge_power", "passes", "used")
+        known = {name: column for name in columns if (column := getattr(self, name)) is not None}
+        return replace(self, **{name: column[lines] for name, column in known.items()})
+
+    @property
+    def used_or_all(self) -> Mask:
+        """The lines that say something; all where nobody looked."""
+        return np.ones(len(self.values), dtype=bool) if self.used is None else self.used
 
     @property
     def relative_uncertainty(self) -> Floats | None:
@@ -93,6 +110,7 @@ def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, 
         force_power.mean(axis=0),
         charge_power.mean(axis=0),
         passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
+        estimator=estimator,
     )
 
 

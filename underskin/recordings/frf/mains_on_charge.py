@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.recordings.frf.estimation import Frf
 from underskin.recordings.frf.mains import HARMONICS, MAINS_HZ
+from underskin.recordings.frf.spectral_average import Frf
 from underskin.units import Floats, Indices, Mask
 
 _BETWEEN, _AROUND = 2.5, 12.5  # lines from a multiple of the mains: what is usual there

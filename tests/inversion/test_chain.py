@@ -1,0 +1,116 @@
+"""d33 of time series through chains with delays, filters and noise in the force."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
+from underskin.findings.codes import FindingCode
+from underskin.inversion.invert import Inversion, invert
+from underskin.surrogate.sigma_table import SigmaTable, load_table
+
+
+@pytest.fixture(scope="module")
+def table() -> SigmaTable:
+    return load_table()
+
+
+def array_d33(inversion: Inversion) -> tuple[float, float, float]:
+    assert inversion.campaign_d33 is not None
+    value, _, low, high = inversion.campaign_d33.d33_rows()[0]
+    return value, low, high
+
+
+def codes(inversion: Inversion) -> set[str]:
+    return {str(finding.code) for finding in inversion.findings}
+
+
+@pytest.mark.parametrize(
+    "chain",
+    [
+        {"charge": delayed(5e-3)},
+        {"charge": delayed(20e-3)},
+        {"charge": delayed(60e-3)},
+        {"force": delayed(3e-3)},
+        {"force": delayed(45e-3)},
+        {"charge": delayed(150e-3), "samples": 8192},
+    ],
+)
+def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: SigmaTable) -> None:
+    """Neither the flat zone nor the check for dead sensors takes Re FRF of a delayed charge for its level."""
+    inversion = invert(shaken(**chain), table)
+    value, low, high = array_d33(inversion)
+    assert value == pytest.approx(D33, rel=0.02)
+    assert low < D33 < high
+    assert inversion.flags == ()
+    assert inversion.findings == ()
+    assert "ms late, which is taken off" in inversion.zone.reason
+
+
+def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:
+    turned = invert(shaken(charge=lambda f: -delayed(20e-3)(f)), table)
+    assert array_d33(turned)[0] == pytest.approx(-D33, rel=0.02)
+
+
+@pytest.mark.parametrize("share", [0.03, 0.1, 0.3])
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+def test_noise_in_the_force_biases_no_estimator(share: float, estimator: str, table: SigmaTable) -> None:
+    """Where it was not excited the force is its own noise, which is in the excited band as well."""
+    inversion = invert(shaken(force_noise=share, estimator=estimator), table)
+    value, low, high = array_d33(inversion)
+    assert value == pytest.approx(D33, rel=0.02)
+    assert low < D33 < high
+    if estimator == "H1":
+        assert FindingCode.NOISE_IN_FRF in codes(inversion)
+        assert inversion.zone.high_hz < 190
+
+
+@pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])
+def test_where_nothing_tells_which_channel_is_noisy_the_interval_holds_d33(
+    in_force: float, in_charge: float, table: SigmaTable
+) -> None:
+    """Force and charge are white up to half the sample rate: γ² tells the noise of both together alone."""
+    campaign = shaken(force_noise=in_force, charge_noise=in_charge, high_hz=400.0)
+    value, low, high = array_d33(invert(campaign, table))
+    assert low < D33 < high
+    assert value == pytest.approx(D33, rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("chain", "named"),
+    [
+        (high_pass(150.0), "high-pass of about 1"),
+        (high_pass(40.0), "high-pass of about"),
+        (low_pass(100.0), "low-pass of about"),
+        (low_pass(60.0), "low-pass of about"),
+        (low_pass(120.0, 2), "low-pass of about"),
+    ],
+)
+def test_a_band_behind_a_filter_is_told_beside_d33(chain: Any, named: str, table: SigmaTable) -> None:
+    """The flattest part of a flank is no flat zone."""
+    inversion = invert(shaken(charge=chain), table)
+    value, low, high = array_d33(inversion)
+    told = [finding.sentence for finding in inversion.findings if finding.code == FindingCode.BEHIND_FILTER]
+    assert low < D33 < high or any(named in sentence for sentence in told), (value, told)
+
+
+def test_a_quiet_chain_has_no_findings(table: SigmaTable) -> None:
+    inversion = invert(shaken(), table)
+    value, low, high = array_d33(inversion)
+    assert value == pytest.approx(D33, rel=0.01)
+    assert low < D33 < high
+    assert codes(inversion) == set()
+    assert "late" not in inversion.zone.reason
+
+
+def test_a_filter_far_off_the_band_is_not_told(table: SigmaTable) -> None:
+    inversion = invert(shaken(charge=high_pass(0.5)), table)
+    assert codes(inversion) == set()
+    assert array_d33(inversion)[0] == pytest.approx(D33, rel=0.01)
+
+
+def test_a_dead_sensor_stays_dead(table: SigmaTable) -> None:
+    """No delay is read from noise."""
+    inversion = invert(shaken(charge=lambda f: np.zeros(len(f), dtype=complex)), table)
+    assert [str(flag.code) for flag in inversion.flags] == ["dead"]
