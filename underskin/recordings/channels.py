@@ -37,8 +37,8 @@ class Channel:
 @dataclass(frozen=True, eq=False)
 class Block:
     """Channels acquired together; `sample_rate_hz` where all are evenly sampled in time at one rate, `recorded_at`
-    where the file says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows of a
-    text begin, which blank or comment lines part; empty where there is one group."""
+    where the file says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows
+    of a text begin, which blank or comment lines part; empty where there is one group."""
 
     name: str
     channels: tuple[Channel, ...]

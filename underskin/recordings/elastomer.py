@@ -11,7 +11,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
+from underskin.recordings.campaign import Campaign, CompressionRecording, CurveRecording, IndentationRecording
+from underskin.recordings.exchanged_columns import look_exchanged
 from underskin.units import Floats, to_lab, to_si
 
 _STRAIGHT = 0.02  # largest departure from a straight line, of the stress it spans
@@ -98,6 +99,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
 
 def of_compression(recording: CompressionRecording) -> CompressionModulus:
     """The modulus of a `compression` recording."""
+    _refuse_exchanged(recording, sphere=False)
     return compression_modulus(
         to_si("displacement_mm", recording.displacement_mm),
         to_si("force_n", recording.force_n),
@@ -108,12 +110,19 @@ def of_compression(recording: CompressionRecording) -> CompressionModulus:
 
 def of_indentation(recording: IndentationRecording, poisson_ratio: float) -> IndentationModulus:
     """The modulus of an `indentation` recording."""
+    _refuse_exchanged(recording, sphere=True)
     return indentation_modulus(
         to_si("displacement_mm", recording.displacement_mm),
         to_si("force_n", recording.force_n),
         float(to_si("indenter_radius_mm", recording.indenter_radius_mm)),
         poisson_ratio,
     )
+
+
+def _refuse_exchanged(recording: CurveRecording, *, sphere: bool) -> None:
+    if look_exchanged(recording.displacement_mm, recording.force_n, sphere=sphere):
+        seen = "moves as a force does, and force_n as a stage"
+        raise unusable("displacement_mm", seen, "the two columns look exchanged: exchange their names or channels")
 
 
 def compression_modulus(displacement: Floats, force: Floats, height: float, diameter: float) -> CompressionModulus:

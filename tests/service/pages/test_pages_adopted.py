@@ -215,7 +215,7 @@ WARMTH = {
          "the model lacks contact resonance (98.5 %)", "look"),
         ("unexplained", 0.998, [], [], "mismatch by a law that nobody listed, 99.8 %", "modulus over the time of day",
          "look"),
-        ("insufficient_data", 0.5, [], [], "too little data", "", "quiet"),
+        ("insufficient_data", 0.5, [], [], "nothing can be concluded", "", "quiet"),
         ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
          "mismatch with several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
         ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch without explanation, 99.9 %", "", "look"),

@@ -17,7 +17,13 @@ _SLIPS = (
         FindingCode.GAIN_STEPS,
     ),
     FindingCode.WARM_UP,
-    *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
+    *(
+        FindingCode.UNITS_OFF_BY_1000,
+        FindingCode.CHANNELS_SWAPPED,
+        FindingCode.SIGN_FLIPPED,
+        FindingCode.MAINS_IN_CHARGE,
+        FindingCode.OUT_OF_DOMAIN,
+    ),
     *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
 )
 _RESERVES = (FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER, FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED)
