@@ -97,7 +97,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
     "other: is force or displacement of one of them off by 1000?",
     Reason.MODULUS_BESIDE_DECLARED: sentences.needed_modulus("{declared_mpa:g} MPa is declared"),
-    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("rubber has {low_mpa:g} to {high_mpa:g} MPa"),
+    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("Rubber has {low_mpa:g} to {high_mpa:g} MPa"),
     Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
     Reason.DECLARED_UNUSUAL: sentences.unusual,
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",

@@ -125,7 +125,7 @@ def needed_modulus(against: str) -> Callable[..., str]:
     def words(modulus_mpa: float, slips: Sequence[str], **bounds: float) -> str:
         guess = f"{', or '.join(slips)}?" if slips else "are force, displacement and size in the units that were said?"
         needed = f"force and displacement would need a modulus of about {modulus_mpa:.2g} MPa"
-        return f"{needed}, where {against.format(**bounds)}: {guess}"
+        return f"{needed}: {guess} {against.format(**bounds)}"
 
     return words
 

@@ -32,6 +32,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Tolerances
 from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.exchanged_channels import exchanged_channels
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
 from underskin.recordings.frf.stacks import stacked
 from underskin.recordings.plausibility import at_reading
@@ -199,6 +200,9 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     """The FRF of each recording that has one, those recordings, and findings on the others."""
     frfs, with_frf, left_out = [], [], []
     for recording in recorded:
+        if (exchanged := exchanged_channels(recording)) is not None:
+            left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
+            continue
         try:
             frfs.append(lines_of(recording))
             with_frf.append(recording)

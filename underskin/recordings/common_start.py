@@ -61,9 +61,8 @@ def _cut(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list
         replace(one, values=one.values[skipped[one.name] : skipped[one.name] + count]) if one.name in used else one
         for one in block.channels
     )
-    began = None if block.recorded_at is None else _time(block, last)
     told = f"{apart}: they were aligned, with {count} samples in common"
-    return replace(block, channels=channels, recorded_at=began), [told]
+    return replace(block, channels=channels), [told]
 
 
 def _starts_s(channel: Channel) -> float:
@@ -74,5 +73,8 @@ def _time(block: Block, channel: Channel) -> str:
     """When a channel starts, or how long after the first where the file does not say when that was."""
     if block.recorded_at is None:
         return f"{channel.starts_s:g} s"
-    moment = datetime.fromisoformat(block.recorded_at) + timedelta(seconds=channel.starts_s)
+    try:
+        moment = datetime.fromisoformat(block.recorded_at) + timedelta(seconds=channel.starts_s)
+    except OverflowError:
+        return f"{channel.starts_s:g} s after {block.recorded_at}"
     return moment.isoformat().replace("+00:00", "Z")

@@ -99,7 +99,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
 
 def of_compression(recording: CompressionRecording) -> CompressionModulus:
     """The modulus of a `compression` recording."""
-    _refuse_exchanged(recording, sphere=False)
+    require_own_columns(recording)
     return compression_modulus(
         to_si("displacement_mm", recording.displacement_mm),
         to_si("force_n", recording.force_n),
@@ -110,7 +110,7 @@ def of_compression(recording: CompressionRecording) -> CompressionModulus:
 
 def of_indentation(recording: IndentationRecording, poisson_ratio: float) -> IndentationModulus:
     """The modulus of an `indentation` recording."""
-    _refuse_exchanged(recording, sphere=True)
+    require_own_columns(recording)
     return indentation_modulus(
         to_si("displacement_mm", recording.displacement_mm),
         to_si("force_n", recording.force_n),
@@ -119,8 +119,10 @@ def of_indentation(recording: IndentationRecording, poisson_ratio: float) -> Ind
     )
 
 
-def _refuse_exchanged(recording: CurveRecording, *, sphere: bool) -> None:
-    if look_exchanged(recording.displacement_mm, recording.force_n, sphere=sphere):
+def require_own_columns(recording: CurveRecording) -> None:
+    """Raises InvalidInput where force and displacement of a curve look exchanged."""
+    is_sphere = isinstance(recording, IndentationRecording)
+    if look_exchanged(recording.displacement_mm, recording.force_n, sphere=is_sphere):
         seen = "moves as a force does, and force_n as a stage"
         raise unusable("displacement_mm", seen, "the two columns look exchanged: exchange their names or channels")
 

@@ -66,7 +66,7 @@ def test_an_adopted_model_heads_its_skin_and_the_start(visitor: Visit, server: S
         told = numbers(head)
         arrays = [answer["array"] for answer in (by_model, by_paper)]
         intervals = [array[f"d33{part}_pc_per_n"] for array in arrays for part in ("", "_low", "_high")]
-        assert told[:6] == pytest.approx(intervals, rel=1e-3)
+        assert told[:6] == pytest.approx(intervals, rel=5e-3)
         assert told[6] == pytest.approx(change, rel=0.06)
         assert "by the adopted model, not to be quoted yet" in head
         assert NOT_QUOTED in head
@@ -133,7 +133,7 @@ def test_what_comes_later_is_told_by_the_adopted_model_too(server: Server) -> No
     row = said(server, "/", "palm-b")
     assert "later" in row
     by_model = d33(server, later, "adopted")["array"]["d33_pc_per_n"]
-    assert f"array {by_model:.2f} pC/N" in row
+    assert f"array {by_model:.1f} pC/N" in row
 
 
 def test_an_outdated_model_is_said_to_serve_nothing(server: Server) -> None:

@@ -21,12 +21,22 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
     for entry in campaign.recordings:
         lacking = None
         if entry.kind == kind:
-            lacking = _lacking(thinned.get(entry.id), campaign.skin.poisson_ratio)
+            lacking = _exchanged(entry) or _lacking(thinned.get(entry.id), campaign.skin.poisson_ratio)
         if lacking is None:
             usable.append(entry)
         else:
             findings.append(Finding(Reason.CURVE_NOT_USABLE, entry.id, lacking.field, {"refusal": lacking}))
     return replace(campaign, recordings=tuple(usable)), findings
+
+
+def _exchanged(entry: object) -> InvalidInput | None:
+    """The refusal of a curve whose columns look exchanged, which its raw samples tell."""
+    try:
+        if isinstance(entry, IndentationRecording | CompressionRecording):
+            elastomer.require_own_columns(entry)
+    except InvalidInput as refusal:
+        return refusal
+    return None
 
 
 def _lacking(entry: object, poisson_ratio: float) -> InvalidInput | None:

@@ -8,7 +8,7 @@ many. Comments at the ends of rows are left out. Source of the format: "Specific
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import BinaryIO
 
 import numpy as np
@@ -22,6 +22,7 @@ _END_OF_HEADER = "***End_of_Header***"
 _OF_EACH_CHANNEL = ("Samples", "Delta_X", "Date", "Time", "X_Dimension")  # rows of a header that name all channels
 _LEAST_STEP_S = 1e-12
 _SAME_START_S = 1e-6
+_LATEST_S = 1e10  # LabVIEW counts seconds from 1904
 _MOST_EMPTY = 10  # parts of channels for each number that there is
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
@@ -119,7 +120,7 @@ class _Reader:
         """1/Delta_X of a channel over time."""
         step = self._number(_entry(segment, "Delta_X", channel))
         is_time = _entry(segment, "X_Dimension", channel) in ("Time", "")
-        return 1 / step if step is not None and step > _LEAST_STEP_S and is_time else None
+        return 1 / step if step is not None and _LEAST_STEP_S < step < _LATEST_S and is_time else None
 
     def _starts(self, segment: _Segment, count: int) -> list[float]:
         """When each channel begins after the first of them [s]: by X0, the first abscissa, and by Date and Time.
@@ -129,7 +130,9 @@ class _Reader:
         channels = range(count)
         by_abscissa = _after_first([self._number(_entry(segment, "X0", channel)) for channel in channels])
         moments = [_moment(_entry(segment, "Date", channel), _entry(segment, "Time", channel)) for channel in channels]
-        stamps = [None if one is None else datetime.fromisoformat(one).timestamp() for one in moments]
+        stamps = [
+            None if one is None else datetime.fromisoformat(one).replace(tzinfo=UTC).timestamp() for one in moments
+        ]
         by_clock = _after_first(stamps)
         if any(by_abscissa) and any(by_clock) and not np.allclose(by_abscissa, by_clock, atol=_SAME_START_S):
             worst = int(np.argmax(np.abs(np.subtract(by_abscissa, by_clock))))
@@ -197,8 +200,8 @@ def _without_gaps(header: dict[str, list[str]]) -> dict[str, list[str]]:
 
 def _after_first(times: Sequence[float | None]) -> list[float]:
     """Times after the earliest; 0 for one that is not known."""
-    known = [time for time in times if time is not None]
-    return [0.0 if time is None else time - min(known) for time in times]
+    known = [time for time in times if time is not None and abs(time) < _LATEST_S]
+    return [time - min(known) if time is not None and abs(time) < _LATEST_S else 0.0 for time in times]
 
 
 def _entry(segment: _Segment, name: str, channel: int) -> str:

@@ -21,7 +21,7 @@ _LABEL = re.compile(
 )
 _WIDE_BLANKS = re.compile(r"\t|\s{2,}")
 _WITH_UNITS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")  # Load (uN)
-_NO_UNITS = ("", "-", "–", "1", "%", "°", "°C", "K", "#", "a.u.", "n/a")
+_NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from underskin.recordings.channels import FIRST_YEAR, Block, Channel, Contents, 
 
 MAGIC = b"TDSm"
 _LEAD_IN = 28
-_LONGEST_OFFSET_S = 1e8  # three years
+_LEAST_STEP_S, _LONGEST_S = 1e-12, 1e8  # from a picosecond to three years
 _BIG_ENDIAN = 1 << 6  # in the table of contents of a segment
 
 
@@ -80,7 +80,7 @@ def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
 def _start(channel: TdmsChannel) -> datetime | None:
     """When a waveform's first sample was taken: its start, and the offset from it."""
     start, offset = _moment(channel.properties.get("wf_start_time")), channel.properties.get("wf_start_offset", 0.0)
-    if start is None or not isinstance(offset, int | float) or not abs(offset) < _LONGEST_OFFSET_S:
+    if start is None or not isinstance(offset, int | float) or not abs(offset) < _LONGEST_S:
         return start
     return start + timedelta(seconds=float(offset))
 
@@ -104,7 +104,7 @@ def _channel(channel: TdmsChannel, file: str) -> Channel:
     with damage_said(file, f"channel {channel.path}", lambda error: f"cannot be read: {type(error).__name__}: {error}"):
         values, about = np.asarray(channel[:]), channel.properties
         step = about.get("wf_increment")
-        rate = 1 / step if isinstance(step, float) and step > 0 else None
+        rate = 1 / step if isinstance(step, float) and _LEAST_STEP_S < step < _LONGEST_S else None
         label = str(about.get("unit_string") or about.get("NI_UnitDescription") or "")
         return Channel(channel.name, label, as_values(values), rate)
 

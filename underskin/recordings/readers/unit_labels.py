@@ -8,7 +8,7 @@ import re
 import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from itertools import product
 
 from underskin.recordings.readers.unit_words import DECIBEL, STANDARD_GRAVITY, dictionary
@@ -88,7 +88,7 @@ def meanings(label: str) -> tuple[Unit, ...]:
     return () if len(label) > _LONGEST else _meanings(label)
 
 
-@cache
+@lru_cache(maxsize=4096)
 def _meanings(label: str) -> tuple[Unit, ...]:
     label = _LEAD.sub("", unicodedata.normalize("NFKC", label).strip().rstrip(".")).strip()
     whole = _IN_BRACKETS.match(label)
