@@ -5,6 +5,7 @@ to SI and the range of magnitudes that are likely in a piezoelectric skin's lab.
 finite, not positive, or of unlikely magnitude, and guesses the unit that was meant.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,11 +78,12 @@ LAB: dict[str, LabField] = {
 _FINER = {"mm": ("µm", "nm"), "N": ("mN", "µN", "nN", "pN")}  # each a thousandth of the one before
 _LEAST_READ = 0.1  # of an axis' unit, below which its numbers are hard to read
 _NEIGHBOURS = {
-    "mm": {1e-3: "µm", 1e3: "m"},
+    "mm": {1e-3: "µm", 1e-6: "nm", 1e3: "m"},
     "MPa": {1e-3: "kPa", 1e-6: "Pa", 1e3: "GPa"},
     "N": {1e-3: "mN", 1e-6: "µN", 1e3: "kN"},
     "pC/N": {1e-3: "fC/N", 1e3: "nC/N", 1e6: "µC/N", 1e12: "C/N"},
 }
+_AS_NEAR = 0.5  # decades: another unit that would make a number about as usual
 
 
 def to_si(name: str, value: ArrayLike) -> Floats:
@@ -173,7 +175,7 @@ def unusual(name: str, value: ArrayLike) -> list[Finding]:
     first = int(np.argmax(unlikely))
     number = float(values.flat[first])
     more = int(unlikely.sum()) - 1
-    arguments = {"value": number, "unit": field.unit, "guess": _guess(field, abs(number)), "more": more}
+    arguments = {"value": number, "unit": field.unit, "guess": unit_guess(name, abs(number)), "more": more}
     return [Finding(Reason.UNUSUAL_MAGNITUDE, "", name, arguments, index=first if values.ndim else None)]
 
 
@@ -189,23 +191,27 @@ def _likely_range(field: LabField, size: float) -> Requirement:
     assert field.likely is not None
     low, high = field.likely
     text = f"must be {low:g} to {high:g} {field.unit} in magnitude"
-    return Requirement(text, UNITS_CHECKED, f"; {sentences.unit_guess(_guess(field, size))}")
+    return Requirement(text, UNITS_CHECKED, f"; {sentences.unit_guess(unit_guess(field.name, size))}")
 
 
-def _guess(field: LabField, size: float) -> UnitGuess:
-    """The wrong unit that would explain a magnitude outside the likely range."""
-    assert field.likely is not None
-    low, high = field.likely
+def unit_guess(name: str, size: float, usual: tuple[float, float] | None = None) -> UnitGuess:
+    """The wrong units that would explain a magnitude of a field outside its likely range, or a narrower one: those
+    that bring it nearest to the (geometric) middle of the range."""
+    field = LAB[name]
+    low, high = usual or field.likely or (0.0, np.inf)
     if size == 0:
         return UnitGuess(size, field.unit)
-    for factor, unit in _NEIGHBOURS[field.unit].items():
-        if _usual(size * factor, low, high):
-            return UnitGuess(size, field.unit, size * factor, given_in=unit)
+    meant = [(size * factor, unit) for factor, unit in _NEIGHBOURS[field.unit].items() if low <= size * factor <= high]
+    if meant:
+        return UnitGuess(size, field.unit, meant=_nearest(meant, np.sqrt(low * high)))
     for power in (3, 6, 9, 12, -3, -6, -9, -12):
-        if _usual(size * 10.0**power, low, high):
-            return UnitGuess(size, field.unit, size * 10.0**power, off_by=-power)
+        if low <= size * 10.0**power <= high:
+            return UnitGuess(size, field.unit, meant=((size * 10.0**power, ""),), off_by=-power)
     return UnitGuess(size, field.unit)
 
 
-def _usual(size: float, low: float, high: float) -> bool:
-    return low <= size <= high
+def _nearest(meant: Sequence[tuple[float, str]], middle: float) -> tuple[tuple[float, str], ...]:
+    """The readings whose values lie nearest to the middle of a range, and those about as near."""
+    off = [abs(float(np.log10(value / middle))) for value, _ in meant]
+    order = np.argsort(off, kind="stable").tolist()
+    return tuple(meant[place] for place in order if off[place] <= min(off) + _AS_NEAR)

@@ -194,7 +194,7 @@ def _kept(
     result: dict[str, Any] = {"file": checked.file, "errors": checked.errors, "notes": notes, "findings": []}
     if campaign is None:
         return {**result, "status": "refused", "id": None, "skin_id": None, "recordings": refused}
-    result["findings"] = [finding.sentence for finding in plausibility.implausible(campaign)]
+    result["findings"] = [finding.sentence for finding in plausibility.at_reading(campaign)]
     notes += [*_of_corrected(connection, campaign, options), *_repeats(connection, campaign, options)]
     corrected_from = options.signed or options.sender
     arrival = campaigns.NewCampaign(

@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 3
+ANSWER_VERSION = 4
 
 
 class D33Value(BaseModel):
@@ -92,14 +92,21 @@ class D33(BaseModel):
     status: Literal["ok", "none"] = Field(description="`none`: no d33 can be told from it; `reason` says why.")
     reason: str | None = Field(description="Why there is none.")
     band: Band | None = Field(description="The lines that were averaged.")
-    array: D33Value | None = Field(description="d33 of the array: mean of the sensors that are not flagged as unfit.")
+    array: D33Value | None = Field(
+        description="d33 of the array, mean of the sensors that are not flagged as unfit; its uncertainty and interval "
+        "include `declared_percent`."
+    )
+    array_relative: D33Value | None = Field(
+        description="The same without `declared_percent`: to compare it with its sensors and with other dates."
+    )
     sensor_spread_percent: Scatter | None = Field(description="Standard deviation of d33 over the sensors.")
     gain_scatter_percent: Scatter | None = Field(description="Standard deviation of a recording's gain.")
     position_scatter_mm: Scatter | None = Field(
         description="Standard deviation of the sphere's position, each axis [mm]."
     )
     declared_percent: float | None = Field(
-        description="How far d33 moves where the declared modulus is 2 % and the thickness 1 % off; not in intervals."
+        description="Standard deviation of all d33 together by the skin's `tolerances`; in the interval of `array`, "
+        "not in those of sensors and cells, which are relative to each other."
     )
     sensors: list[SensorD33] = Field(description="One entry a sensor that was recorded.")
     cells: list[CellD33] = Field(description="One entry a sensor, indenter and preload that was recorded.")

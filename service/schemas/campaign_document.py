@@ -20,7 +20,7 @@ from underskin.recordings.campaign import (
     IndentationRecording,
     read_estimator,
 )
-from underskin.recordings.conditions import Sensor, SkinDescription, read_sensors
+from underskin.recordings.conditions import Sensor, SkinDescription, Tolerances, read_sensors, read_tolerances
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.shown_values import LONGEST_NAME
 from underskin.units import LAB
@@ -62,6 +62,7 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
     },
     read_estimator: {"type": "string", "enum": list(get_args(Estimator))},
     read_sensors: {"type": "array", "items": {"$ref": f"{_REF}Sensor"}},
+    read_tolerances: {"$ref": f"{_REF}Tolerances"},
 }
 
 _WORDS: Mapping[str, str] = {
@@ -75,6 +76,10 @@ _WORDS: Mapping[str, str] = {
     "d33_pc_per_n": "Piezoelectric coefficient d33 as declared [pC/N]; null where it is not known.",
     "width_mm": "Extent of the skin along y [mm].",
     "length_mm": "Extent of the skin along x [mm].",
+    "tolerances": "What the declared thickness, sensor radius and modulus may be off by; part of absolute intervals.",
+    "thickness_percent": "Standard deviation of the thickness [%]; 2 where it is left out.",
+    "sensor_radius_percent": "Standard deviation of the sensor radius [%]; 2 where it is left out.",
+    "youngs_modulus_percent": "Standard deviation of Young's modulus [%]; 10 where it is left out.",
     "sensors": "The sensors of the array.",
     "kind": "What was recorded.",
     "sensor": "Id of the sensor that is pressed, one of the skin's.",
@@ -108,6 +113,7 @@ def campaign_schemas() -> dict[str, Schema]:
     """The schemas of a campaign and its parts by name, which refer to one another as components of OpenAPI."""
     parts = {
         "Sensor": _object(Sensor, "A sensor of the array."),
+        "Tolerances": _object(Tolerances, "What declared values of the skin may be off by."),
         "Skin": _object(SkinDescription, "The skin as the lab declares it."),
         "FrfRecording": _frf(LINES, (*TIME_SERIES, "estimator"), "Charge over force, line by line."),
         "FrfTimeSeries": _frf(
@@ -120,7 +126,7 @@ def campaign_schemas() -> dict[str, Schema]:
             CompressionRecording, "The force on a cylinder between platens.", "compression"
         ),
     }
-    recordings = [{"$ref": f"{_REF}{name}"} for name in parts if name not in ("Sensor", "Skin")]
+    recordings = [{"$ref": f"{_REF}{name}"} for name in parts if name not in ("Sensor", "Tolerances", "Skin")]
     campaign = {
         "title": "Campaign",
         "type": "object",

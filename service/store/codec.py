@@ -17,7 +17,7 @@ import orjson
 from service.store.tables import AnyRow
 from service.store.times import stored
 from underskin.recordings.campaign import KINDS, Campaign, Recording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.conditions import Sensor, SkinDescription, Tolerances
 from underskin.units import Floats
 
 _LEVEL = 1  # higher levels take several times longer and save a few per cent
@@ -31,7 +31,9 @@ def about(campaign: Campaign) -> dict[str, Any]:
 def campaign_of(about: dict[str, Any], recordings: tuple[Recording, ...]) -> Campaign:
     """The inverse of `about`."""
     sensors = tuple(Sensor(**sensor) for sensor in about["skin"]["sensors"])
-    skin = SkinDescription(**{**about["skin"], "sensors": sensors})
+    stated = about["skin"].get("tolerances")
+    tolerances = None if stated is None else Tolerances(**stated)
+    skin = SkinDescription(**{**about["skin"], "sensors": sensors, "tolerances": tolerances})
     return Campaign(about["name"], skin, recordings, about["units_checked"])
 
 

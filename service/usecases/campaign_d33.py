@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 def of_inversion(inversion: "Inversion") -> dict[str, Any]:
     """The fields of `D33` that come from an inversion."""
-    zone, cells, array = inversion.zone, inversion.cells, inversion.campaign_d33
+    zone, cells = inversion.zone, inversion.cells
+    array, relative = inversion.absolute_d33, inversion.campaign_d33
 
     radii = to_lab("indenter_radius_mm", cells.indenter_radius).tolist()
     return {
@@ -31,6 +32,7 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
             "left_out_hz": [float(line) for line in zone.left_out_hz],
         },
         "array": None if array is None else _d33(array)[0],
+        "array_relative": None if relative is None else _d33(relative)[0],
         "sensor_spread_percent": _scatter(inversion.spread, 100.0),
         "gain_scatter_percent": _scatter(inversion.gain, 100.0),
         "position_scatter_mm": _scatter(inversion.position, 1e3),

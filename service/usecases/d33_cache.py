@@ -29,7 +29,9 @@ BandHz = tuple[float, float]
 _MOST_NAMED = 3  # reasons for which recordings give no d33
 _PAPER = {"model": "paper", "model_id": None, "model_percent": None}
 _NONE: dict[str, Any] = {
-    **dict.fromkeys(("band", "array", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")),
+    **dict.fromkeys(
+        ("band", "array", "array_relative", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")
+    ),
     "declared_percent": None,
     "status": "none",
     "sensors": [],
@@ -221,7 +223,7 @@ def _inverted(
     except InvalidInput as error:
         if band_hz is not None and error.field == "band_hz":
             raise
-        findings = [finding.sentence for finding in plausibility.implausible(campaign)]
+        findings = [finding.sentence for finding in plausibility.at_reading(campaign)]
         told = {"reason": str(error), "findings": findings, "moduli": moduli, "left_out": without_modulus}
         return {**_NONE, **told}, None
     left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]

@@ -44,13 +44,16 @@ def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
     found = invert(palm, load_table())
     answer = run("d33", str(file), "--csv")
     assert answer.returncode == 0
-    array, *others = csv.DictReader(io.StringIO(answer.stdout))
+    array, relative, *others = csv.DictReader(io.StringIO(answer.stdout))
     sensors, cells = others[:6], others[6:]
+    assert found.absolute_d33 is not None
     assert found.campaign_d33 is not None
+    assert (relative["level"], relative["d33_pc_per_n"]) == ("array_relative", array["d33_pc_per_n"])
+    assert float(relative["d33_high_pc_per_n"]) == pytest.approx(to_lab("d33_pc_per_n", found.campaign_d33.high), 1e-12)
     assert (array["level"], array["sensor"]) == ("array", "")
     for name in ("value", "uncertainty", "low", "high"):
         column = "d33_pc_per_n" if name == "value" else f"d33_{name}_pc_per_n"
-        assert float(array[column]) == pytest.approx(to_lab("d33_pc_per_n", getattr(found.campaign_d33, name)), 1e-12)
+        assert float(array[column]) == pytest.approx(to_lab("d33_pc_per_n", getattr(found.absolute_d33, name)), 1e-12)
         assert [float(row[column]) for row in sensors] == pytest.approx(
             to_lab("d33_pc_per_n", getattr(found.sensors, name)), rel=1e-12
         )
@@ -69,12 +72,11 @@ def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
 def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign, file: Path) -> None:
     shown = run("d33", str(file)).stdout
     found = invert(palm, load_table())
-    assert found.campaign_d33 is not None
-    value, low, high = (
-        float(to_lab("d33_pc_per_n", getattr(found.campaign_d33, name))) for name in ("value", "low", "high")
-    )
     assert f"palm ({file})" in shown
-    assert re.search(rf"d33 of the array +{value:.4g} ± \S+ pC/N \(95 %: {low:.4g} to {high:.4g}\)", shown)
+    for title, d33 in (("d33 of the array", found.absolute_d33), ("relative to others", found.campaign_d33)):
+        assert d33 is not None
+        value, low, high = (float(to_lab("d33_pc_per_n", getattr(d33, name))) for name in ("value", "low", "high"))
+        assert re.search(rf"{title} +{value:.4g} ± \S+ pC/N \(95 %: {low:.4g} to {high:.4g}\)", shown)
     assert re.search(r"band +5 to 130 Hz: no resonance in any recording; it is the whole recorded range", shown)
     assert re.search(r"s5 .* weak: 2\d % of the array's d33", shown)
     assert "left out: sensor s5: weak" in shown

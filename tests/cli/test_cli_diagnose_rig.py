@@ -16,7 +16,7 @@ units_checked: true
 skin: {poisson_ratio: 0.5}
 recording: {indenter_radius_mm: 0.0075}
 channels:
-  displacement_mm: {channel: Piezo, unit: um, sign: -1, deflection: {channel: Deflection}}
+  displacement_mm: {channel: Piezo, unit: um, labelled: nm, sign: -1, deflection: {channel: Deflection}}
   force_n: {channel: Deflection, spring_constant_n_per_m: {property: k (N/m)}}
 """
 
@@ -43,6 +43,6 @@ def test_a_raw_curve_is_diagnosed_with_a_rig_description(tmp_path: Path) -> None
     told = CliRunner().invoke(app, [*asked, "--rig", str(rig)])
     assert told.exit_code == 0
     assert "read force_n: 'Deflection' in nm, a deflection, times 3 N/m: " in told.stderr
-    assert "look at: channel 'Piezo' is labelled 'nm', but the rig description says 'um', which counts" in told.stderr
+    assert "look at: channel 'Piezo' is labelled 'nm'; the rig description says 'um'" in told.stderr
     report = json.loads((tmp_path / "reports" / "curve.json").read_text())
     assert report["verdict"] == "no_mismatch"

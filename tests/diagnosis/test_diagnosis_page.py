@@ -204,7 +204,7 @@ def test_a_report_without_mechanisms_has_its_page(made: Made, verdict: str, name
     assert ("The grey band holds 95 %" in tags.text) == ("frf" in names)
     if not names:
         assert tags.count("script") == 1  # the page's own, without plotly
-        assert "What is lacking: " in tags.text
+        assert "Before anything can be concluded: " in tags.text
 
 
 def test_figures_show_the_report_s_numbers(resonant: tuple[dict[str, Any], str], figures: dict[str, go.Figure]) -> None:

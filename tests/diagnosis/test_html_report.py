@@ -61,8 +61,8 @@ def test_a_report_without_an_answer_says_what_is_lacking() -> None:
     shown = body_of(EMPTY, {})
     assert re.findall("<h2>(.*?)</h2>", shown) == [WHERE, "What to measure next"]
     assert texts(shown) == (
-        f"The recordings cannot tell anything: no recording can be used. too little data {WHERE} Nothing was located. "
-        "What to measure next What is lacking: no recording can be used."
+        f"The recordings cannot tell anything: no recording can be used. nothing can be concluded {WHERE} "
+        "Nothing was located. What to measure next Before anything can be concluded: no recording can be used."
     )
     assert texts(provenance(EMPTY)) == "Made with underskin 1 tables sigma ab"
 

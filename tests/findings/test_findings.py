@@ -107,8 +107,12 @@ def test_a_finding_states_its_arguments() -> None:
     ("guess", "words"),
     [
         (UnitGuess(0.0, "mm"), "a dead sensor?"),
-        (UnitGuess(2500.0, "mm", 2.5, given_in="µm"), "2500 µm is 2.5 mm: was it given in µm?"),
-        (UnitGuess(1e7, "mm", 10.0, off_by=6), "off by a factor of 10^6? 10 mm would be usual"),
+        (UnitGuess(2500.0, "mm", ((2.5, "µm"),)), "2500 µm is 2.5 mm: was it given in µm?"),
+        (
+            UnitGuess(1e5, "MPa", ((100.0, "kPa"), (0.1, "Pa"))),
+            "100000 kPa is 100 MPa, 100000 Pa is 0.1 MPa: was it given in kPa or Pa?",
+        ),
+        (UnitGuess(1e7, "mm", ((10.0, ""),), off_by=6), "off by a factor of 10^6? 10 mm would be usual"),
         (UnitGuess(1e99, "mm"), "no unit that we know explains it"),
     ],
 )

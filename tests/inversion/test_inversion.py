@@ -147,19 +147,15 @@ def test_the_users_band_is_used_and_a_campaign_without_frf_is_refused(table: Sig
         invert(replace(campaign, recordings=()), table)
 
 
-def test_a_declared_thickness_that_is_off_moves_d33_by_what_is_said(table: SigmaTable) -> None:
+def test_a_declared_value_that_is_off_moves_d33_by_what_is_said(table: SigmaTable) -> None:
     campaign = simulate(table, Rig(d33=np.array([14.0]), gain=1e-6, line=1e-6), np.random.default_rng(9))
-    assert campaign.skin.thickness_mm is not None
-    assert campaign.skin.youngs_modulus_mpa is not None
     changes = []
-    for skin in (
-        replace(campaign.skin, thickness_mm=1.01 * campaign.skin.thickness_mm),
-        replace(campaign.skin, youngs_modulus_mpa=1.02 * campaign.skin.youngs_modulus_mpa),
-    ):
+    for name, off in (("thickness_mm", 1.02), ("sensor_radius_mm", 1.02), ("youngs_modulus_mpa", 1.1)):
+        skin = replace(campaign.skin, **{name: off * getattr(campaign.skin, name)})
         found = invert(replace(campaign, skin=skin), table).campaign_d33
         assert found is not None
         changes.append(100 * (float(found.value) / 14e-12 - 1))
-    assert invert(campaign, table).declared_percent == pytest.approx(np.hypot(changes[0], changes[1]), rel=0.1)
+    assert invert(campaign, table).declared_percent == pytest.approx(np.linalg.norm(changes), rel=0.1)
 
 
 def test_time_series_are_inverted_and_what_is_wrong_with_them_is_said(table: SigmaTable) -> None:

@@ -148,3 +148,22 @@ def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTab
         series = tuple(as_series(item, mean) for item, mean in zip(recorded, means, strict=True))
         found = invert(replace(campaign, recordings=series), table).findings
         assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused
+
+
+def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -> None:
+    random = np.random.default_rng(21)
+    campaign = simulate(table, Rig(d33=np.array([14.0])), random)
+    recording = campaign.recordings[0]
+    assert isinstance(recording, FrfRecording)
+    force = recording.preload_n + recording.dynamic_force_n * np.sin(np.arange(4096) / 3)
+    charge = 7.4 * (force - recording.preload_n) + 0.01 * random.normal(size=4096)
+    known = {**vars(recording.without_measurements(frequency_hz=None)), "sample_rate_hz": 1000.0}
+    both = [
+        FrfRecording(**{**known, "id": name, "force_n": of_force, "charge_pc": of_charge})
+        for name, of_force, of_charge in (("right", force, charge), ("exchanged", charge, force))
+    ]
+    found = invert(replace(campaign, recordings=tuple(both)), table)
+    assert found.recordings.ids == ("right",)
+    (left,) = found.left_out
+    assert left.sentence.startswith("recording exchanged: ")
+    assert "force and charge look exchanged. Left out" in left.sentence

@@ -192,7 +192,7 @@ def test_what_cannot_be_parsed_is_refused_with_an_example(formula: str) -> None:
         ("Piezo - 5", "5 has no unit"),
         ("2 [N/m] * Piezo + Piezo", "2 [N/m] * Piezo has the unit N"),
         ("Piezo - Raw", "Raw: has no unit in the file: say it in brackets"),
-        ("Piezo [V]", "Piezo [V]: is labelled 'nm', a unit of another kind"),
+        ("Piezo [V]", "Piezo [V]: is labelled 'nm', but the formula says 'V'"),
         ("Piezo * Piezo", "which no channel can have"),
         ("Piezo - Height", "Height: is no channel or property; it has Piezo [nm]"),
         ("Piezo - Short", "Piezo and Short differ in length"),

@@ -80,15 +80,16 @@ def test_travel_and_deflection_have_signs_and_sensitivities_of_their_own() -> No
         the_curve(read(table(raw), channels))
 
 
-def test_a_heading_s_unit_is_a_proposal_that_the_rig_overrides() -> None:
+def test_a_heading_s_wrong_unit_is_overridden_by_the_rig_that_names_it() -> None:
     """Its heading says nm and means um."""
     text = table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN})
-    reading = read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
-    the_curve(reading)
-    said = "channel 'Depth (nm)' is labelled 'nm', but the rig description says 'um', which counts"
-    assert reading.warnings == [said]
+    said = r"channel 'Depth \(nm\)': is labelled 'nm', but the rig description says 'um': .* add labelled: nm"
+    with pytest.raises(FileError, match=said):
+        read(text, {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um"}})
     known = {**SIMPLE, "displacement_mm": {"channel": "Depth (nm)", "unit": "um", "labelled": "nm"}}
-    the_curve(read(text, known))
+    reading = read(text, known)
+    the_curve(reading)
+    assert reading.warnings == ["channel 'Depth (nm)' is labelled 'nm'; the rig description says 'um'"]
     odd = text.replace("Depth (nm)", "Depth (measured)")
     assert read(odd, {**SIMPLE, "displacement_mm": {"channel": "Depth (measured)", "unit": "um"}}).warnings == []
 

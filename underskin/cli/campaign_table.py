@@ -54,7 +54,7 @@ class InvertedFile:
         notes = reading_notes(self.reading)
         campaign = self.reading.campaign
         findings = (
-            self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.implausible(campaign)
+            self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.at_reading(campaign)
         )
         notes += [f"look at: {finding.sentence}" for finding in findings]
         if not isinstance(self.inversion, Inversion) and not self.moduli:
@@ -86,7 +86,8 @@ def write_tables(everything: Iterable[InvertedFile]) -> None:
 
 
 def write_csv(everything: Iterable[InvertedFile]) -> None:
-    """d33 in rows: of the array, of each sensor, of each sensor × indenter × preload.
+    """d33 in rows: of the array, with what the skin may be off as declared and without, of each sensor, and of each
+    sensor × indenter × preload.
 
     Findings, and what was left out, go to standard error.
     """
@@ -101,8 +102,9 @@ def write_csv(everything: Iterable[InvertedFile]) -> None:
 
 def _rows(inversion: Inversion) -> list[list[str]]:
     rows, cells = [], inversion.cells
-    if inversion.campaign_d33 is not None:
-        rows.append(["array", "", "", "", "", *_full(inversion.campaign_d33.d33_rows()[0]), ""])
+    for level, d33 in (("array", inversion.absolute_d33), ("array_relative", inversion.campaign_d33)):
+        if d33 is not None:
+            rows.append([level, "", "", "", "", *_full(d33.d33_rows()[0]), ""])
     for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
         codes = " ".join(flag.code for flag in inversion.flags if flag.sensor == name)
         rows.append(["sensor", name, "", "", "", *_full(numbers), codes])
@@ -121,12 +123,12 @@ def _full(numbers: Sequence[float]) -> list[str]:
 def _array(inversion: Inversion) -> Table:
     listed = Table.grid(padding=(0, 2))
     zone = inversion.zone
-    if inversion.campaign_d33 is not None:
-        value, uncertainty, low, high = inversion.campaign_d33.d33_rows()[0]
-        ends = f"{significant(low, 4)} to {significant(high, 4)}"
-        listed.add_row(
-            "d33 of the array", f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})"
-        )
+    named = ("d33 of the array", inversion.absolute_d33), ("relative to others", inversion.campaign_d33)
+    for name, d33 in named:
+        if d33 is not None:
+            value, uncertainty, low, high = d33.d33_rows()[0]
+            ends = f"{significant(low, 4)} to {significant(high, 4)}"
+            listed.add_row(name, f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})")
     for name, scatter, factor, unit in (
         ("spread over sensors", inversion.spread, 100.0, "%"),
         ("scatter of gain", inversion.gain, 100.0, "%"),
@@ -135,7 +137,7 @@ def _array(inversion: Inversion) -> Table:
         if scatter is not None:
             value, low, high = (factor * float(part) for part in (scatter.value, scatter.low, scatter.high))
             listed.add_row(name, f"± {value:.2g} {unit} (95 %: {low:.2g} to {high:.2g})")
-    listed.add_row("E 2 % and h 1 % off", f"would move d33 by {inversion.declared_percent:.2g} %, not in the intervals")
+    listed.add_row("skin as declared", f"± {inversion.declared_percent:.2g} % of all d33, in the array's alone")
     chosen = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
     listed.add_row("band", chosen if zone.chosen_by_user else zone.reason)
     return listed

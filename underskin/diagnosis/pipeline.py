@@ -98,7 +98,7 @@ def _diagnosed(
         usable, unusable = without_unusable(campaign, kind)
         consistent = without_inconsistent(usable, kind)
         begun = begun.with_findings(*unusable, *consistent.findings)
-        if consistent.findings and consistent.lacking and kind == kinds[0]:
+        if (unusable or consistent.findings) and consistent.lacking and kind == kinds[0]:
             return replace(begun, lacking=consistent.lacking)
         if curve_lines(consistent.campaign, kind).recordings:
             curves[kind] = consistent.campaign

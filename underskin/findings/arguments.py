@@ -8,14 +8,14 @@ from enum import StrEnum
 class UnitGuess:
     """The slip of units that brings an unusual magnitude back to what is usual.
 
-    `size` in the field's `unit` becomes `meant` either if it was given in `given_in`, or if it is off by ten to the
-    power of `off_by`. Without both no slip explains it; a size of 0 is a measured value of 0.
+    `size` in the field's `unit` becomes each of `meant`, a value in that unit, if it was given in the unit beside the
+    value; or the only one, without a unit, if it is off by ten to the power of `off_by`. Without any no slip explains
+    it; a size of 0 is a measured value of 0.
     """
 
     size: float
     unit: str
-    meant: float = 0.0
-    given_in: str = ""
+    meant: tuple[tuple[float, str], ...] = ()
     off_by: int = 0
 
 

@@ -144,6 +144,7 @@ class Reason(StrEnum):
     AMPLITUDE_FACTOR = "gain_steps"
     WARM_UP = "warm_up"
     CHANNELS_SWAPPED = "channels_swapped"
+    PRELOAD_AND_RADIUS_EXCHANGED = "channels_swapped.preload_and_radius"
     FORCE_CONTRADICTS_PRELOAD = "force_contradicts_preload"
     SENSORS_AT_ONE_PLACE = "impossible_geometry.one_place"
     SENSORS_TOO_NEAR = "impossible_geometry.too_near"

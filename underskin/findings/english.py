@@ -97,7 +97,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.TWO_MODULI: "the two curves' apparent moduli of {first_mpa:.2g} and {second_mpa:.2g} MPa contradict each "
     "other: is force or displacement of one of them off by 1000?",
     Reason.MODULUS_BESIDE_DECLARED: sentences.needed_modulus("{declared_mpa:g} MPa is declared"),
-    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("rubber has {low_mpa:g} to {high_mpa:g} MPa"),
+    Reason.MODULUS_BESIDE_RUBBER: sentences.needed_modulus("Rubber has {low_mpa:g} to {high_mpa:g} MPa"),
     Reason.MODULUS_OF_NO_ELASTOMER: sentences.elastomer,
     Reason.DECLARED_UNUSUAL: sentences.unusual,
     Reason.WIDE_PITCH: "no two sensors lie nearer than {pitch_mm:g} mm: were places given in µm?",
@@ -127,7 +127,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.SERIES_PRELOAD: sentences.of_series(sentences.series_preload),
     Reason.BESIDE_OTHERS: sentences.beside_others,
     Reason.DYNAMIC_FORCE_LARGE: "the dynamic force reaches the preload in all recordings, so the sphere would leave "
-    "the skin: was it given in mN, or the preload in kN?",
+    "the skin: was it given in mN, or the preload in kN, or are the two exchanged?",
     Reason.DYNAMIC_FORCE_SMALL: "it is at most {ratio:.1g} of the preload: it looks 1000 × too small; was it given in "
     "kN, or the preload in mN?",
     Reason.NARROW_MAP: "the map spans {span_mm:g} mm, on sensors {diameter_mm:g} mm across: is it in mm?",
@@ -166,6 +166,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.WARM_UP: "the response drifts by {percent:+.0f} % over the first recordings, to the level of all later "
     "ones: warm-up of amplifier or sensor? The first {recordings} were left out",
     Reason.CHANNELS_SWAPPED: sentences.of_series(sentences.swapped),
+    Reason.PRELOAD_AND_RADIUS_EXCHANGED: sentences.preload_and_radius_exchanged,
     Reason.FORCE_CONTRADICTS_PRELOAD: "the force is {mean_n:.3g} N in the mean, but the preload is {preload_n:g} N: "
     "is one in another unit?",
     Reason.SENSORS_AT_ONE_PLACE: sentences.one_place,

@@ -26,12 +26,12 @@ def unit_guess(guess: UnitGuess) -> str:
     """The slip that would explain an unusual magnitude."""
     if guess.size == 0:
         return "a dead sensor?"
-    if guess.given_in:
-        was = f"{guess.size:g} {guess.given_in} is {guess.meant:g} {guess.unit}"
-        return f"{was}: was it given in {guess.given_in}?"
+    if not guess.meant:
+        return "no unit that we know explains it"
     if guess.off_by:
-        return f"off by a factor of 10^{guess.off_by}? {guess.meant:g} {guess.unit} would be usual"
-    return "no unit that we know explains it"
+        return f"off by a factor of 10^{guess.off_by}? {guess.meant[0][0]:g} {guess.unit} would be usual"
+    was = ", ".join(f"{guess.size:g} {given_in} is {meant:g} {guess.unit}" for meant, given_in in guess.meant)
+    return f"{was}: was it given in {' or '.join(given_in for _, given_in in guess.meant)}?"
 
 
 def defect(kind: DefectKind, channel: str, samples: int, first_sample: int) -> str:
@@ -142,22 +142,30 @@ def unusual(value: float, unit: str, guess: UnitGuess, more: int) -> str:
     return f"{value:g} {unit} is unusual: {unit_guess(guess)}{more_rows(more)}"
 
 
-def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, given_in: str) -> str:
+def elastomer(modulus_mpa: float, low_mpa: float, high_mpa: float, guess: UnitGuess) -> str:
     """A modulus that no elastomer has."""
     word = "stiffer" if modulus_mpa > high_mpa else "softer"
     usual = f"({low_mpa:g} to {high_mpa:g} MPa)"
-    return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: was it given in {given_in}?"
+    return f"{modulus_mpa:g} MPa is {word} than elastomers are {usual}: {unit_guess(guess)}"
 
 
 def needed_modulus(against: str) -> Callable[..., str]:
     """Words for curves whose modulus is far from what is known."""
 
-    def words(modulus_mpa: float, too_large: bool, **bounds: float) -> str:
-        guess = "N for mN, or mm for m" if too_large else "mN for N, or m for mm"
+    def words(modulus_mpa: float, slips: Sequence[str], **bounds: float) -> str:
+        guess = f"{', or '.join(slips)}?" if slips else "are force, displacement and size in the units that were said?"
         needed = f"force and displacement would need a modulus of about {modulus_mpa:.2g} MPa"
-        return f"{needed}, where {against.format(**bounds)}: off by 1000 ({guess})?"
+        return f"{needed}: {guess} {against.format(**bounds)}"
 
     return words
+
+
+def preload_and_radius_exchanged(beyond: int, recordings: int) -> str:
+    """Loads beyond the tables that come within once preload and sphere are exchanged."""
+    return (
+        f"preload_n and indenter_radius_mm look exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond "
+        "what the tables hold, and within if the two columns are exchanged"
+    )
 
 
 def frequencies(lowest_hz: float, highest_hz: float, too_large: bool, given_in: str) -> str:

@@ -3,8 +3,9 @@ for the campaign (Seminara 2018, section 3.2 and equation 15).
 
 Each recording's Re FRF, without the delay that all share and the bias by noise in its channels, is averaged over the
 flat zone and divided by (3/2) ρ² σ, σ at the commanded offset; the mixed model then says how far the recordings
-scatter, and so how well each d33 is known. Intervals hold for the skin as declared and the base model as it stands:
-`declared_percent` says by how much d33 would move with E 2 % and h 1 % off.
+scatter, and so how well each d33 is known. These intervals are relative: they hold for the skin as declared and the
+base model as it stands. `declared_percent` is the standard deviation of all d33 together by the tolerances of the
+declared thickness, sensor radius and modulus; `absolute_d33` includes it.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import ndtri
 
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
@@ -26,23 +28,26 @@ from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction import domain_checks
 from underskin.prediction.domain_checks import usable
+from underskin.prediction.exchanged_values import exchanged_values
 from underskin.prediction.pressed_skin import frf_gradient, transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.conditions import Tolerances
 from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.delay import common_delay, without_delay
 from underskin.recordings.frf.estimation import Frf, lines_of
+from underskin.recordings.frf.exchanged_channels import exchanged_channels
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
 from underskin.recordings.frf.line_choice import usable_lines
 from underskin.recordings.frf.roll_off import roll_off
 from underskin.recordings.frf.stacks import stacked
-from underskin.recordings.plausibility import implausible
+from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
 _MOST_REASONS = 3  # quoted where no recording can be used
-_MODULUS_UNSURE, _THICKNESS_UNSURE = 0.02, 0.01  # what a declared value may be off by
+_SDS_OF_95 = float(ndtri(0.975))
 
 
 class NoD33(InvalidInput):
@@ -89,8 +94,9 @@ class Cells:
 
 @dataclass(frozen=True)
 class Inversion:
-    """The array's d33. `campaign_d33`, `spread` (relative, over sensors), `gain` and `position` [m] come from the
-    sensors that are neither dead, inverted nor weak; None where there is no such sensor."""
+    """The array's d33. `campaign_d33` (its interval is relative), `spread` (relative, over sensors), `gain` and
+    `position` [m] come from the sensors that are neither dead, inverted nor weak; None where there is no such
+    sensor."""
 
     sensor_ids: tuple[str, ...]
     recordings: RecordingD33
@@ -104,7 +110,19 @@ class Inversion:
     position: Estimate | None
     left_out: tuple[Finding | Flag, ...]  # each recording or sensor that the campaign's d33 does without
     findings: tuple[Finding, ...]  # what looks wrong and is used all the same
-    declared_percent: float  # change of d33 for E 2 % and h 1 % off, in quadrature
+    declared_percent: float  # standard deviation of all d33 together by the tolerances of the skin
+
+    @property
+    def absolute_d33(self) -> Estimate | None:
+        """`campaign_d33` with the tolerances of what is declared of the skin, independent of the scatter."""
+        relative = self.campaign_d33
+        if relative is None:
+            return None
+        off = abs(relative.value) * self.declared_percent / 100
+        half = _SDS_OF_95 * off
+        low = relative.value - np.hypot(relative.value - relative.low, half)
+        high = relative.value + np.hypot(relative.high - relative.value, half)
+        return Estimate(relative.value, np.hypot(relative.uncertainty, off), low, high)
 
     def wider(self, relative: float) -> "Inversion":
         """With an uncertainty that all its d33 share, relative, besides."""
@@ -149,6 +167,8 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
+    if (exchanged := exchanged_values(campaign.skin, recorded, table)) and not campaign.units_checked:
+        raise NoD33("preload_n", campaign.name, exchanged[0].statement)
     contact = _Contact(campaign, recorded, table)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
     reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
@@ -178,7 +198,7 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     unsure = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
     inversion = _estimated(ids, rows, contact, zone).wider(unsure)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
-    findings = (*implausible(campaign), *filtered, *findings_of(recorded, measured, level, inversion.campaign_d33))
+    findings = (*at_reading(campaign), *filtered, *findings_of(recorded, measured, level, inversion.campaign_d33))
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
@@ -203,6 +223,9 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     """The usable lines of each recording that has an FRF, those recordings, and findings on the others."""
     frfs, with_frf, left_out = [], [], []
     for recording in recorded:
+        if (exchanged := exchanged_channels(recording)) is not None:
+            left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
+            continue
         try:
             frfs.append(lines_of(recording))
             with_frf.append(recording)
@@ -212,7 +235,8 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
 
 
 class _Contact:
-    """What the base model says of each recording's contact; `declared`: relative change of FRF for E and h off."""
+    """What the base model says of each recording's contact; `declared_percent`: standard deviation of its FRF by the
+    tolerances of the skin."""
 
     def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> None:
         described = campaign.skin
@@ -244,10 +268,13 @@ class _Contact:
         )
         slopes = frf_gradient(table, skin, indenter, preload, 1.0)
         size = transmitted.frf(1.0)
-        self.declared = np.hypot(
-            slopes["youngs_modulus"] * skin.youngs_modulus * _MODULUS_UNSURE / size,
-            slopes["thickness"] * thickness * _THICKNESS_UNSURE / size,
+        off = described.tolerances or Tolerances()
+        changes = (
+            slopes["thickness"] * thickness * off.thickness_percent,
+            slopes["sensor_radius"] * skin.sensor_radius * off.sensor_radius_percent,
+            slopes["youngs_modulus"] * skin.youngs_modulus * off.youngs_modulus_percent,
         )
+        self.declared_percent = np.linalg.norm(changes, axis=0) / size
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:
@@ -290,7 +317,7 @@ def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone
         position=model.position if model else None,
         left_out=(*far_off, *unfit.values()),
         findings=(),
-        declared_percent=100 * float(np.nanmedian(contact.declared[good])),
+        declared_percent=float(np.nanmedian(contact.declared_percent[good])),
     )  # fmt: skip
 
 

@@ -37,8 +37,8 @@ NOT_ADOPTED = {
     "unexplained": "none of the known mechanisms describes what is missing, and no law over one axis that holds for "
     "other recordings stands for it. Look at the rig where the report says that the misfit lies, and record it again",
     "no_mismatch": "nothing is missing, so that there is nothing to adopt; the paper's model serves",
-    "insufficient_data": "too little was recorded to tell what is missing. Record what it says is "
-    "lacking, send it together with these recordings, and diagnose that",
+    "insufficient_data": "it cannot tell what is missing. Correct what it says is wrong, or record what it says is "
+    "lacking and send it together with these recordings; then diagnose that",
 }  # by verdict: why it is refused, and what to do
 UNNAMED = "a law without a name"  # what an adopted one is called
 _SAME = 1e-9  # relative

@@ -5,7 +5,7 @@ keeps the good recordings and says of each of the others what is wrong; writing 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -20,6 +20,7 @@ from underskin.recordings.conditions import (
     FrfConditions,
     IndentationConditions,
     SkinDescription,
+    Tolerances,
 )
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
 from underskin.recordings.shown_values import shown
@@ -190,6 +191,8 @@ def _plain(model: Any) -> dict[str, Any]:
         value = getattr(model, name)
         if isinstance(value, np.ndarray):
             document[name] = value.tolist()
+        elif isinstance(value, Tolerances):
+            document[name] = asdict(value)
         elif value not in (None, ()) and (name, value) != ("kind", "frf"):
             document[name] = list(value) if isinstance(value, tuple) else value
     return document

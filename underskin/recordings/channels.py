@@ -1,13 +1,13 @@
 """What an instrument's file holds before a rig description says what its channels are."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.recordings.readers.unit_labels import in_brackets
+from underskin.recordings.readers.unit_labels import in_brackets, labelled_unit
 from underskin.units import Floats
 
 Values = Floats | NDArray[np.complex128]
@@ -16,18 +16,29 @@ FIRST_YEAR = 1970  # LabVIEW writes an unset clock as the beginning of 1904
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One column: its name as written, its unit as labelled (empty where the file says none), its values."""
+    """One column: its name as written, its unit as labelled (empty where the file says none), its values.
+
+    Where the file states them: `sample_rate_hz`, and `starts_s`, the time of its first sample after `recorded_at` of
+    the block [s].
+    """
 
     name: str
     unit: str
     values: Values
+    sample_rate_hz: float | None = None
+    starts_s: float = 0.0
+
+    @property
+    def label(self) -> str:
+        """The unit as labelled, or as its name has it: `Force (lbs)`; empty where neither says one."""
+        return self.unit or labelled_unit(self.name)
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Channels acquired together; `sample_rate_hz` where they are evenly sampled in time, `recorded_at` where the file
-    says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows of a text begin,
-    which blank or comment lines part; empty where there is one group."""
+    """Channels acquired together; `sample_rate_hz` where all are evenly sampled in time at one rate, `recorded_at`
+    where the file says when the acquisition began (ISO 8601). `group_starts` are the samples at which groups of rows
+    of a text begin, which blank or comment lines part; empty where there is one group."""
 
     name: str
     channels: tuple[Channel, ...]
@@ -78,7 +89,7 @@ def with_distinct_names(channels: list[Channel]) -> tuple[Channel, ...]:
     for channel in channels:
         seen[channel.name] = count = seen.get(channel.name, 0) + 1
         name = channel.name if count == 1 else f"{channel.name} ({count})"
-        distinct.append(Channel(name, channel.unit, channel.values))
+        distinct.append(replace(channel, name=name))
     return tuple(distinct)
 
 

@@ -46,6 +46,23 @@ Sensors = Annotated[tuple[Sensor, ...], read_sensors]
 
 
 @dataclass(frozen=True)
+class Tolerances:
+    """What declared values of the skin may be off by: standard deviations [%].
+
+    They are part of absolute intervals, such as that of the array's d33, and of none that compares sensors or dates.
+    """
+
+    thickness_percent: field.NotNegative = 2.0
+    sensor_radius_percent: field.NotNegative = 2.0
+    youngs_modulus_percent: field.NotNegative = 10.0
+
+
+def read_tolerances(name: str, value: Any, units_checked: bool) -> Tolerances:
+    """Those that differ from the default ones."""
+    return field.build(Tolerances, name, value, units_checked)
+
+
+@dataclass(frozen=True)
 class SkinDescription:
     """The skin as the lab declares it.
 
@@ -61,6 +78,7 @@ class SkinDescription:
     d33_pc_per_n: field.Declared | None = None
     width_mm: field.Declared | None = None
     length_mm: field.Declared | None = None
+    tolerances: Annotated[Tolerances, read_tolerances] | None = None
     sensors: Sensors = ()
 
 

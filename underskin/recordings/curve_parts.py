@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.errors import FileError
-from underskin.recordings.channels import Block, Channel, Contents
+from underskin.recordings.channels import Block, Contents
 from underskin.recordings.rig_description import CurveChannel
 
 _MOST_CURVES = 1000  # of a block
@@ -67,7 +67,7 @@ def _joined(blocks: Sequence[Block]) -> Block:
         whole = [one for one in alike if one is not None and one.unit == channel.unit]
         if len(whole) == len(blocks):
             values = np.concatenate([one.values for one in whole])
-            channels.append(Channel(channel.name, channel.unit, values))
+            channels.append(replace(channel, values=values))
     return Block(first.name, tuple(channels), first.sample_rate_hz, first.recorded_at)
 
 

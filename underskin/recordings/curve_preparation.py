@@ -21,6 +21,7 @@ from underskin.recordings.campaign import (
 )
 from underskin.recordings.curve_defects import periodic_error, saturated
 from underskin.recordings.curve_signs import Orientation
+from underskin.recordings.exchanged_columns import are_exchanged
 
 _LEAST = 16  # samples, with which a defect can be told
 _ONE_WAY = 2  # turning points of a curve of one way: its first and its last sample
@@ -43,7 +44,7 @@ def prepared(campaign: Campaign) -> PreparedCurves:
     negative: dict[tuple[str, tuple[str, ...]], list[str]] = {}
     recordings: list[Recording] = []
     for recording in campaign.recordings:
-        if isinstance(recording, FrfRecording):
+        if isinstance(recording, FrfRecording) or are_exchanged(recording):
             recordings.append(recording)
             continue
         curve, found = _without_saturation(recording)

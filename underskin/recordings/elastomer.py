@@ -7,6 +7,7 @@ from underskin.errors import InvalidInput, unusable
 from underskin.recordings.block_modulus import CompressionModulus, of_compression
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.curve_preparation import prepared
+from underskin.recordings.exchanged_columns import require_own_columns
 from underskin.recordings.sphere_modulus import IndentationModulus, of_indentation
 
 
@@ -26,6 +27,8 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
     for recording in prepared(campaign).campaign.recordings:
         result: CompressionModulus | IndentationModulus | InvalidInput
         try:
+            if isinstance(recording, CompressionRecording | IndentationRecording):
+                require_own_columns(recording)
             if isinstance(recording, CompressionRecording):
                 result = of_compression(recording)
             elif isinstance(recording, IndentationRecording):

@@ -81,7 +81,7 @@ def _facts(skin: SkinDescription) -> Iterator[tuple[str, Any]]:
 
 
 def _same(value: Any, other: Any) -> bool:
-    if isinstance(value, str):
+    if not isinstance(value, float):
         return bool(value == other)
     return math.isclose(value, other, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
 

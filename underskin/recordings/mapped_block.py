@@ -13,15 +13,16 @@ from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
-from underskin.recordings.readers.unit_labels import unit
+from underskin.recordings.readers.unit_labels import meanings, unit
+from underskin.recordings.readers.unit_words import DECIBEL
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
 from underskin.recordings.sampling import even_rate, mean_step
 from underskin.recordings.shown_values import shown
 from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats, readable_unit
 
-_DEGREES = {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0, "rad": math.degrees(1), "radians": math.degrees(1)}
 _PERCENT = 100.0
+_NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
 
 
@@ -65,6 +66,8 @@ class MappedBlock:
         if MAGNITUDE not in values:
             return rest
         magnitude, phase = values[MAGNITUDE], values[PHASE]
+        if (magnitude < 0).any():
+            raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
         if len(magnitude) != len(phase):
             raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
         frf = magnitude * np.exp(1j * np.radians(phase))
@@ -104,7 +107,8 @@ class MappedBlock:
         if len(channel.values) == 0:
             raise self._error(place, "holds no values")
         if field == "coherence":
-            return channel.values, repr(channel.name)
+            in_percent = (mapping.unit or channel.label) == "%"
+            return channel.values / (_PERCENT if in_percent else 1.0), repr(channel.name)
         target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
         label = self._true_unit(channel, mapping, place)
         scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
@@ -151,37 +155,41 @@ class MappedBlock:
         return column - zero
 
     def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:
-        """The rig's unit, else the file's label.
-
-        A label of the same dimension may be wrong, with a warning; one of another must be acknowledged, since then the
-        channel may be the wrong one.
-        """
+        """The rig's unit, else the file's label, which must not contradict it unless the rig says that it is wrong."""
+        label = channel.label
         if mapping.labelled is not None:
-            if mapping.labelled != channel.unit:
-                raise self._error(place, f"is labelled {channel.unit!r}, not {mapping.labelled!r} as the rig says")
-            self.warnings.append(f"{place} is labelled {channel.unit!r}; the rig description says {mapping.unit!r}")
+            if mapping.labelled != label:
+                raise self._error(place, f"is labelled {label!r}, not {mapping.labelled!r} as the rig says")
+            self.warnings.append(f"{place} is labelled {label!r}; the rig description says {mapping.unit!r}")
             return mapping.unit or ""
-        true, labelled = unit(mapping.unit or ""), unit(channel.unit)
-        if mapping.unit and labelled is not None and true != labelled:
-            reason = f"is labelled {channel.unit!r}, but the rig description says {mapping.unit!r}"
-            if true is None or true.dimension != labelled.dimension:
-                raise self._error(place, f"{reason}: if the label is wrong, add labelled: {channel.unit}")
-            self.warnings.append(f"{place} {reason}, which counts")
-        label = mapping.unit or channel.unit
-        if not label:
+        labelled = meanings(label)
+        if mapping.unit and labelled and unit(mapping.unit) not in labelled:
+            reason = f"is labelled {label!r}, but the rig description says {mapping.unit!r}"
+            raise self._error(
+                place, f"{reason}: correct the one that is wrong; if it is the label, add labelled: {label}"
+            )
+        if not mapping.unit and len(labelled) > 1:
+            raise self._error(
+                place, f"its unit {label!r} has several meanings: say it, as `unit` of the rig description"
+            )
+        if not (mapping.unit or label):
             raise self._error(
                 place, "has no unit in the file: say it, as `unit` of the rig description or as its true unit"
             )
-        return label
+        return mapping.unit or label
 
     def _degrees(self, label: str, place: str) -> float:
         """From the unit of a phase to degrees."""
-        if label.lower() not in _DEGREES:
+        known = unit(label)
+        if known is None or known.dimension != "angle":
             raise self._error(place, f"its unit {label!r} is none of an angle: a phase is in deg or rad")
-        return _DEGREES[label.lower()]
+        return math.degrees(known.to_si)
 
     def _scale(self, field: str, label: str, mapping: SignalMapping, place: str) -> float:
         """From the channel's unit to the field's, through the sensitivity where there is one."""
+        known = unit(label)
+        if known is not None and known.dimension == DECIBEL:
+            raise self._error(place, _NO_DECIBELS)
         if mapping.sensitivity is None or mapping.sensitivity_unit is None:
             return factor(label, field, self.file, place, "; a signal in volts needs its sensitivity")
         above, _, below = mapping.sensitivity_unit.rpartition("/")

@@ -14,7 +14,8 @@ from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings.campaign import Campaign
+from underskin.recordings import curve_magnitudes
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Sensor
 from underskin.recordings.curve_preparation import prepared
 from underskin.units import Floats
@@ -28,6 +29,19 @@ _LARGEST_IN_METRES_MM = 0.1
 def implausible(campaign: Campaign) -> list[Finding]:
     """Times that no recording has, sensors that would lie in each other, and what is put right of curves."""
     return [*_times(campaign), *overlapping_sensors(campaign), *prepared(campaign).findings]
+
+
+def at_reading(campaign: Campaign) -> list[Finding]:
+    """The same, with slips of units that a diagnosis would find: in curves, and in the dynamic force of all FRFs."""
+    frfs = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    return [*implausible(campaign), *curve_magnitudes.implausible(campaign), *loose_sphere(frfs)]
+
+
+def loose_sphere(entries: Sequence[FrfRecording]) -> list[Finding]:
+    """A dynamic force that reaches the preload in all recordings, so that the sphere would leave the skin."""
+    if not entries or any(entry.dynamic_force_n < entry.preload_n for entry in entries):
+        return []
+    return [Finding(Reason.DYNAMIC_FORCE_LARGE, "", "dynamic_force_n")]
 
 
 def _times(campaign: Campaign) -> Iterator[Finding]:

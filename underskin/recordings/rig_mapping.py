@@ -6,6 +6,7 @@ from pathlib import PurePath
 from typing import Any
 
 from underskin.errors import FileError
+from underskin.recordings import common_start
 from underskin.recordings.campaign import SCHEMA
 from underskin.recordings.channels import Block, Contents
 from underskin.recordings.curve_parts import curve_parts, doubts
@@ -31,6 +32,8 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
 
     Raises FileError that names the channel or property that is missing or whose unit does not fit.
     """
+    in_formulas = [name for formula in rig.derived.values() for name in formula.names]
+    contents = common_start.aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
     contents = derived_channels.with_derived(contents, rig.derived, lambda one: _stated(contents, one, one.name), file)
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]

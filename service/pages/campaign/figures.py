@@ -73,7 +73,7 @@ def _d33(row: AnyRow, answer: Mapping[str, Any], numbers: Mapping[str, Any], sho
     names, d33, uncertainty, low, high, x_mm, y_mm, reasons = columns_of(
         sensors_of(row, answer), "sensor", *D33Value.model_fields, "x_mm", "y_mm", "reasons"
     )
-    array, radius = answer["array"], row.about["skin"].get("sensor_radius_mm")
+    array, radius = answer["array_relative"], row.about["skin"].get("sensor_radius_mm")
     limits = None if array is None else (array["d33_low_pc_per_n"], array["d33_high_pc_per_n"])
     sensor = show if show in names else None
     rows = _of_sensor(numbers["recordings"], sensor)

@@ -26,7 +26,7 @@ _SAYS = {
     "ambiguous": "mismatch with several explanations",
     "unexplained": "mismatch without explanation",
     "no_mismatch": "no mismatch found",
-    "insufficient_data": "too little data",
+    "insufficient_data": "nothing can be concluded",
 }
 _BY_A_LAW = "mismatch by a law that nobody listed"
 

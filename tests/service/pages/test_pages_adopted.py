@@ -66,7 +66,7 @@ def test_an_adopted_model_heads_its_skin_and_the_start(visitor: Visit, server: S
         told = numbers(head)
         arrays = [answer["array"] for answer in (by_model, by_paper)]
         intervals = [array[f"d33{part}_pc_per_n"] for array in arrays for part in ("", "_low", "_high")]
-        assert told[:6] == pytest.approx(intervals, rel=1e-3)
+        assert told[:6] == pytest.approx(intervals, rel=5e-3)
         assert told[6] == pytest.approx(change, rel=0.06)
         assert "by the adopted model, not to be quoted yet" in head
         assert NOT_QUOTED in head
@@ -133,7 +133,7 @@ def test_what_comes_later_is_told_by_the_adopted_model_too(server: Server) -> No
     row = said(server, "/", "palm-b")
     assert "later" in row
     by_model = d33(server, later, "adopted")["array"]["d33_pc_per_n"]
-    assert f"array {by_model:.2f} pC/N" in row
+    assert f"array {by_model:.1f} pC/N" in row
 
 
 def test_an_outdated_model_is_said_to_serve_nothing(server: Server) -> None:
@@ -215,7 +215,7 @@ WARMTH = {
          "the model lacks contact resonance (98.5 %)", "look"),
         ("unexplained", 0.998, [], [], "mismatch by a law that nobody listed, 99.8 %", "modulus over the time of day",
          "look"),
-        ("insufficient_data", 0.5, [], [], "too little data", "", "quiet"),
+        ("insufficient_data", 0.5, [], [], "nothing can be concluded", "", "quiet"),
         ("ambiguous", 0.55, ["contact_resonance"], [("timing_delay", 0.4), ("none_of_these", 0.015)],
          "mismatch with several explanations", "contact resonance 55 % or timing delay 40 %", "look"),
         ("unexplained", 0.999, [], [("crosstalk", 0.001)], "mismatch without explanation, 99.9 %", "", "look"),

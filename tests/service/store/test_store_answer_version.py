@@ -25,6 +25,7 @@ KNOWN = {
     1: ("6feb4e2d51f904c6", 13.402, 0.105487),
     2: ("c41e6ef11406b7c7", 13.402, 0.105487),
     3: ("c41e6ef11406b7c7", 13.402, 0.105487),  # findings of times and places
+    4: ("53a90e4aa097fad6", 13.402, 0.105487),  # tolerances of the skin in the array's interval
 }
 
 

@@ -161,7 +161,7 @@ def test_only_what_is_explained_is_adopted(server: Server, client: Client) -> No
         ("no_mismatch", "nothing to adopt; the paper's model serves"),
         ("ambiguous", r"several explanations remain.*recordings that it plans"),
         ("unexplained", "Look at the rig"),
-        ("insufficient_data", r"too little was recorded.*Record what it says is lacking"),
+        ("insufficient_data", r"Correct what it says is wrong, or record what it says is lacking"),
     ):
         _, diagnosis_id = diagnosed(server, small(), {**report(), "verdict": verdict})
         with pytest.raises(ServiceError, match=f"a diagnosis of verdict {verdict}.*must be explained: .*{what_to_do}"):

@@ -180,7 +180,11 @@ class D33(Document):
     """The lines that were averaged."""
 
     array: D33Value | None
-    """d33 of the array: mean of the sensors that are not flagged as unfit."""
+    """d33 of the array, mean of the sensors that are not flagged as unfit; its uncertainty and interval include
+    `declared_percent`."""
+
+    array_relative: D33Value | None
+    """The same without `declared_percent`: to compare it with its sensors and with other dates."""
 
     sensor_spread_percent: Scatter | None
     """Standard deviation of d33 over the sensors."""
@@ -192,7 +196,8 @@ class D33(Document):
     """Standard deviation of the sphere's position, each axis [mm]."""
 
     declared_percent: float | None
-    """How far d33 moves where the declared modulus is 2 % and the thickness 1 % off; not in intervals."""
+    """Standard deviation of all d33 together by the skin's `tolerances`; in the interval of `array`, not in those
+    of sensors and cells, which are relative to each other."""
 
     sensors: tuple[SensorD33, ...]
     """One entry a sensor that was recorded."""

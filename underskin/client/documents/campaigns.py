@@ -52,6 +52,9 @@ class Skin(Document):
     length_mm: float | None
     """Extent of the skin along x [mm]. Unless `units_checked`, 0.1 to 10000."""
 
+    tolerances: str | None
+    """What the declared thickness, sensor radius and modulus may be off by; part of absolute intervals."""
+
     sensors: tuple[Sensor, ...] | None
     """The sensors of the array."""
 

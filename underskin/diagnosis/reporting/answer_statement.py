@@ -10,13 +10,15 @@ from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.power import Power
 from underskin.findings.english import lacking
 from underskin.findings.formatting import in_digits, in_percent
-from underskin.findings.lacking import Lacking
+from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.registry import CATALOGUE
 
 _WORTH_NAMING = 0.02
 _FAR_ABOVE = 2.0  # times the noise: an error held out that a verdict's first sentence tells
 _INSUFFICIENT = "The recordings cannot tell anything: "
+_TO_CORRECT = "Nothing can be told before a correction: "
+_CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
 _STATED = 3  # mechanisms whose strengths are told
 
@@ -198,13 +200,13 @@ def _reserve(fit: Mapping[str, Any]) -> str:
 def insufficient_statement(what: Lacking | None, slips: Sequence[str]) -> str:
     """The statement on a campaign from which nothing can be concluded."""
     assert what is not None
-    return of_clauses([f"{_INSUFFICIENT}{lacking(what)}"], slips)
+    return of_clauses([f"{_TO_CORRECT if what.lack in _CORRECTED else _INSUFFICIENT}{lacking(what)}"], slips)
 
 
 # The page of a stored report lays its statement out by these two; nothing is decided by what they return.
 def lacking_part(statement: str) -> str:
-    """What is lacking, with its full stop, out of the statement that `insufficient_statement` made."""
-    return statement.removeprefix(_INSUFFICIENT)
+    """What is lacking or wrong, with its full stop, out of the statement that `insufficient_statement` made."""
+    return statement.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
 def first_and_rest(statement: str) -> tuple[str, str]:

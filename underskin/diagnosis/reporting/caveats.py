@@ -20,7 +20,13 @@ _SLIPS = (
     ),
     FindingCode.WARM_UP,
     *(FindingCode.FORCE_SATURATES, FindingCode.PERIODIC_ERROR),
-    *(FindingCode.UNITS_OFF_BY_1000, FindingCode.SIGN_FLIPPED, FindingCode.MAINS_IN_CHARGE, FindingCode.OUT_OF_DOMAIN),
+    *(
+        FindingCode.UNITS_OFF_BY_1000,
+        FindingCode.CHANNELS_SWAPPED,
+        FindingCode.SIGN_FLIPPED,
+        FindingCode.MAINS_IN_CHARGE,
+        FindingCode.OUT_OF_DOMAIN,
+    ),
     *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
 )
 _RESERVES = (

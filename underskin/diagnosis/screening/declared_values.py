@@ -15,7 +15,7 @@ from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
-from underskin.units import unusual
+from underskin.units import unit_guess, unusual
 
 _PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
 _FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
@@ -43,7 +43,7 @@ def _of_skin(campaign: Campaign) -> list[Finding]:
             "modulus_mpa": modulus,
             "low_mpa": low,
             "high_mpa": high,
-            "given_in": "kPa" if modulus > high else "GPa",
+            "guess": unit_guess("youngs_modulus_mpa", modulus, _ELASTOMERS_MPA),
         }
         findings.append(Finding(Reason.MODULUS_OF_NO_ELASTOMER, "", "skin.youngs_modulus_mpa", arguments))
     for name in _GEOMETRY:

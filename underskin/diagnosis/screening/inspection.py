@@ -19,13 +19,14 @@ from underskin.diagnosis.screening.phase_convention import in_one_convention
 from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
 from underskin.diagnosis.screening.silent_together import without_silent_pair
 from underskin.diagnosis.screening.time_series import as_given, as_lines
-from underskin.diagnosis.screening.unit_errors import faint_oscillation, loose_sphere, single_unit_errors
+from underskin.diagnosis.screening.unit_errors import faint_oscillation, single_unit_errors
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
+from underskin.prediction.exchanged_values import exchanged_values
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.plausibility import overlapping_sensors
+from underskin.recordings.plausibility import loose_sphere, overlapping_sensors
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 
@@ -66,7 +67,8 @@ def _inspect_lines(
     if not entries:
         return _inspected(campaign, entries, findings)
     contradictory = [*loose_sphere(entries), *overlapping_sensors(campaign), *misgiven]
-    doubtful = [*unlikely(campaign, entries), *at_sensors(campaign, entries)]
+    exchanged = exchanged_values(campaign.skin, entries, table)
+    doubtful = [*unlikely(campaign, entries), *at_sensors(campaign, entries), *exchanged]
     findings += [*doubtful, *contradictory]
     if contradictory or (doubtful and not campaign.units_checked):
         lacking = _impossible([*doubtful, *contradictory], confirmable=not contradictory)

@@ -10,13 +10,10 @@ import numpy as np
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.frf.exchanged_channels import exchanged_channels, oscillation_of
 from underskin.recordings.frf.signal_checks import mean_of
-from underskin.units import Floats
 
 _SLIP, _WITHIN = 1000.0, 30.0
-_AS_DECLARED = float(np.log(1.4))
-_PARTS = 8  # of a record, of which drift is taken off; its analysis has blocks of that length
-_TINY = 1e-300
 
 
 def contradiction_of(entry: FrfRecording) -> Finding | None:
@@ -25,10 +22,9 @@ def contradiction_of(entry: FrfRecording) -> Finding | None:
         return None
     mean = float(np.mean(entry.force_n))
     preload = mean_of(entry.force_n)
-    if _declared(entry.charge_pc, entry) and not _declared(entry.force_n, entry):
-        means = {"force_mean_n": mean, "charge_mean_pc": float(np.mean(entry.charge_pc))}
-        return Finding(Reason.CHANNELS_SWAPPED, entry.id, "force_n", {**means, "preload_n": entry.preload_n})
-    oscillation = _oscillation(entry.force_n) / entry.dynamic_force_n
+    if (exchanged := exchanged_channels(entry)) is not None:
+        return exchanged
+    oscillation = oscillation_of(entry.force_n) / entry.dynamic_force_n
     agrees = any(_near(one, 1.0) for one in oscillation)
     nearest = oscillation[int(np.argmin(np.abs(np.log(np.maximum(oscillation, 1e-300)))))] * entry.dynamic_force_n
     pressed = None if preload is None else abs(preload) / entry.preload_n
@@ -47,21 +43,5 @@ def contradiction_of(entry: FrfRecording) -> Finding | None:
     return None
 
 
-def _oscillation(force: Floats) -> Floats:
-    """√2 times the deviation of a force less its drift, and its peak [N]."""
-    parts = np.arange(0, len(force), max(len(force) // _PARTS, _PARTS))
-    from scipy.signal import detrend  # takes 0.3 s to load, which few need
-
-    drift_free = detrend(force, bp=parts)
-    return np.array([np.sqrt(2.0) * np.std(drift_free), np.max(np.abs(drift_free))])
-
-
 def _near(ratio: float, factor: float) -> bool:
     return factor / _WITHIN < ratio < factor * _WITHIN
-
-
-def _declared(signal: Floats, entry: FrfRecording) -> bool:
-    """Whether the mean of a signal is the declared preload, and what shakes it the declared dynamic force."""
-    ratios = np.append(_oscillation(signal) / entry.dynamic_force_n, np.mean(signal) / entry.preload_n)
-    near = np.abs(np.log(np.maximum(ratios, _TINY))) < _AS_DECLARED
-    return bool(near[:-1].any() and near[-1])

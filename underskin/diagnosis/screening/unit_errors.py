@@ -64,13 +64,6 @@ def single_unit_errors(entries: Sequence[FrfRecording]) -> tuple[Mask, list[Find
     return off, findings
 
 
-def loose_sphere(entries: Sequence[FrfRecording]) -> list[Finding]:
-    """A dynamic force that reaches the preload in all recordings, so that the sphere would leave the skin."""
-    if any(entry.dynamic_force_n < entry.preload_n for entry in entries):
-        return []
-    return [Finding(Reason.DYNAMIC_FORCE_LARGE, "", "dynamic_force_n")]
-
-
 def faint_oscillation(entries: Sequence[FrfRecording]) -> list[Finding]:
     """A dynamic force that is hardly there, as one in kN would be; only the laws of large amplitudes use it."""
     ratio = max(entry.dynamic_force_n / entry.preload_n for entry in entries)

@@ -13,6 +13,7 @@ from underskin.mechanisms.base import Kind
 from underskin.recordings.block_modulus import of_compression
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
 from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.exchanged_columns import require_own_columns
 from underskin.recordings.sphere_modulus import estimate, require_depth, tip_of
 from underskin.units import to_si
 
@@ -25,7 +26,8 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
     for entry in campaign.recordings:
         lacking, doubt = None, None
         if entry.kind == kind:
-            lacking, doubt = _lacking(thinned.get(entry.id), campaign.skin)
+            exchanged = _exchanged(entry)
+            lacking, doubt = (exchanged, None) if exchanged else _lacking(thinned.get(entry.id), campaign.skin)
         if lacking is None:
             usable.append(entry)
         else:
@@ -33,6 +35,16 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
         if doubt is not None:
             findings.append(Finding(Reason.TIP_SHAPE, entry.id, doubt.field, {"refusal": doubt}))
     return replace(campaign, recordings=tuple(usable)), findings
+
+
+def _exchanged(entry: object) -> InvalidInput | None:
+    """The refusal of a curve whose columns look exchanged, which its raw samples tell."""
+    try:
+        if isinstance(entry, IndentationRecording | CompressionRecording):
+            require_own_columns(entry)
+    except InvalidInput as refusal:
+        return refusal
+    return None
 
 
 def _lacking(entry: object, skin: SkinDescription) -> tuple[InvalidInput | None, InvalidInput | None]:

@@ -25,7 +25,7 @@ from typing import Any, BinaryIO
 from underskin.errors import FileError
 from underskin.recordings.campaign import KINDS, SCHEMA
 from underskin.recordings.channels import Document
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.conditions import SkinDescription, Tolerances
 from underskin.recordings.readers import template_columns, template_lines, text
 from underskin.recordings.readers.calendar_times import iso_time
 from underskin.recordings.readers.template_columns import CLOCK, DATE, NO_NAME, Column, NoField
@@ -39,7 +39,11 @@ from underskin.units import LAB, LabField
 
 _SENSOR = ("id", "x_mm", "y_mm")
 _TEXTS = ("id", "kind", "sensor", "recorded_at", "estimator", "name", "skin.id", DATE, CLOCK)
-_SKIN_FIELDS = tuple(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name != "sensors")
+_TOLERANCE = "tolerances."
+_SKIN_FIELDS = (
+    *(f"skin.{entry.name}" for entry in fields(SkinDescription) if entry.name not in ("sensors", "tolerances")),
+    *(f"skin.{_TOLERANCE}{entry.name}" for entry in fields(Tolerances)),
+)
 _KNOWN = ({entry.name for kind in KINDS.values() for entry in fields(kind)} | set(POSITION)) - {"conditions"}
 _ID = "id"
 _MOST_ABOVE = 10_000  # lines
@@ -101,7 +105,11 @@ class _Template:
         above = [self._above(row, index) for index, row in enumerate(self.rows[:-1]) if any(row)]
         parts = {part: {field: value for of, field, value in above if of == part} for part in ("campaign", "skin")}
         sensors = [value for part, _, value in above if part == "sensor"]
-        skin = {**parts["skin"], **({"sensors": sensors} if sensors else {})}
+        tolerances = {name: value for name, value in parts["skin"].items() if name.startswith(_TOLERANCE)}
+        skin = {name: value for name, value in parts["skin"].items() if name not in tolerances}
+        if tolerances:
+            skin["tolerances"] = {name.removeprefix(_TOLERANCE): value for name, value in tolerances.items()}
+        skin |= {"sensors": sensors} if sensors else {}
         return {"schema": SCHEMA, **parts["campaign"], "skin": skin, "recordings": self._recordings()}
 
     def _above(self, row: list[str], index: int) -> tuple[str, str, Any]:

@@ -10,7 +10,7 @@ from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers import channel_arithmetic, text
 from underskin.recordings.readers.channel_arithmetic import Formula, Quantity, in_unit
 from underskin.recordings.readers.dimensions import described, exponents, label_of
-from underskin.recordings.readers.unit_labels import labelled_unit, unit
+from underskin.recordings.readers.unit_labels import labelled_unit, meanings, unit
 from underskin.recordings.shown_values import LONGEST_NAME
 
 Stated = Mapping[str, str | float]
@@ -82,7 +82,7 @@ class _Derivation:
             return self._constants[name]
         channel = self._channel(name)
         if channel is not None:
-            label = self._unit(name, channel.unit, stated_unit)
+            label = self._unit(name, channel.label, stated_unit)
             self._labels.append(label)
             return in_unit(channel.values, label)
         given = self.stated[name]
@@ -97,17 +97,15 @@ class _Derivation:
         return self.block.channel(name) if stated else self.block.headed(name)
 
     def _unit(self, name: str, label: str, stated: str | None) -> str:
-        """The unit in brackets, else the label; where they differ that in brackets counts, of the same dimension."""
+        """The unit in brackets, else the label; they must not contradict each other."""
         if stated is None:
             if exponents(label) is None:
                 what = f"its unit {label!r} is not known here" if label else "has no unit in the file"
                 raise self._error(f"{name}: {what}: say it in brackets, such as [mm] behind it")
             return label
-        meant, labelled = exponents(stated), exponents(label)
-        if labelled is not None and labelled != meant:
-            raise self._error(f"{name} [{stated}]: is labelled {label!r}, a unit of another kind")
-        if labelled is not None and unit(stated) != unit(label):
-            self.warnings.append(f"{name} is labelled {label!r}; its formula says {stated!r}, which counts")
+        if (labelled := meanings(label)) and unit(stated) not in labelled:
+            remedy = f"if the label is wrong, leave {stated!r} out and convert by a factor in the formula"
+            raise self._error(f"{name} [{stated}]: is labelled {label!r}, but the formula says {stated!r}; {remedy}")
         return stated
 
     def _error(self, reason: str) -> FileError:

@@ -37,10 +37,10 @@ def exponents(label: str) -> Exponents | None:
     known = unit(label)
     if known is None:
         return None
-    above, *below = known.dimension.split("/")
-    result = _EXPONENTS[above]
-    for one in below:
-        result = times(result, _EXPONENTS[one], -1)
+    parts = [_EXPONENTS.get(part) for part in known.dimension.split("/")]
+    result, *below = parts
+    for part in below:
+        result = None if result is None or part is None else times(result, part, -1)
     return result
 
 

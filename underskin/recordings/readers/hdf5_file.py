@@ -1,7 +1,7 @@
 """Campaigns as HDF5, field for field as in JSON, and back without loss.
 
 /                        attributes schema, name, units_checked
-/skin                    attributes as in the document
+/skin                    attributes as in the document; tolerances.thickness_percent and its like
 /skin/sensors            datasets id, x_mm, y_mm
 /recordings/<number>     attributes for single values, a dataset for each column
 """
@@ -17,6 +17,7 @@ from underskin.errors import ErrorCode, FileError
 from underskin.recordings.campaign import COLUMNS, SCHEMA, Campaign, to_dict
 from underskin.recordings.readers import hdf5_input
 
+_TOLERANCES = "tolerances"
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -32,6 +33,7 @@ def write_document(about: Mapping[str, Any], recordings: Iterable[Mapping[str, A
         _write_attributes(target, {name: about[name] for name in about if name not in ("skin", "recordings")})
         skin = dict(about["skin"])
         sensors = skin.pop("sensors", [])
+        skin |= {f"{_TOLERANCES}.{name}": value for name, value in (skin.pop(_TOLERANCES, None) or {}).items()}
         _write_attributes(target.create_group("skin"), skin)
         for name in ("id", "x_mm", "y_mm") if sensors else ():
             target[f"skin/sensors/{name}"] = [sensor[name] for sensor in sensors]
@@ -65,6 +67,10 @@ def _document(source: Any, file: str) -> dict[str, Any]:
         needed = f"it needs the attribute schema = {SCHEMA}, /skin and /recordings"
         raise FileError(file, "/", f"is HDF5, but no campaign: {needed}; other HDF5 is read from MATLAB 7.3 only")
     skin = _attributes(source["skin"])
+    tolerances = {name: value for name, value in skin.items() if name.startswith(f"{_TOLERANCES}.")}
+    skin = {name: value for name, value in skin.items() if name not in tolerances}
+    if tolerances:
+        skin[_TOLERANCES] = {name.removeprefix(f"{_TOLERANCES}."): value for name, value in tolerances.items()}
     if "sensors" in source["skin"]:
         columns = [_entries(source["skin/sensors"], name) for name in ("id", "x_mm", "y_mm")]
         skin["sensors"] = [dict(zip(("id", "x_mm", "y_mm"), row, strict=True)) for row in zip(*columns, strict=True)]

@@ -6,9 +6,9 @@ many. Comments at the ends of rows are left out. Source of the format: "Specific
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import BinaryIO
 
 import numpy as np
@@ -19,6 +19,10 @@ from underskin.recordings.readers import text
 
 MAGIC = "LabVIEW Measurement"
 _END_OF_HEADER = "***End_of_Header***"
+_OF_EACH_CHANNEL = ("Samples", "Delta_X", "Date", "Time", "X_Dimension")  # rows of a header that name all channels
+_LEAST_STEP_S = 1e-12
+_SAME_START_S = 1e-6
+_LATEST_S = 1e10  # LabVIEW counts seconds from 1904
 _MOST_EMPTY = 10  # parts of channels for each number that there is
 _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
@@ -96,16 +100,46 @@ class _Reader:
         count = self._count(segment)
         decimal = self.decimal or ("," if self._has_decimal_commas(segment) else ".")
         step = 2 if self.x_columns == "Multi" else 1
+        if step == 2:
+            segment.header = _without_gaps(segment.header)
         names = [*segment.names, *[""] * (1 + step * count)]
+        starts = self._starts(segment, count)
         channels = [
             Channel(
                 names[1 + step * channel] or f"channel {channel + 1}",
                 _entry(segment, "Y_Unit_Label", channel),
                 np.array(values, dtype=np.float64),
+                self._rate(segment, channel),
+                starts[channel],
             )
             for channel, values in enumerate(self._columns(segment, count, step, decimal))
         ]
         return self._acquisitions(segment, with_distinct_names(channels))
+
+    def _rate(self, segment: _Segment, channel: int) -> float | None:
+        """1/Delta_X of a channel over time."""
+        step = self._number(_entry(segment, "Delta_X", channel))
+        is_time = _entry(segment, "X_Dimension", channel) in ("Time", "")
+        return 1 / step if step is not None and _LEAST_STEP_S < step < _LATEST_S and is_time else None
+
+    def _starts(self, segment: _Segment, count: int) -> list[float]:
+        """When each channel begins after the first of them [s]: by X0, the first abscissa, and by Date and Time.
+
+        Raises FileError where both differ from channel to channel, and not alike.
+        """
+        channels = range(count)
+        by_abscissa = _after_first([self._number(_entry(segment, "X0", channel)) for channel in channels])
+        moments = [_moment(_entry(segment, "Date", channel), _entry(segment, "Time", channel)) for channel in channels]
+        stamps = [
+            None if one is None else datetime.fromisoformat(one).replace(tzinfo=UTC).timestamp() for one in moments
+        ]
+        by_clock = _after_first(stamps)
+        if any(by_abscissa) and any(by_clock) and not np.allclose(by_abscissa, by_clock, atol=_SAME_START_S):
+            worst = int(np.argmax(np.abs(np.subtract(by_abscissa, by_clock))))
+            by_x, by_time = by_abscissa[worst], by_clock[worst]
+            reason = f"channel {worst + 1} begins {by_x:g} s after the first by X0, and {by_time:g} s by Date and Time"
+            raise FileError(self.file, f"line {segment.rows[0][0]}" if segment.rows else "a segment", reason)
+        return by_abscissa if any(by_abscissa) else by_clock
 
     def _count(self, segment: _Segment) -> int:
         stated = _entry(segment, "Channels", 0)
@@ -132,16 +166,14 @@ class _Reader:
                     raise FileError(self.file, place, f"{cell[:40]!r} is no number here")
         return columns
 
-    def _step(self, cell: str) -> float | None:
-        """A step of the abscissa: the decimal mark is its own where the header names none."""
+    def _number(self, cell: str) -> float | None:
+        """A number of the header: the decimal mark is its own where the header names none."""
         return text.number(cell, self.decimal or ("," if "," in cell else "."))
 
     def _acquisitions(self, segment: _Segment, channels: tuple[Channel, ...]) -> list[Block]:
         """The channels cut into runs of the stated number of samples."""
-        steps = {_entry(segment, "Delta_X", channel) for channel in range(len(channels))}
-        step = self._step(steps.pop()) if len(steps) == 1 else None
-        is_time = _entry(segment, "X_Dimension", 0) in ("Time", "")
-        rate = 1 / step if step is not None and step > 1e-12 and is_time else None
+        rates = {channel.sample_rate_hz for channel in channels}
+        rate = rates.pop() if len(rates) == 1 else None
         samples = {_entry(segment, "Samples", channel) for channel in range(len(channels))}
         stated = samples.pop() if len(samples) == 1 else ""
         length = max(len(channel.values) for channel in channels)
@@ -154,9 +186,22 @@ class _Reader:
             self.warnings.append(f"the last acquisition was interrupted after {length % run} of {run} samples")
         began = _moment(_entry(segment, "Date", 0), _entry(segment, "Time", 0)) or self.began
         return [
-            Block("", tuple(Channel(c.name, c.unit, c.values[start : start + run]) for c in channels), rate, began)
+            Block("", tuple(replace(one, values=one.values[start : start + run]) for one in channels), rate, began)
             for start in range(0, length, run or 1)
         ]
+
+
+def _without_gaps(header: dict[str, list[str]]) -> dict[str, list[str]]:
+    """The header of channels that each have a column of abscissae, without the empty cells above these; as it is where
+    a writer left no cells for them."""
+    filled = next((cells for name in _OF_EACH_CHANNEL if any(cells := header.get(name, [])[1:])), [])
+    return header if filled and filled[0] else {name: cells[::2] for name, cells in header.items()}
+
+
+def _after_first(times: Sequence[float | None]) -> list[float]:
+    """Times after the earliest; 0 for one that is not known."""
+    known = [time for time in times if time is not None and abs(time) < _LATEST_S]
+    return [time - min(known) if time is not None and abs(time) < _LATEST_S else 0.0 for time in times]
 
 
 def _entry(segment: _Segment, name: str, channel: int) -> str:

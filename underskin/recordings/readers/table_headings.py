@@ -13,7 +13,7 @@ from underskin.errors import FileError
 from underskin.recordings.readers import text
 from underskin.recordings.readers.cell_bytes import BLANKS
 from underskin.recordings.readers.table_rows import Table, split, uncommented
-from underskin.recordings.readers.unit_labels import labelled_unit, unit
+from underskin.recordings.readers.unit_labels import labelled_unit, unit, without_brackets
 
 _LABEL = re.compile(
     r"(?P<units>units?|einheit(en)?)\s*[:=]\s*|((column|channel|field|heading|header|(fancy)?name)s?|spalten?)\s*[:=]\s*",
@@ -21,8 +21,7 @@ _LABEL = re.compile(
 )
 _WIDE_BLANKS = re.compile(r"\t|\s{2,}")
 _WITH_UNITS = re.compile(r"[^\s\[(]+(?:\s*[\[(][^\])]*[\])])?")  # Load (uN)
-_BRACKETS = "[]() "
-_NO_UNITS = ("", "-", "–", "1", "%", "°", "°C", "K", "#", "a.u.", "n/a")
+_NO_UNITS = ("", "-", "–", "1", "%", "°C", "K", "#", "a.u.", "n/a")
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class _Candidate:
         return self.label == "names" or any(unit(labelled_unit(cell)) is not None for cell in self.cells)
 
     def is_units(self) -> bool:
-        units = [cell.strip(_BRACKETS) for cell in self.cells]
+        units = [without_brackets(cell) for cell in self.cells]
         known = sum(unit(cell) is not None for cell in units)
         others = sum(cell not in _NO_UNITS for cell in units) - known
         states_values = any("=" in cell or ":" in cell for cell in units)  # k=3 N/m
@@ -60,16 +59,16 @@ def find(lines: Sequence[str], table: Table, file: str) -> Headings:
     candidates = list(_candidates(lines, table))
     units = next((one for one in candidates if one.is_units()), None)
     names = _names([one for one in candidates if one is not units and _full(one, table)], units, table)
-    if names is None:
-        names, units = units if units is not None and _full(units, table) else None, None
+    if names is None:  # a line of units alone names the columns as well
+        names = units if units is not None and _full(units, table) else None
     if names is None:
         return Headings([(f"column {number}", "") for number in range(1, table.width + 1)])
-    said = [""] * table.width if units is None else [cell.strip(_BRACKETS) for cell in _padded(units.cells, table)]
+    said = [""] * table.width if units is None else [without_brackets(cell) for cell in _padded(units.cells, table)]
     headings = [
         (name or f"column {number}", by_row or labelled_unit(name))
         for number, (name, by_row) in enumerate(zip(_padded(names.cells, table), said, strict=True), start=1)
     ]
-    return Headings(headings, tuple(one.line for one in (names, units) if one is not None))
+    return Headings(headings, tuple(dict.fromkeys(one.line for one in (names, units) if one is not None)))
 
 
 def _names(candidates: Sequence[_Candidate], units: _Candidate | None, table: Table) -> _Candidate | None:
@@ -84,7 +83,7 @@ def _names(candidates: Sequence[_Candidate], units: _Candidate | None, table: Ta
 def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
     """The lines above the numbers with as many cells as these have columns, the nearest first.
 
-    One with numbers among its cells is none, unless nothing stands between it and the numbers.
+    One with numbers among its cells is none, unless nothing stands between it and the numbers but a line of units.
     """
     nearest = True
     for index in range(table.start - 1, -1, -1):
@@ -98,7 +97,9 @@ def _candidates(lines: Sequence[str], table: Table) -> Iterator[_Candidate]:
             candidate = _Candidate(index, cells, said)
             if nearest or not _holds_number(candidate, table):
                 yield candidate
-        nearest = False
+            nearest = nearest and candidate.is_units()
+        else:
+            nearest = False
 
 
 def _cells(line: str, table: Table) -> Sequence[str] | None:

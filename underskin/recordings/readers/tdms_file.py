@@ -7,6 +7,7 @@ one without length, or shorter than it says: what comes before is read, with a w
 import io
 import struct
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any, BinaryIO
 
@@ -19,6 +20,7 @@ from underskin.recordings.channels import FIRST_YEAR, Block, Channel, Contents, 
 
 MAGIC = b"TDSm"
 _LEAD_IN = 28
+_LEAST_STEP_S, _LONGEST_S = 1e-12, 1e8  # from a picosecond to three years
 _BIG_ENDIAN = 1 << 6  # in the table of contents of a segment
 
 
@@ -61,17 +63,29 @@ def _whole_segments(stream: BinaryIO, file: str) -> tuple[int, list[str]]:
 
 
 def _block(group: TdmsGroup, about_file: Mapping[str, Any], file: str) -> Block:
-    channels = [channel for channel in group.channels() if channel.dtype.kind in "iufc" and len(channel) > 0]
-    steps = {channel.properties.get("wf_increment") for channel in channels} - {None, 0}
-    step = steps.pop() if len(steps) == 1 else None
-    rate = 1 / step if isinstance(step, float) and step > 0 else None
-    starts = [channel.properties.get("wf_start_time") for channel in channels]
-    moments = [_moment(given) for given in (*starts, group.properties.get("DateTime"), about_file.get("DateTime"))]
-    began = next((moment for moment in moments if moment is not None), None)
-    return Block(group.name, with_distinct_names([_channel(channel, file) for channel in channels]), rate, began)
+    stored = [channel for channel in group.channels() if channel.dtype.kind in "iufc" and len(channel) > 0]
+    starts = [_start(channel) for channel in stored]
+    known = [start for start in starts if start is not None]
+    channels = [
+        replace(_channel(channel, file), starts_s=(start - min(known)).total_seconds() if start is not None else 0.0)
+        for channel, start in zip(stored, starts, strict=True)
+    ]
+    rates = {channel.sample_rate_hz for channel in channels} - {None}
+    rate = rates.pop() if len(rates) == 1 else None
+    others = (_moment(given) for given in (group.properties.get("DateTime"), about_file.get("DateTime")))
+    began = min(known) if known else next((moment for moment in others if moment is not None), None)
+    return Block(group.name, with_distinct_names(channels), rate, None if began is None else _iso(began))
 
 
-def _moment(given: Any) -> str | None:
+def _start(channel: TdmsChannel) -> datetime | None:
+    """When a waveform's first sample was taken: its start, and the offset from it."""
+    start, offset = _moment(channel.properties.get("wf_start_time")), channel.properties.get("wf_start_offset", 0.0)
+    if start is None or not isinstance(offset, int | float) or not abs(offset) < _LONGEST_S:
+        return start
+    return start + timedelta(seconds=float(offset))
+
+
+def _moment(given: Any) -> datetime | None:
     """A time stamp, which TDMS keeps in UTC; None where it is none, or of a clock that was not set."""
     if not isinstance(given, TdmsTimestamp):
         return None
@@ -79,13 +93,20 @@ def _moment(given: Any) -> str | None:
         moment = datetime(1904, 1, 1, tzinfo=UTC) + timedelta(seconds=given.seconds + given.second_fractions / 2**64)
     except OverflowError:
         return None
-    return moment.isoformat().replace("+00:00", "Z") if moment.year >= FIRST_YEAR else None
+    return moment if moment.year >= FIRST_YEAR else None
+
+
+def _iso(moment: datetime) -> str:
+    return moment.isoformat().replace("+00:00", "Z")
 
 
 def _channel(channel: TdmsChannel, file: str) -> Channel:
     with damage_said(file, f"channel {channel.path}", lambda error: f"cannot be read: {type(error).__name__}: {error}"):
-        values = np.asarray(channel[:])
-        return Channel(channel.name, str(channel.properties.get("unit_string", "")), as_values(values))
+        values, about = np.asarray(channel[:]), channel.properties
+        step = about.get("wf_increment")
+        rate = 1 / step if isinstance(step, float) and _LEAST_STEP_S < step < _LONGEST_S else None
+        label = str(about.get("unit_string") or about.get("NI_UnitDescription") or "")
+        return Channel(channel.name, label, as_values(values), rate)
 
 
 def _properties(prefix: str, properties: Mapping[str, Any]) -> dict[str, str | float]:

@@ -1,0 +1,172 @@
+"""Units in a file that contradict those of the rig description, in any format; and synonyms that do not."""
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from nptdms import ChannelObject, TdmsWriter
+
+from tests.support.campaign_documents import FRF, document
+from tests.support.instrument_files import COMMON
+from underskin.errors import FileError
+from underskin.recordings import read_file, rig_description
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.readers.unit_labels import labelled_unit, meanings, unit
+from underskin.recordings.reading import Reading
+from underskin.recordings.rig_description import RigDescription
+
+FORCE, CHARGE = np.array([1.0, 1.5, 0.5, 1.0]), np.array([0.0, 3.5, -3.5, 0.5])
+
+
+def rig(force: dict[str, Any], charge: dict[str, Any] | None = None, **more: Any) -> RigDescription:
+    channels = {"force_n": force, "charge_pc": charge or {"channel": "Charge", "unit": "pC"}}
+    common = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": {**COMMON, "sample_rate_hz": 1000}}
+    return rig_description.from_dict({**common, "channels": channels, **more})
+
+
+def table(force: str, above: str = "") -> bytes:
+    rows = "\n".join(f"{f:g};{q:g}" for f, q in zip(FORCE, CHARGE, strict=True))
+    return f"{force};Charge\n{above}{rows}\n".encode()
+
+
+def lvm(label: str) -> bytes:
+    head = "LabVIEW Measurement\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\n\nChannels\t2\n"
+    head += f"Y_Unit_Label\t{label}\tpC\nX_Dimension\tTime\tTime\nDelta_X\t0.001\t0.001\n***End_of_Header***\nX_Value\t"
+    return (head + "Force\tCharge\n" + "".join(f"\t{f}\t{q}\n" for f, q in zip(FORCE, CHARGE, strict=True))).encode()
+
+
+def tdms(name: str, label: str) -> bytes:
+    buffer = io.BytesIO()
+    with TdmsWriter(buffer) as writer:
+        force = ChannelObject("run", name, FORCE, {"unit_string": label, "wf_increment": 1e-3})
+        writer.write_segment(
+            [force, ChannelObject("run", "Charge", CHARGE, {"unit_string": "pC", "wf_increment": 1e-3})]
+        )
+    return buffer.getvalue()
+
+
+def force_of(reading: Reading) -> Any:
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    return recording.force_n
+
+
+@pytest.mark.parametrize(
+    ("label", "stated"),
+    [
+        ("lbs", "N"), ("mN", "N"), ("kgf", "N"), ("Millinewton", "N"), ("MN", "mN"), ("дин. Н", "mN"), ("牛", "mN"),
+        ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"), ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
+    ],
+)  # fmt: skip
+def test_a_label_that_contradicts_the_rig_is_refused(label: str, stated: str) -> None:
+    """In a heading, in a row of units and as an instrument's own label; both are named."""
+    label = label.removeprefix("дин. ")
+    said = rf"is labelled '{label}', but the rig description says '{stated}'"
+    force = {"channel": "Force", "unit": stated}
+    for data, name in (
+        (table(f"Force ({label})"), "a.csv"),
+        (table("Force", f"{label};pC\n"), "a.csv"),
+        (lvm(label), "a.lvm"),
+    ):
+        with pytest.raises(FileError, match=said):
+            read_file(data, name, rig(force))
+    in_formula = rig({"channel": "load"}, derived={"load": f"2 * Force [{stated}]"})
+    with pytest.raises(FileError, match=rf"is labelled '{label}', but the formula says '{stated}'"):
+        read_file(table(f"Force ({label})"), "a.csv", in_formula)
+    reading = read_file(table(f"Force ({label})"), "a.csv", rig({**force, "labelled": label}))
+    np.testing.assert_allclose(force_of(reading), FORCE * (1 if stated == "N" else 1e-3))
+
+
+@pytest.mark.parametrize(
+    "label", ["left", "tared", "raw data", "Kanal 1", "na", "-", "%", "a.u.", "ch. 3", "N/A", "#2"]
+)
+def test_a_label_that_is_no_unit_refuses_nothing(label: str) -> None:
+    reading = read_file(table(f"Force ({label})"), "a.csv", rig({"channel": "Force", "unit": "N"}))
+    np.testing.assert_allclose(force_of(reading), FORCE)
+
+
+@pytest.mark.parametrize(
+    ("label", "newtons"),
+    [
+        ("Newtons", 1.0), ("newton", 1.0), ("lbs", 4.4482216), ("lbf", 4.4482216), ("millinewtons", 1e-3),
+        ("kgf", 9.80665), ("N peak", 1.0), ("in N", 1.0), ("Н", 1.0), ("KN", 1e3), ("oz", 0.27801385),
+    ],
+)  # fmt: skip
+def test_words_and_abbreviations_are_units(label: str, newtons: float) -> None:
+    reading = read_file(table(f"Force ({label})"), "a.csv", rig({"channel": "Force"}))
+    np.testing.assert_allclose(force_of(reading), FORCE * newtons, rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("Volts", "V"), ("sec", "s"), ("Sekunden", "s"), ("(pC)/N", "pC/N"), ("pC per N", "pC/N"), ("pC·N^-1", "pC/N"),
+        ("picocoulombs per newton", "pC/N"), ("N/mm²", "MPa"), ("µm", "um"), ("msec", "ms"), ("degrees", "deg"),
+        ("Volt", "V"), ("kHZ", "kHz"), ("psi", "lbf/in2"), ("inches", "in"), ("мм", "mm"), ("usec", "µs"),
+    ],
+)  # fmt: skip
+def test_synonyms_are_one_unit(one: str, other: str) -> None:
+    if other != "lbf/in2":
+        assert unit(other) is not None
+        assert meanings(one) == (unit(other),)
+    else:
+        assert unit(one) is not None
+
+
+def test_letters_of_no_unit_have_every_meaning_of_them() -> None:
+    """MHZ may be mHz or MHz: it contradicts neither, and alone it says nothing."""
+    assert {known.to_si for known in meanings("MHZ")} == {1e-3, 1e6}
+    assert unit("MHZ") is None
+    assert unit("MPA") == unit("MPa")
+
+
+@pytest.mark.parametrize(
+    ("heading", "label"),
+    [
+        ("Force [lbs] (filtered)", "lbs"), ("Force lbs", "lbs"), ("Kraft / mN", "mN"), ("Load: N", "N"),
+        ("FRF dB", "dB"), ("|H| dB re 1 pC/N", "dB"), ("Magnitude_dB", "dB"), ("FRF pC/N", "pC/N"),
+        ("Channel A", ""), ("Force max", ""),
+        ("Load min", ""), ("Sensor C", ""), ("Mag ((pC)/N)", "(pC)/N"), ("Time in sec", "sec"),
+    ],
+)  # fmt: skip
+def test_a_heading_says_its_unit(heading: str, label: str) -> None:
+    assert labelled_unit(heading) == label
+
+
+SPECTRUM = "Frequency (Hz);{};Phase ({})\n" + "\n".join(f"{5 * n};{17.4 + 0.01 * n};-0.1" for n in range(1, 9))
+
+
+def spectrum(heading: str, angle: str = "deg", **unit_of: str) -> Reading:
+    channels = {
+        "frequency_hz": {"channel": "Frequency"},
+        "frf_magnitude_pc_per_n": {"channel": heading.partition(" (")[0], "unit": unit_of.get("magnitude", "pC/N")},
+        "frf_phase_deg": {"channel": "Phase", **({"unit": unit_of["phase"]} if "phase" in unit_of else {})},
+    }
+    common = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "channels": channels}
+    return read_file(
+        SPECTRUM.format(heading, angle).replace(";17.", f";{unit_of.get('sign', '')}17.").encode(),
+        "frf.csv",
+        rig_description.from_dict(common),
+    )
+
+
+def test_decibels_are_refused() -> None:
+    """As a label beside a stated unit, as a unit, and where a magnitude is below 0."""
+    for heading in ("Magnitude (dB)", "Magnitude (dB re 1 pC/N)", "Gain dB", "Magnitude (decibels)"):
+        with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'pC/N'"):
+            spectrum(heading)
+    with pytest.raises(FileError, match="decibels are a logarithm"):
+        spectrum("Magnitude (dB)", magnitude="dB")
+    with pytest.raises(FileError, match="below 0, as no magnitude is: decibels"):
+        spectrum("Magnitude", sign="-")
+
+
+def test_a_phase_in_other_angles_is_refused() -> None:
+    with pytest.raises(FileError, match="is labelled 'rad', but the rig description says 'deg'"):
+        spectrum("Magnitude (pC/N)", "rad", phase="deg")
+    reading = spectrum("Magnitude (pC/N)", "radians")
+    (recording,) = reading.campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    assert recording.frf_im_pc_per_n is not None
+    assert recording.frf_im_pc_per_n[0] == pytest.approx(17.41 * np.sin(-0.1))

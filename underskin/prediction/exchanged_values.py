@@ -1,0 +1,41 @@
+"""Preloads and spheres that look exchanged: loads beyond what a skin bears, which all come within once they are.
+
+Contact radius and depth go with F R, which an exchange of the numbers of F [N] and R [mm] leaves as it is; the load
+parameter L = F/(R² E) tells.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.physics import hertz
+from underskin.recordings.campaign import FrfRecording
+from underskin.recordings.conditions import SkinDescription
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, Mask, to_si
+
+_BEYOND = 0.5  # of the recordings as declared, at the least
+_WITHIN = 0.9  # of the recordings once exchanged, at the least
+_LARGEST_MM = 30.0  # radius of a ball that a laboratory has: beyond it a preload in mN is likelier
+
+
+def exchanged_values(skin: SkinDescription, recorded: Sequence[FrfRecording], table: SigmaTable) -> list[Finding]:
+    """That preload and sphere of the recordings look exchanged, if they do."""
+    if not recorded or skin.youngs_modulus_mpa is None:
+        return []
+    modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
+    preload = np.array([entry.preload_n for entry in recorded])
+    radius_mm = np.array([entry.indenter_radius_mm for entry in recorded])
+
+    def beyond(force: Floats, sphere_mm: Floats) -> Mask:
+        load = hertz.load_parameter(force, to_si("indenter_radius_mm", sphere_mm), modulus)
+        return np.asarray(load > table.domain["load_parameter"][1])
+
+    as_declared = beyond(preload, radius_mm)
+    as_exchanged = ~beyond(radius_mm, preload) & (preload < _LARGEST_MM)
+    if as_declared.mean() < _BEYOND or as_exchanged.mean() < _WITHIN:
+        return []
+    arguments = {"beyond": int(as_declared.sum()), "recordings": len(recorded)}
+    return [Finding(Reason.PRELOAD_AND_RADIUS_EXCHANGED, "", "preload_n", arguments)]
