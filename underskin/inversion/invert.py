@@ -30,6 +30,7 @@ from underskin.recordings.frf.band_halves import lower_half
 from underskin.recordings.frf.estimation import Frf, lines_of
 from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
 from underskin.recordings.frf.stacks import stacked
+from underskin.recordings.physical_limits import excesses
 from underskin.recordings.plausibility import implausible
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
@@ -129,6 +130,8 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
+    for excess in excesses(campaign.skin):
+        raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
     measured, recorded, left_out = _measured(recorded)
     if not recorded:
         raise _none_usable(campaign, left_out)
@@ -180,6 +183,11 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     """The FRF of each recording that has one, those recordings, and findings on the others."""
     frfs, with_frf, left_out = [], [], []
     for recording in recorded:
+        beyond = next((excess for excess in excesses(recording) if not excess.is_faint), None)
+        if beyond is not None:
+            arguments = {"largest": beyond.largest, "low": beyond.low, "high": beyond.high}
+            left_out.append(Finding(Reason.IMPOSSIBLE_RECORDING, recording.id, beyond.field, arguments))
+            continue
         try:
             frfs.append(lines_of(recording))
             with_frf.append(recording)
