@@ -67,7 +67,7 @@ class Excess:
     @property
     def error(self) -> InvalidInput:
         """As the refusal of the field."""
-        allowed = f"must be {self.low:g} to {self.high:g} in magnitude: there is nothing beyond"
+        allowed = f"must be {self.low:g} to {self.high:g} in magnitude: no skin and no instrument is beyond"
         return out_of_range(self.field, self.largest, allowed)
 
 

@@ -16,7 +16,7 @@ from tests.support.store_server import campaign
 from underskin.recordings.campaign import Campaign, FrfRecording, IndentationRecording, parse
 
 FIRST, LAST = "0001-01-01T00:00:00Z", "9999-12-31T23:59:59.999999Z"
-NUMBERS = (1e300, -1e300, 1e-300, 1e154, 1e20)
+BEYOND = (1e300, -1e300, 1e-300)
 DATES = (FIRST, LAST, "0001-01-01T00:00:00+14:00", "1000-01-01", "8999-12-31T23:59:59.999999-12:00")
 ZONES = ("America/New_York", "Europe/Rome")
 PAGES = (
@@ -40,28 +40,31 @@ def document(name: str = "extreme") -> dict[str, Any]:
 
 
 def mutated() -> list[dict[str, Any]]:
-    """Campaigns each with one field made extreme, or with all dates so."""
+    """Campaigns with one field beyond all bounds, with many at their bounds, and with extreme dates."""
     made: list[dict[str, Any]] = []
-    for number in NUMBERS:
+
+    def another(name: str) -> dict[str, Any]:
+        made.append(document(name))
+        return made[-1]
+
+    for number in BEYOND:
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "d33_pc_per_n"):
-            made.append(document(f"{field} {number}"))
-            made[-1]["skin"][field] = number
-        for field in ("indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s"):
-            made.append(document(f"{field} {number}"))
-            made[-1]["recordings"][0][field] = number
-        for field in ("frf_re_pc_per_n", "frf_im_pc_per_n"):
-            made.append(document(f"{field} {number}"))
-            made[-1]["recordings"][0][field][0] = number
-        for field in ("displacement_mm", "force_n"):
-            made.append(document(f"{field} {number}"))
-            made[-1]["recordings"][-1][field][7] = number
-        made.append(document(f"place {number}"))
-        made[-1]["recordings"][0]["position_mm"] = [number, 0.0]
-        made.append(document(f"noted {number}"))
-        made[-1]["recordings"][0]["conditions"] = {"temperature": number}
-    for date in DATES:
-        made.append(document(f"date {date}"))
-        for entry in made[-1]["recordings"][:3]:
+            another(f"{field} {number}")["skin"][field] = number
+        for field in ("indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s", "frf_re_pc_per_n"):
+            entry = another(f"{field} {number}")["recordings"][0]
+            entry[field] = [number] * 6 if field == "frf_re_pc_per_n" else number
+    for size, skin in ((1e6, 1e6), (1e-9, 1e-9), (1e6, 2.0), (1e-9, 2.0)):
+        edge = another(f"at the bounds {size} {skin}")
+        edge["skin"] |= {"thickness_mm": skin, "sensor_radius_mm": skin}
+        edge["skin"]["sensors"][1] = {"id": "s1", "x_mm": -size, "y_mm": size}
+        for entry in edge["recordings"][:2]:
+            entry |= {"indenter_radius_mm": size, "preload_n": 10 * size, "dynamic_force_n": 10 * size, "dwell_s": 1e12}
+            entry |= {"frf_re_pc_per_n": [-1e9, 1e9, 1e-9, 0.0, 1e-300, 1.0], "position_mm": [size, -size]}
+            entry["conditions"] = {"temperature": -1e20, "humidity": 1e-300}
+        edge["recordings"][-1] |= {"displacement_mm": [size * place / 40 for place in range(40)]}
+    for number, date in enumerate(DATES):
+        dated = another(f"date {date}")
+        for entry in dated["recordings"][: 3 if number else 5]:
             entry["recorded_at"] = date
     return made
 
@@ -83,15 +86,15 @@ async def failures(service: InProcess, kept: Sequence[tuple[str, str]]) -> list[
 def test_every_page_of_what_is_sent_is_answered(zone: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each number or date is refused by recording and field, or every page of it is answered."""
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
-    documents = mutated()
+    documents = [one for one in mutated() if zone == ZONES[0] or one["name"].startswith("date")]
 
     async def sent(service: InProcess) -> list[tuple[str, str]]:
         kept = []
         async with service.client() as client:
             for number, one in enumerate(documents):
                 answer = await client.post(f"/v1/campaigns?skin=skin{number}", json=one)
-                assert answer.status_code == 201, answer.text
-                if answer.json()["id"] is not None:
+                assert answer.status_code in (201, 422), answer.text
+                if answer.status_code == 201:
                     kept.append((answer.json()["id"], f"skin{number}"))
         return kept
 
@@ -101,7 +104,7 @@ def test_every_page_of_what_is_sent_is_answered(zone: str, tmp_path: Path, monke
 
     with in_process(tmp_path) as service:
         count, failed = asyncio.run(both(service))
-    assert count > len(documents) // 3
+    assert count >= 5
     assert failed == []
 
 
@@ -142,7 +145,7 @@ def test_every_page_of_what_was_kept_is_answered(zone: str, tmp_path: Path, monk
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
     with in_process(tmp_path) as service:
         kept = []
-        for number, one in enumerate(kept_before()):
+        for number, one in enumerate(kept_before()[: None if zone == ZONES[0] else 3]):
             arrival = campaigns.NewCampaign(one, f"skin{number}")
             campaign_id, _ = service.store.write(campaigns.add, arrival)
             kept.append((campaign_id, f"skin{number}"))
