@@ -89,7 +89,11 @@ def create_api(settings: Settings, table: SigmaTable, access: AccessControl, sto
     api.state.store = store
     memory_bytes = int(settings.diagnosis_memory_mb * 1e6)
     processes = WorkerProcesses(
-        settings.tables / SIGMA_TABLE, table.sha256, memory_bytes, keeps_ready=settings.diagnosis_ready
+        settings.tables / SIGMA_TABLE,
+        table.sha256,
+        memory_bytes,
+        settings.diagnosis_seconds,
+        keeps_ready=settings.diagnosis_ready,
     )
     metrics.watch_disk(settings.data)
     api.state.runner = Runner(store, processes, settings.diagnosis_workers)

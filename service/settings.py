@@ -85,6 +85,13 @@ class Settings(BaseSettings):
         le=1e6,
         description="Memory that one diagnosis may take, in MB (10^6 bytes); one that needs more fails.",
     )
+    diagnosis_seconds: float = Field(
+        default=1800.0,
+        ge=1,
+        le=1e6,
+        description="Seconds on a processor that one diagnosis may take, and five times as many by the clock; one that "
+        "needs more fails.",
+    )
     diagnosis_ready: bool = Field(
         default=True,
         description="Whether a process with the program loaded waits to fork the next diagnosis (some 200 MB of "

@@ -78,7 +78,11 @@ def _of_workers(settings: Settings, *, has_tables: bool) -> Observation:
     path = settings.tables / SIGMA_TABLE
     try:
         processes = WorkerProcesses(
-            path, load_table(path).sha256, int(settings.diagnosis_memory_mb * 1e6), keeps_ready=False
+            path,
+            load_table(path).sha256,
+            int(settings.diagnosis_memory_mb * 1e6),
+            settings.diagnosis_seconds,
+            keeps_ready=False,
         )
         with processes.at_work([Given(json.dumps(_TRIAL).encode(), "trial")]) as worker:
             while not worker.ended and worker.news.wait(_LIMIT_S):

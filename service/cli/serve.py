@@ -65,6 +65,8 @@ def serve(
     configure_logging()
     if unknown := unknown_settings():
         logger.warning("nothing reads %s (docs/settings.md lists what is read)", ", ".join(unknown))
+    for refusal in CATALOGUE.refused:
+        logger.warning("a mechanism of the lab's own cannot be used: %s", refusal)
     address = f"http://{_host_name(host)}:{listener.getsockname()[1]}"
     typer.echo(f"underskin serves on {address}, with its data in {settings.data} (Ctrl+C ends it)")
     access = AccessControl(

@@ -24,6 +24,7 @@ from underskin.recordings.readers import json_file
 _INHERITED = ("PATH", "LD_LIBRARY_PATH", "TMPDIR", "UNDERSKIN_MECHANISMS", "UNDERSKIN_TIME_ZONE")
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _LAST_WORDS = 2000
+_WAIT_TIMES = 5  # as long by the clock as on a processor: a busy machine is no reason to end a diagnosis
 _LOADING_S = (
     300.0  # within which a fork server must have loaded everything: 4 s, at low priority on a busy machine far more
 )
@@ -143,9 +144,13 @@ class WorkerProcesses:
     """Workers for jobs. Their fork server starts with the first one, or when it is to be ready, and goes on until
     `stop` or, where none is to be kept ready, until the last worker has ended."""
 
-    def __init__(self, table: Path, table_sha256: str, memory_bytes: int, *, keeps_ready: bool) -> None:
-        """`memory_bytes`: what a job may take beyond its program."""
+    def __init__(
+        self, table: Path, table_sha256: str, memory_bytes: int, cpu_seconds: float, *, keeps_ready: bool
+    ) -> None:
+        """`memory_bytes`: what a job may take beyond its program; `cpu_seconds`: on a processor."""
         self.table_sha256 = table_sha256
+        self.longest_s = _WAIT_TIMES * cpu_seconds
+        self._cpu_seconds = cpu_seconds
         self._table = table
         self._memory_bytes = memory_bytes
         self._keeps_ready = keeps_ready
@@ -169,7 +174,7 @@ class WorkerProcesses:
     ) -> "Worker":
         """A worker at its job, on campaigns; see `Job`."""
         parts = [Part(one.skin_id, len(one.document), one.excluded) for one in campaigns]
-        job = Job(parts, self.table_sha256, self._memory_bytes, limits, without, kind, name)
+        job = Job(parts, self.table_sha256, self._memory_bytes, self._cpu_seconds, limits, without, kind, name)
         content = [one.document for one in campaigns]
         with self._lock:
             try:
@@ -215,6 +220,7 @@ class Worker:
         self.said: dict[str, Any] = {"progress": 0.0}  # the latest of each message, by its name
         self.news = threading.Event()
         self.ended = False
+        self.too_long = f"it takes more than {job.cpu_seconds:g} s on a processor (UNDERSKIN_DIAGNOSIS_SECONDS)"
         self._process, self._is_done = process, is_done
         self._code: int | None = None
         threading.Thread(target=self._send, args=(job, documents), daemon=True).start()
@@ -237,6 +243,8 @@ class Worker:
             return str(self.said["error"])
         if self._code is None:
             return "its process ended with the one that had started it"
+        if self._code == -signal.SIGXCPU:
+            return self.too_long
         if self._code < 0:
             return f"its process was killed by signal {-self._code}; where nobody did that, memory was short"
         last = self.last_words.strip().splitlines()[-1:]

@@ -3,8 +3,9 @@
 import logging
 import secrets
 import threading
+import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sqlalchemy.exc import SQLAlchemyError
@@ -13,7 +14,7 @@ from service.jobs.process import Given, Worker, WorkerProcesses
 from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
-from underskin.mechanisms.declared.document import digest
+from underskin.mechanisms.declared.folder import digest
 from underskin.recordings.shown_values import LONGEST_NAME
 
 logger = logging.getLogger("underskin")
@@ -21,6 +22,8 @@ logger = logging.getLogger("underskin")
 _POLL_S = 2.0  # how often the queue is looked at: another server may have put something in
 _BEAT_S = 2.0  # how often a running one is kept alive and its progress kept
 _JOIN_S = 10.0
+_LONG_S = 30.0  # from which on a diagnosis that runs holds up others no more
+_SHORT_S = 60.0  # within which one must end that runs beside as many long ones as there are workers
 _STORE_FAILED = (SQLAlchemyError, StorageFailed, StoreMoved, OSError)
 
 
@@ -31,11 +34,22 @@ def basis(table_sha256: str) -> diagnoses.Basis:
 
 @dataclass
 class _Job:
-    """A diagnosis in a thread of this server; without a worker while that starts."""
+    """A diagnosis in a thread of this server; without a worker while that starts.
+
+    One that is `aside` runs beside as many as there are workers, all of them long, and goes back into the queue where
+    it is long itself.
+    """
 
     row: AnyRow
     thread: threading.Thread
+    aside: bool
     worker: Worker | None = None
+    begun: float = field(default_factory=time.monotonic)
+
+    @property
+    def lasted_s(self) -> float:
+        """How long it runs."""
+        return time.monotonic() - self.begun
 
 
 class Runner:
@@ -50,6 +64,7 @@ class Runner:
         self._ending = threading.Event()
         self._stirred = threading.Event()
         self._jobs: dict[int, _Job] = {}  # by the diagnosis' number
+        self._long: set[int] = set()  # those that had to go back into the queue
         self._lock = threading.Lock()
         self._failure = LastingFailure(logger)
         self._dispatcher = threading.Thread(target=self._dispatch, name="diagnosing", daemon=True)
@@ -83,8 +98,8 @@ class Runner:
             for job in self._starting():
                 self._is_ours(job.row, 0.0)  # its thread cannot say so before there is a worker
             try:
-                while len(self._under_way()) < self._workers and (row := self._claim()) is not None:
-                    self._start(row)
+                while self._claim():
+                    pass
             except _STORE_FAILED as error:
                 self._failure.log("no diagnosis can be claimed", error)
             # Not while one starts: it may hold for minutes what this would wait for.
@@ -98,10 +113,10 @@ class Runner:
     def _starting(self) -> list[_Job]:
         return [job for job in self._under_way() if job.worker is None]
 
-    def _start(self, row: AnyRow) -> None:
+    def _start(self, row: AnyRow, *, aside: bool) -> None:
         thread = threading.Thread(target=self._job, args=(row,), name=row.id, daemon=True)
         with self._lock:
-            self._jobs[row.number] = _Job(row, thread)
+            self._jobs[row.number] = _Job(row, thread, aside)
         try:
             thread.start()
         except RuntimeError as error:  # the system has no room for a thread now
@@ -110,11 +125,20 @@ class Runner:
             self._release(row)
             raise OSError(str(error)) from error
 
-    def _claim(self) -> AnyRow | None:
-        own = [job.row.number for job in self._under_way()]
-        row = self._store.write(diagnoses.claim, self._server, basis(self._processes.table_sha256), own)
+    def _claim(self) -> bool:
+        """Start the next diagnosis, where there is one and a place for it: that of a worker, or, where all of those
+        have been at theirs for long, one aside, for the smallest."""
+        jobs = self._under_way()
+        aside = sum(not job.aside for job in jobs) >= self._workers
+        if aside and any(job.aside or job.lasted_s < _LONG_S for job in jobs):
+            return False
+        not_these = {job.row.number for job in jobs} | (self._long if aside else set())
+        claimed_with = basis(self._processes.table_sha256)
+        row = self._store.write(diagnoses.claim, self._server, claimed_with, not_these, smallest=aside)
         self._failure.is_over()
-        return row
+        if row is not None:
+            self._start(row, aside=aside)
+        return row is not None
 
     def _job(self, row: AnyRow) -> None:
         try:
@@ -135,11 +159,18 @@ class Runner:
         without = diagnoses.without(row)
         with self._processes.at_work(self._given(row), None, without, row.kind, row.name) as worker:
             with self._lock:
-                self._jobs[row.number].worker = worker
+                job = self._jobs[row.number]
+                job.worker, job.begun = worker, time.monotonic()
             while not worker.ended and not self._ending.is_set():
                 worker.news.wait(_BEAT_S)
                 worker.news.clear()
                 if not self._is_ours(row, worker.said["progress"]):
+                    return
+                if job.aside and job.lasted_s > _SHORT_S and not worker.ended:
+                    self._long.add(row.number)
+                    break
+                if job.lasted_s > self._processes.longest_s:
+                    self._end(row, diagnoses.fail, worker.too_long)
                     return
             if not worker.ended:
                 self._release(row)

@@ -7,6 +7,7 @@ whose runner is gone ends too. Standard output: a line of JSON for each progress
 campaign, one with its figures, or one with the plan where the job has limits of a rig, or one with the error.
 """
 
+import math
 import os
 import sys
 import threading
@@ -21,6 +22,7 @@ from service.schemas.diagnoses import DiagnosisKind
 
 if TYPE_CHECKING:
     from underskin.recordings.campaign import Campaign
+    from underskin.recordings.reading import Reading
     from underskin.surrogate.sigma_table import SigmaTable
 
 Say = Callable[[dict[str, Any]], None]
@@ -62,7 +64,8 @@ class Part:
 
 @dataclass(frozen=True)
 class Job:
-    """What a worker needs beside the campaigns: what each of them is, the table's hash, the memory that it may take.
+    """What a worker needs beside the campaigns: what each of them is, the table's hash, the memory and the time on a
+    processor that it may take.
 
     With `limits` (of `RigLimits`, by name) it plans the next experiment within them, and makes no report. Mechanisms
     `without` which it is to be explained are left out. Where it is of several campaigns, of one skin or of a fleet by
@@ -72,6 +75,7 @@ class Job:
     parts: Sequence[Part]
     table_sha256: str
     memory_bytes: int
+    cpu_seconds: float
     limits: dict[str, Any] | None = None
     without: Sequence[str] = ()
     kind: DiagnosisKind = "campaign"
@@ -133,40 +137,42 @@ def _work(job: Job, documents: Sequence[bytes], table: "SigmaTable", say: Say) -
     from underskin.errors import TableError
     from underskin.mechanisms.registry import CATALOGUE
     from underskin.parallel import limit_process
-    from underskin.recordings.campaign import parse
+    from underskin.recordings.campaign import from_dict
+    from underskin.recordings.reading import Reading
 
     if table.sha256 != job.table_sha256:
         raise TableError(f"{sys.argv[1]} changed since the server started: restart it")
     CATALOGUE.reload()  # the lab's own may have changed since the fork server loaded them
-    CATALOGUE.load()
-    limit_process(job.memory_bytes)
-    campaigns = [parse(_read(document)) for document in documents]
+    limit_process(job.memory_bytes, cpu_seconds=math.ceil(job.cpu_seconds))
+    readings = [Reading(*from_dict(_read(document)), []) for document in documents]  # an older server read otherwise
     if job.kind == "campaign":
-        _diagnose(job, campaigns[0], table, say)
+        _diagnose(job, readings[0], table, say)
     else:
-        say({"report": _with_left_out(job, _together(job, campaigns, table, say), campaigns)})
+        say({"report": _with_left_out(job, _together(job, readings, table, say), readings)})
 
 
-def _diagnose(job: Job, campaign: "Campaign", table: "SigmaTable", say: Say) -> None:
+def _diagnose(job: Job, reading: "Reading", table: "SigmaTable", say: Say) -> None:
     """One campaign; its figures come after the report, which is kept without them too."""
-    from underskin.diagnosis.pipeline import diagnose
+    from underskin.diagnosis.pipeline import diagnose, with_refused
     from underskin.diagnosis.planning.rig_limits import RigLimits
     from underskin.diagnosis.reporting.figures import figures
     from underskin.diagnosis.reporting.report import report
 
     limits = RigLimits(**job.limits or {})
-    diagnosis = diagnose(campaign, table, lambda share: say({"progress": share}), limits, job.without)
+    diagnosis = diagnose(reading.campaign, table, lambda share: say({"progress": share}), limits, job.without)
     if job.limits is not None:
         say({"plan": diagnosis.next_experiment})
         return
+    diagnosis = with_refused(diagnosis, reading.problems)
     document = report(diagnosis)
-    say({"report": _with_left_out(job, document, [campaign])})
+    say({"report": _with_left_out(job, document, [reading])})
     say({"figures": {name: figure.to_json() for name, figure in figures(diagnosis, document).items()}})
 
 
-def _together(job: Job, campaigns: "Sequence[Campaign]", table: "SigmaTable", say: Say) -> dict[str, Any]:
+def _together(job: Job, readings: "Sequence[Reading]", table: "SigmaTable", say: Say) -> dict[str, Any]:
     """The report of several campaigns of a skin, or of those of a fleet."""
     name = job.name or ""
+    campaigns = [reading.campaign for reading in readings]
 
     def progress(share: float) -> None:
         say({"progress": share})
@@ -183,16 +189,20 @@ def _together(job: Job, campaigns: "Sequence[Campaign]", table: "SigmaTable", sa
     return diagnose_fleet(skins, table, name, job.without, progress)
 
 
-def _with_left_out(job: Job, document: dict[str, Any], campaigns: "Sequence[Campaign]") -> dict[str, Any]:
-    """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name."""
+def _with_left_out(job: Job, document: dict[str, Any], readings: "Sequence[Reading]") -> dict[str, Any]:
+    """A report whose findings begin with the recordings that had been excluded; of several campaigns with its name, and
+    with those that are refused."""
+    from underskin.diagnosis.pipeline import refused
     from underskin.findings.codes import Reason
     from underskin.findings.finding import Finding
 
     left_out = [
-        (campaign.name, Finding(Reason.EXCLUDED, recording, "", {"excluded_for": reason}).in_report())
-        for part, campaign in zip(job.parts, campaigns, strict=True)
+        (reading.campaign.name, Finding(Reason.EXCLUDED, recording, "", {"excluded_for": reason}).in_report())
+        for part, reading in zip(job.parts, readings, strict=True)
         for recording, reason in part.excluded
     ]
+    if job.kind != "campaign":
+        left_out += [(one.campaign.name, entry.in_report()) for one in readings for entry in refused(one.problems)]
     said = [
         finding if job.kind == "campaign" else {**finding, "statement": f"{name}: {finding['statement']}"}
         for name, finding in left_out

@@ -62,7 +62,7 @@ _BODY: dict[str, Any] = {
 @router.get("/mechanisms", operation_id="mechanisms", summary="The catalogue of mechanisms")
 def listed() -> MechanismList:
     """Every mechanism that diagnoses know by name: underskin's, those of other packages, and the lab's own."""
-    return MechanismList(mechanisms=usecase.entries())
+    return MechanismList(mechanisms=usecase.entries(), unusable=usecase.unusable())
 
 
 @router.post(

@@ -26,10 +26,18 @@ class MechanismEntry(BaseModel):
     parameters: list[MechanismParameter] = Field(description="Of the lab's own; empty for others.")
 
 
+class UnusableFile(BaseModel):
+    """A file of the lab's folder that cannot be used: no diagnosis is made until it is mended or removed."""
+
+    file: str = Field(description="Its name.", examples=["warm.yaml"])
+    reason: str = Field(description="Why, with the line.")
+
+
 class MechanismList(BaseModel):
     """The catalogue of mechanisms, in the order in which a model composes them."""
 
     mechanisms: list[MechanismEntry] = Field(description="All of them.")
+    unusable: list[UnusableFile] = Field(description="Files of the lab's own that are left out.")
 
 
 class KeepFound(BaseModel):

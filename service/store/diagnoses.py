@@ -193,9 +193,12 @@ def cancel(connection: Connection, diagnosis_id: str) -> None:
         connection.execute(update(diagnoses).where(this).values(**values))
 
 
-def claim(connection: Connection, server: str, basis: Basis, under_way: Collection[int] = ()) -> AnyRow | None:
-    """Take the next diagnosis to run: a queued one, or one whose server is taken for dead; None where there is none.
-    Never one that this server has `under_way`, by its number, whatever others took it for meanwhile.
+def claim(
+    connection: Connection, server: str, basis: Basis, not_these: Collection[int] = (), *, smallest: bool = False
+) -> AnyRow | None:
+    """Take the next diagnosis to run, or the one whose campaign has the fewest recordings: a queued one, or one whose
+    server is taken for dead; None where there is none. `not_these`, by their numbers: those that this server has under
+    way are not taken again, whatever others took them for meanwhile.
 
     Servers that claim at once do not get the same one. It is run with what the server that has it now diagnoses with,
     whatever that was when it was asked for.
@@ -203,8 +206,10 @@ def claim(connection: Connection, server: str, basis: Basis, under_way: Collecti
     moment = clock(connection)
     _set_back(connection, moment)
     abandoned = (diagnoses.c.state == "running") & (diagnoses.c.alive_at < moment - HEARTBEAT_TIMEOUT_S)
-    waiting = ((diagnoses.c.state == "queued") | abandoned) & diagnoses.c.number.not_in(under_way)
-    query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(diagnoses.c.number).limit(1)
+    waiting = ((diagnoses.c.state == "queued") | abandoned) & diagnoses.c.number.not_in(not_these)
+    size = select(campaigns.c.recordings).where(campaigns.c.number == diagnoses.c.campaign).scalar_subquery()
+    order = (size, diagnoses.c.number) if smallest else (diagnoses.c.number,)
+    query = select(diagnoses.c.number, diagnoses.c.id).where(waiting).order_by(*order).limit(1)
     row = connection.execute(query.with_for_update(skip_locked=True)).first()
     if row is None:
         return None

@@ -20,6 +20,13 @@ from service.store.write_turns import SOON_S, WAIT_S, WriteTurns, busy
 
 SQLITE_FILE = "underskin.sqlite3"
 CONNECTION_WAIT_S = 10.0  # for one of the connections of a pool, beside the wait for other writers
+_TAKES_NOTHING = (errno.EROFS, errno.EIO, errno.EFBIG)  # the last where files may not grow beyond some size
+_NOT_WRITTEN = (  # of SQLite, other than for a full disk
+    sqlite3.SQLITE_IOERR_WRITE,
+    sqlite3.SQLITE_IOERR_FSYNC,
+    sqlite3.SQLITE_IOERR_TRUNCATE,
+    sqlite3.SQLITE_IOERR_SHMSIZE,
+)
 _PG_DISK_FULL = "53100"
 _PG_READ_ONLY = "25006"
 # A server that is gone without a word, as when its power fails, is noticed within half a minute: by the system's own
@@ -194,12 +201,12 @@ def database(database_url: str, folder: Path) -> Database:
 def storage_failure(error: OSError | DBAPIError) -> StorageFailed | None:
     """What an error, or what caused it, says of the disk: that it is full, or takes nothing; None where neither."""
     if isinstance(error, OSError):
-        full, failed = error.errno in (errno.ENOSPC, errno.EDQUOT), error.errno in (errno.EROFS, errno.EIO)
+        full, failed = error.errno in (errno.ENOSPC, errno.EDQUOT), error.errno in _TAKES_NOTHING
         said = error.strerror
     else:
-        code = getattr(error.orig, "sqlite_errorcode", 0) & 0xFF
-        full = code == sqlite3.SQLITE_FULL or _sqlstate(error.orig) == _PG_DISK_FULL
-        failed = code == sqlite3.SQLITE_READONLY
+        code = getattr(error.orig, "sqlite_errorcode", 0)
+        full = code & 0xFF == sqlite3.SQLITE_FULL or _sqlstate(error.orig) == _PG_DISK_FULL
+        failed = code & 0xFF == sqlite3.SQLITE_READONLY or code in _NOT_WRITTEN
         said = str(error.orig)
     if full:
         return StorageFull(str(error))

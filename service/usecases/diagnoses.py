@@ -9,7 +9,7 @@ from service.jobs.runner import basis
 from service.schemas.diagnoses import MOST_TOGETHER, AskForFleet, AskForSkin, DiagnosisEntry
 from service.store import AnyRow, Conflict, campaigns, diagnosed_together, diagnoses, skins
 from service.store.diagnosed_together import Member, Together
-from service.usecases.mechanisms import catalogue
+from service.usecases.mechanisms import whole_catalogue
 from underskin.errors import ErrorCode, InvalidInput, not_one_of
 from underskin.recordings.validation import name as checked_name
 from underskin.surrogate.sigma_table import SigmaTable
@@ -128,7 +128,7 @@ def _not_usable(connection: Connection, root: str, campaign_id: str, index: int)
 
 
 def _require_known(without: Sequence[str]) -> None:
-    known = catalogue()
+    known = whole_catalogue()
     for name in without:
         if name not in known:
             raise not_one_of("without", name, known)

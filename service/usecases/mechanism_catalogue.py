@@ -13,7 +13,7 @@ from underskin.diagnosis.data.names import EXPLAINED
 from underskin.figures.law_effect import LawEffect, lacking, law_effect
 from underskin.figures.law_twins import Twin, law_twins
 from underskin.mechanisms import Mechanism, Parameter
-from underskin.mechanisms.declared.document import digest
+from underskin.mechanisms.declared.folder import digest
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.unnamed.vocabulary import followed
@@ -57,7 +57,7 @@ class Catalogue:
 
 
 def catalogue(store: Database, table: SigmaTable) -> Catalogue:
-    """As it is now; raises Refusal 409 as `mechanisms.catalogue`."""
+    """As it is now."""
     known, listed = mechanisms.catalogue(), {entry.name: entry for entry in mechanisms.entries()}
     alike, seen = _twins(table, digest()), findings(store)
     return Catalogue(
@@ -122,6 +122,6 @@ def _file(entry: MechanismEntry) -> str | None:
     assert entry.package is not None
     path: Path = mechanism_files.folder_of_lab() / entry.package.rsplit(" ", 1)[0]
     try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
+        return path.read_bytes().decode("utf-8", "replace")
+    except OSError:
         return None

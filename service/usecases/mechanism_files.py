@@ -12,7 +12,8 @@ from service.problems import Refusal
 from service.store import own_mechanisms
 from service.store.times import now
 from underskin.errors import FileError
-from underskin.mechanisms.declared.document import FOLDER, parse
+from underskin.mechanisms.declared.document import parse
+from underskin.mechanisms.declared.folder import FOLDER
 
 _SET_ASIDE = "discarded"  # a folder beside the files, from which none is read
 
@@ -52,11 +53,16 @@ def set_aside(file: Path) -> None:
     durable.keep_entries(file.parent)
 
 
+def of_mechanism(name: str) -> list[Path]:
+    """The files that declare a mechanism of this name."""
+    return [file for file, content in _present().items() if _mechanism(content) == name]
+
+
 def remember(connection: Connection) -> None:
     """Keep the files as they are in the store, whose backups then hold them."""
     folder = folder_of_lab()
     if folder.is_dir():  # else those of the last backup stay
-        own_mechanisms.replace(connection, {file.name: file.read_bytes() for file in sorted(folder.glob("*.yaml"))})
+        own_mechanisms.replace(connection, {file.name: content for file, content in _present().items()})
 
 
 def put_back(connection: Connection) -> PutBack:
@@ -67,7 +73,7 @@ def put_back(connection: Connection) -> PutBack:
     for name, content in kept.items():
         if Path(name).name != name or not name.endswith(".yaml"):  # in no backup that this service made
             continue
-        present = {file: file.read_bytes() for file in folder.glob("*.yaml")}
+        present = _present()
         if present.get(folder / name) == content:
             continue
         rivals = [
@@ -78,6 +84,11 @@ def put_back(connection: Connection) -> PutBack:
         write(folder / name, content)
         (replaced if rivals else written).append(name)
     return PutBack(tuple(written), tuple(replaced))
+
+
+def _present() -> dict[Path, bytes]:
+    """The files of the folder, in the order of their names."""
+    return {file: file.read_bytes() for file in sorted(folder_of_lab().glob("*.yaml")) if file.is_file()}
 
 
 def _mechanism(content: bytes) -> str | bytes:

@@ -2,18 +2,19 @@
 
 import threading
 from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
 
 from sqlalchemy import Connection
 
 from service.problems import Refusal
-from service.schemas.mechanisms import MechanismEntry, MechanismParameter
+from service.schemas.mechanisms import MechanismEntry, MechanismParameter, UnusableFile
 from service.store import diagnoses, models
 from service.usecases import mechanism_files
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.base import Mechanism
-from underskin.mechanisms.contract import check_numbers
 from underskin.mechanisms.declared import saving
-from underskin.mechanisms.declared.document import digest, in_folder, parse
+from underskin.mechanisms.declared.folder import checked, digest
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.registry import CATALOGUE
 
@@ -24,43 +25,57 @@ _loaded = {"digest": digest()}
 def catalogue() -> Mapping[str, Mechanism]:
     """The mechanisms by name, with the lab's own as they are now: another server may have changed them.
 
-    Raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be another one.
+    Files of the lab's folder that cannot be used are left out (`unusable`).
     """
     with _lock:
         found = digest()
         if found != _loaded["digest"]:
-            try:
-                in_folder()  # which refuses what cannot be used while the catalogue in use still stands
-                CATALOGUE.reload()
-                CATALOGUE.load()
-            except FileError as error:
-                raise Refusal(
-                    409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it."
-                ) from None
+            CATALOGUE.reload()
             _loaded["digest"] = found
-    return CATALOGUE
+    return CATALOGUE.load().mechanisms
+
+
+def whole_catalogue() -> Mapping[str, Mechanism]:
+    """The same; raises Refusal 409 where a file of the lab's folder cannot be used: a diagnosis without it would be
+    another one."""
+    known = catalogue()
+    try:
+        CATALOGUE.require_whole()
+    except FileError as error:
+        raise Refusal(409, f"A mechanism of the lab's own cannot be used: {error}. Mend or remove it.") from None
+    return known
 
 
 def entries() -> list[MechanismEntry]:
     """The catalogue, described."""
-    return [_entry(mechanism) for mechanism in catalogue().values()]
+    return [_entry(mechanism, CATALOGUE.packages.get(mechanism.name)) for mechanism in catalogue().values()]
+
+
+def unusable() -> list[UnusableFile]:
+    """The files of the lab's folder that the catalogue lacks, and why."""
+    catalogue()
+    return [
+        UnusableFile(file=Path(error.file).name, reason=": ".join(filter(None, (error.place, error.reason))))
+        for error in CATALOGUE.refused
+    ]
 
 
 def keep(content: bytes) -> MechanismEntry:
-    """Keep a document as one more of the lab's own.
+    """Keep a document as one more of the lab's own; nothing is written before its entry is known.
 
-    Raises FileError or InvalidInput where it cannot be used, and Refusal 409 where its name is taken.
+    Raises FileError where it cannot be used, and Refusal 409 where its name is taken.
     """
     folder = mechanism_files.folder_of_lab()
-    mechanism = parse(content, "mechanism")
-    check_numbers(mechanism)
+    mechanism = checked(content, "", apart=True)
+    file = folder / f"{mechanism.name}.yaml"
+    entry = _entry(mechanism, f"{file.name} {sha256(content).hexdigest()[:12]}")
     if mechanism.name in catalogue():
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.")
     try:
-        mechanism_files.write(folder / f"{mechanism.name}.yaml", content)
+        mechanism_files.write(file, content)
     except FileExistsError:
         raise Refusal(409, f"The name {mechanism.name!r} is taken by another mechanism.") from None
-    return _entry(catalogue()[mechanism.name])
+    return entry
 
 
 def keep_found(connection: Connection, diagnosis_id: str, name: str, description: str | None) -> MechanismEntry:
@@ -92,15 +107,14 @@ def discard(connection: Connection, name: str) -> MechanismEntry:
         report = diagnoses.report_of(connection, row.number)
         if report is not None and name in {entry["name"] for entry in report["mechanisms"]}:
             raise Refusal(409, f"The model in force of skin {row.model_skin_id!r} needs {name!r}: withdraw it first.")
-    for file in mechanism_files.folder_of_lab().glob("*.yaml"):
-        if parse(file.read_bytes(), str(file)).name == name:
-            mechanism_files.set_aside(file)
-    discarded = _entry(mechanism)
+    discarded = _entry(mechanism, CATALOGUE.packages.get(name))
+    for file in mechanism_files.of_mechanism(name):
+        mechanism_files.set_aside(file)
     catalogue()
     return discarded
 
 
-def _entry(mechanism: Mechanism) -> MechanismEntry:
+def _entry(mechanism: Mechanism, package: str | None) -> MechanismEntry:
     stated = mechanism.parameters_stated if isinstance(mechanism, DeclaredMechanism) else None
     return MechanismEntry(
         name=mechanism.name,
@@ -109,7 +123,7 @@ def _entry(mechanism: Mechanism) -> MechanismEntry:
         kinds=list(mechanism.kinds),
         assumptions=mechanism.assumptions,
         source=mechanism.source,
-        package=CATALOGUE.packages.get(mechanism.name),
+        package=package,
         own=stated is not None,
         parameters=[
             MechanismParameter(name=entry.name, unit=entry.unit, low=entry.low, high=entry.high)

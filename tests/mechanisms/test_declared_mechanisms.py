@@ -1,23 +1,27 @@
 """Mechanisms that a lab declares in files: read by a whitelist, with derivatives, refused with line and reason."""
 
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from typer.testing import CliRunner
 
+import underskin
 from tests.support.declared_documents import refusal
 from underskin.autodiff import Differentiated
 from underskin.cli.mechanism import app
-from underskin.errors import InvalidInput
+from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.declared import saving
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.expressions import read
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
@@ -94,7 +98,28 @@ def test_what_is_no_arithmetic_is_refused_with_its_line(law: str) -> None:
         ("high: 0.1", "high: -1", 8, "must be above low"),
         ("sd: 0.01", "sd: 0", 8, "must be above 0"),
         ("limit: 0", "limits: 0", 8, "is no field"),
-        ("low: 0,", "low: yes,", 8, "must be a finite number"),
+        ("low: 0,", "low: yes,", 8, "must be a number"),
+        ("low: 0,", "low: 123456789012345678901234567890,", 8, "must be a number"),
+        ("high: 0.1", "high: 1.0e-300", 8, "in magnitude"),
+        ("low: 0, high: 0.1", "low: 0, high: 1.0e-20", 8, "must lie within"),
+        (
+            "softening: {unit: 1/°C, low: 0, high: 0.1, prior: {mean: 0.01, sd: 0.01}",
+            "softening: {unit: 1/°C, low: 0, high: 1.0e-20",
+            8,
+            "must change the law",
+        ),
+        (
+            "high: 0.1, prior: {mean: 0.01, sd: 0.01}",
+            "high: 0.1, prior: {mean: 0.01, sd: 1.0e+10}",
+            8,
+            "1% of the prior",
+        ),
+        ("sd: 0.01", "sd: 1.0e-12", 8, "must be above 1e-06 of the range"),
+        ("1/°C", '"\\0"', 8, "printable"),
+        ("The skin softens as it warms up.", '"abc \\ud800"', 3, "description: the character U+D800"),
+        ("The skin softens as it warms up.", '"abc \\a"', 3, "U+0007"),
+        ("description: The", '"\\udfff": The', 3, "U+DFFF"),
+        ("(temperature_c - 23)", "(temperature_c - 23) / (i - i)", 8, "must change the law"),
         ("source: Our own measurements.", "colour: red", 9, "is no field"),
         ("law: 1 -", "law: 1 - other *", 6, "must be one of"),
         ("schema: mechanism/1", "schema: [", 3, "not YAML"),
@@ -219,3 +244,39 @@ def test_the_commands_check_and_save(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     saved = (tmp_path / "lab" / "drawn_film.yaml").read_bytes()
     assert parse(saved, "drawn_film.yaml").name == "drawn_film"
+
+
+def test_a_file_that_takes_long_to_parse_is_refused_in_another_process() -> None:
+    """Brackets within brackets take the pure Python loader a time that grows with the square of their number."""
+    began = time.process_time()
+    assert "nested more than" in refusal("[" * 99_000).reason
+    assert time.process_time() - began < 2
+
+
+def test_json_is_read_with_all_its_characters() -> None:
+    """A character beyond 16 bits is a pair of escapes in JSON."""
+    document = {**yaml.safe_load(WARM), "description": "It is warm: \N{SUN WITH FACE}"}
+    text = json.dumps(document)
+    assert "\\ud83c" in text
+    assert parse(text.encode(), "lab.json").plain == document["description"]
+
+
+def test_a_file_of_the_folder_that_cannot_be_used_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The catalogue lists the others; no diagnosis is made without it."""
+    (tmp_path / "a.yaml").write_text(WARM.replace("high: 0.1, prior: {mean: 0.01, sd: 0.01}", "high: 1.0e-300"))
+    (tmp_path / "b.yaml").write_text(WARM)
+    (tmp_path / "c.yaml").write_text(WARM)
+    (tmp_path / "d.yaml").mkdir()
+    monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
+    CATALOGUE.reload()
+    try:
+        assert "warm_skin" in CATALOGUE
+        refused = [(Path(error.file).name, error.place) for error in CATALOGUE.refused]
+        assert refused == [("a.yaml", "line 8"), ("d.yaml", ""), ("c.yaml", "name")]
+        listed = CliRunner().invoke(app, ["list"])
+        assert (listed.exit_code, "warm_skin" in listed.output, "a.yaml: line 8" in listed.output) == (2, True, True)
+        with pytest.raises(FileError, match=r"a\.yaml: line 8: parameters\.softening\.high"):
+            underskin.diagnose(reference_campaign("frf"))
+    finally:
+        monkeypatch.undo()
+        CATALOGUE.reload()

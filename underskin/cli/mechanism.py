@@ -17,12 +17,16 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, help="Mechanisms o
 
 @app.command(name="list")
 def list_() -> None:
-    """All mechanisms, and where those come from that are not underskin's own."""
+    """All mechanisms, and where those come from that are not underskin's own; files that cannot be used, and why."""
     from underskin.mechanisms.registry import CATALOGUE
 
     for name, mechanism in CATALOGUE.items():
         source = CATALOGUE.packages.get(name, "")
         typer.echo(f"{name}{f' ({source})' if source else ''}: {mechanism.plain}")
+    for error in CATALOGUE.refused:
+        typer.echo(f"underskin: {error}", err=True)
+    if CATALOGUE.refused:
+        raise typer.Exit(2)
 
 
 @app.command()
@@ -50,7 +54,8 @@ def save(
 ) -> None:
     """Keep the law of a report as a mechanism, recognised by name in later campaigns."""
     from underskin.mechanisms.declared import saving
-    from underskin.mechanisms.declared.document import FOLDER, parse
+    from underskin.mechanisms.declared.document import parse
+    from underskin.mechanisms.declared.folder import FOLDER
     from underskin.mechanisms.registry import CATALOGUE
 
     where = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
@@ -81,13 +86,10 @@ def _on(mechanism: "DeclaredMechanism") -> str:
 
 
 def _read(file: Path) -> "DeclaredMechanism":
-    from underskin.mechanisms.contract import check_numbers
-    from underskin.mechanisms.declared.document import parse
+    from underskin.mechanisms.declared.folder import checked
 
     try:
         data = file.read_bytes()
     except OSError as error:
         raise UnderskinError(f"{file}: cannot be opened: {error.strerror}") from error
-    mechanism = parse(data, str(file))
-    check_numbers(mechanism)
-    return mechanism
+    return checked(data, str(file))

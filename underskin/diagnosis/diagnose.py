@@ -14,8 +14,6 @@ from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import report as report_document
 from underskin.diagnosis.several import campaigns as several
 from underskin.diagnosis.several import fleet
-from underskin.findings.codes import Reason
-from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.reading import Reading
 from underskin.surrogate.sigma_table import SigmaTable, load_table
@@ -114,10 +112,8 @@ def _with_refused(document: Mapping[str, object], campaigns: Sequence[Campaign |
     """With the recordings that were refused when they were read first among the findings, after their campaign."""
     refused = []
     for reading in [one for one in campaigns if isinstance(one, Reading)]:
-        for problem in reading.problems:
-            arguments = {"field": problem.field, "value": problem.value, "allowed": problem.allowed}
-            finding = Finding(Reason.REFUSED, problem.recording, problem.field, arguments).in_report()
-            refused.append({**finding, "statement": f"{reading.campaign.name}: {finding['statement']}"})
+        own = (entry.in_report() for entry in pipeline.refused(reading.problems))
+        refused += [{**finding, "statement": f"{reading.campaign.name}: {finding['statement']}"} for finding in own]
     findings = document["findings"]
     assert isinstance(findings, list)
     return Report.of({**document, "findings": [*refused, *findings]})

@@ -277,20 +277,29 @@ def _beside_other_tip(begun: DiagnosisResult, result: Search) -> Search:
     return replace(result, imitating={**result.imitating, leader.names: 1.0})
 
 
-def with_refused(diagnosis: DiagnosisResult, refused: Sequence[RecordingProblem]) -> DiagnosisResult:
+def refused(problems: Sequence[RecordingProblem]) -> list[Finding]:
+    """Recordings that were refused when they were read, as findings."""
+    return [
+        Finding(
+            Reason.REFUSED,
+            entry.recording,
+            entry.field,
+            {"field": entry.field, "value": entry.value, "allowed": entry.allowed},
+        )
+        for entry in problems
+    ]
+
+
+def with_refused(diagnosis: DiagnosisResult, problems: Sequence[RecordingProblem]) -> DiagnosisResult:
     """The diagnosis with recordings that were refused when they were read named first among its findings."""
-    problems = []
-    for entry in refused:
-        arguments = {"field": entry.field, "value": entry.value, "allowed": entry.allowed}
-        problems.append(Finding(Reason.REFUSED, entry.recording, entry.field, arguments))
     lacking = diagnosis.lacking
     if lacking and problems:
         lacking = replace(
             lacking,
-            refused_recordings=len({entry.recording for entry in refused}),
-            refused_fields=tuple(dict.fromkeys(entry.field for entry in refused)),
+            refused_recordings=len({entry.recording for entry in problems}),
+            refused_fields=tuple(dict.fromkeys(entry.field for entry in problems)),
         )
-    return replace(diagnosis, findings=(*problems, *diagnosis.findings), lacking=lacking)
+    return replace(diagnosis, findings=(*refused(problems), *diagnosis.findings), lacking=lacking)
 
 
 def _provenance(table: SigmaTable, mechanisms: Known) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import plotly.graph_objects as go
@@ -18,6 +18,7 @@ _LINE = 0.06  # of the span of all values: what the name of a point takes up
 _MOST_BESIDE = 3  # names beside a point
 _CHOSEN = COLOURS[2]
 _DAY, _DAY_MS = timedelta(days=1), 86_400_000
+_CALENDAR = datetime.min.replace(tzinfo=UTC) + _DAY, datetime.max.replace(tzinfo=UTC) - _DAY
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,8 @@ def _finished(figure: go.Figure, title: str, times: Sequence[str], *, legend: bo
     figure.update_xaxes(title="recorded", type="date")
     moments = sorted(datetime.fromisoformat(time) for time in times)
     if moments and moments[-1] - moments[0] < _DAY:  # otherwise the axis of a single campaign would show milliseconds
-        figure.update_xaxes(range=[moments[0] - _DAY, moments[-1] + _DAY], dtick=_DAY_MS, tickformat="%d %b %Y")
+        first, last = max(moments[0], _CALENDAR[0]) - _DAY, min(moments[-1], _CALENDAR[1]) + _DAY
+        figure.update_xaxes(range=[first, last], dtick=_DAY_MS, tickformat="%d %b %Y")
     figure.update_yaxes(title="d33, 95 % [pC/N]")
     # Dates may have two lines of ticks above the axis' title.
     return styled(figure.update_layout(showlegend=legend, margin={"b": 75}), title)

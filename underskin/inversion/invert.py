@@ -40,6 +40,7 @@ from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
 from underskin.recordings.frf.line_choice import usable_lines
 from underskin.recordings.frf.roll_off import roll_off
 from underskin.recordings.frf.stacks import stacked
+from underskin.recordings.physical_limits import excesses
 from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.surrogate.sigma_table import SigmaTable
@@ -158,6 +159,8 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     recorded = [recording for recording in campaign.recordings if isinstance(recording, FrfRecording)]
     if not recorded:
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
+    for excess in excesses(campaign.skin):
+        raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
     measured, recorded, left_out = _measured(recorded)
     if not recorded:
         raise _none_usable(campaign, left_out)
@@ -225,6 +228,11 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
     for recording in recorded:
         if (exchanged := exchanged_channels(recording)) is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
+            continue
+        beyond = next((excess for excess in excesses(recording) if not excess.is_faint), None)
+        if beyond is not None:
+            arguments = {"largest": beyond.largest, "low": beyond.low, "high": beyond.high}
+            left_out.append(Finding(Reason.IMPOSSIBLE_RECORDING, recording.id, beyond.field, arguments))
             continue
         try:
             frfs.append(lines_of(recording))

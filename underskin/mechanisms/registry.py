@@ -2,13 +2,14 @@
 
 A mechanism of this package is a module of `underskin.mechanisms.laws`; one of another package is named by an entry
 point of the group `underskin.mechanisms`, as a subclass of `Mechanism` or an instance of one; the lab's own are files
-(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names.
+(`mechanism/1`) in the folder that `UNDERSKIN_MECHANISMS` names. Files there that cannot be used are left out and
+named; no diagnosis is made without them.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -31,31 +32,46 @@ GROUP = "underskin.mechanisms"
 class Catalogue(Mapping[str, Mechanism]):
     """The mechanisms by name, in order of composition. Those of other packages are loaded at the first access.
 
-    Every access raises ExtensionError where a mechanism of another package cannot be used: a diagnosis without it would
-    be another diagnosis.
+    Every access raises ExtensionError where a mechanism of another package cannot be used. Files of the lab's folder
+    that cannot be used are in `refused`.
     """
 
+    def __init__(self) -> None:
+        self._loaded: _Loaded | None = None
+
     def __getitem__(self, name: str) -> Mechanism:
-        return _loaded().mechanisms[name]
+        return self.load().mechanisms[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_loaded().mechanisms)
+        return iter(self.load().mechanisms)
 
     def __len__(self) -> int:
-        return len(_loaded().mechanisms)
+        return len(self.load().mechanisms)
 
-    def load(self) -> None:
-        """Load the mechanisms of other packages now; raises ExtensionError where one cannot be used."""
-        _loaded()
+    def load(self) -> _Loaded:
+        """What is loaded, now where it was not; raises ExtensionError where one of another package cannot be used."""
+        if self._loaded is None:
+            self._loaded = _load()
+        return self._loaded
 
     def reload(self) -> None:
-        """Load the mechanisms of other packages and the lab's own again, as they are now."""
-        _loaded.cache_clear()
+        """Load the mechanisms of other packages and the lab's own again, as they are now; until then others stay."""
+        self._loaded = _load()
+
+    @property
+    def refused(self) -> Sequence[FileError]:
+        """Why files of the lab's folder cannot be used."""
+        return self.load().refused
+
+    def require_whole(self) -> None:
+        """Raises FileError where a file of the lab's folder cannot be used: a diagnosis without it would be another."""
+        for error in self.refused:
+            raise FileError(error.file, error.place, error.reason, code=error.code)
 
     @property
     def packages(self) -> Mapping[str, str]:
         """Package and version of each mechanism that comes from another package, by its name."""
-        return _loaded().packages
+        return self.load().packages
 
 
 CATALOGUE = Catalogue()
@@ -68,7 +84,9 @@ class Known(Mapping[str, Mechanism]):
     """
 
     def __init__(self, without: Collection[str] = ()) -> None:
-        """Raises InvalidInput where `without` names something that is not in the catalogue."""
+        """Raises InvalidInput where `without` names something that is not in the catalogue, and FileError where a file
+        of the lab's folder cannot be used."""
+        CATALOGUE.require_whole()
         for name in without:
             if name not in CATALOGUE:
                 raise not_one_of("without", name, CATALOGUE)
@@ -123,29 +141,35 @@ def built_in() -> tuple[Mechanism, ...]:
 class _Loaded:
     mechanisms: Mapping[str, Mechanism]
     packages: Mapping[str, str]
+    refused: Sequence[FileError]
 
 
-@cache
-def _loaded() -> _Loaded:
+def _load() -> _Loaded:
     mechanisms = list(built_in())
     packages: dict[str, str] = {}
     for extension in extensions.load(GROUP):
         mechanism = _checked(extension, mechanisms)
         packages[mechanism.name] = extension.package
         mechanisms.append(mechanism)
-    for declared, file in _declared():
+    refused = _add_declared(mechanisms, packages) if os.environ.get("UNDERSKIN_MECHANISMS") else []
+    return _Loaded({mechanism.name: mechanism for mechanism in _in_order(mechanisms)}, packages, refused)
+
+
+def _add_declared(mechanisms: list[Mechanism], packages: dict[str, str]) -> list[FileError]:
+    """Add those of the lab's folder, each with its file; the errors of those that cannot be used."""
+    from underskin.mechanisms.declared.folder import in_folder  # the models, which few callers need
+
+    folder = in_folder()
+    refused = [*folder.refused]
+    for declared, file in folder.mechanisms:
         if declared.name in {other.name for other in mechanisms}:
-            raise FileError(file, "name", f"{declared.name!r} is taken by another mechanism")
+            refused.append(
+                FileError(file.rsplit(" ", 1)[0], "name", f"{declared.name!r} is taken by another mechanism")
+            )
+            continue
         packages[declared.name] = file
         mechanisms.append(declared)
-    return _Loaded({mechanism.name: mechanism for mechanism in _in_order(mechanisms)}, packages)
-
-
-def _declared() -> list[tuple[Mechanism, str]]:
-    """Those of the lab's folder, each with its file."""
-    from underskin.mechanisms.declared.document import in_folder  # the models, which few callers need
-
-    return [*in_folder()] if os.environ.get("UNDERSKIN_MECHANISMS") else []
+    return refused
 
 
 def _checked(extension: extensions.Extension, others: list[Mechanism]) -> Mechanism:

@@ -23,6 +23,7 @@ from underskin.recordings.conditions import (
     Tolerances,
 )
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
+from underskin.recordings.physical_limits import refusals
 from underskin.recordings.shown_values import shown
 from underskin.units import Complexes, Floats
 
@@ -140,6 +141,8 @@ def from_dict(document: Any) -> tuple[Campaign, list[RecordingProblem]]:
     units_checked = field.flag("units_checked", document.get("units_checked", False), False)
     name = field.name("name", document.get("name"), units_checked)
     skin = field.build(SkinDescription, "skin", document.get("skin"), units_checked)
+    for refusal in refusals(skin):
+        raise refusal.at(f"skin.{refusal.field}")
     entries = document.get("recordings")
     if not isinstance(entries, list) or not entries:
         raise errors.wrong_type("recordings", shown(entries), "must be a list of at least one recording")
@@ -210,7 +213,10 @@ def _recording(entry: Any, skin: SkinDescription, units_checked: bool) -> tuple[
     known = {error.field for error in refused}
     together = [*_unmet_needs(kind, document, values, skin), *_unequal_lengths(values)]
     refused += [error for error in together if error.field not in known]
-    return (None if known else KINDS[kind](**{**values, "kind": kind})), refused
+    if known:
+        return None, refused
+    recording = KINDS[kind](**{**values, "kind": kind})
+    return recording, [*refused, *refusals(recording)]
 
 
 def _unmet_needs(

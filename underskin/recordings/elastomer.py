@@ -39,5 +39,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
                 raise unusable("force_n", None, "must rise with the displacement: no modulus follows from a fall")
         except InvalidInput as error:
             result = error
+        except (ArithmeticError, ValueError) as error:  # NumPy's among them
+            result = unusable("force_n", None, f"no modulus can be computed from these numbers ({error})")
         moduli.append(RecordingModulus(recording.id, recording.kind, result))
     return moduli

@@ -1,7 +1,7 @@
 """The lab's time zone: that of the time of day, and of times that are written without one."""
 
 import os
-from datetime import UTC, tzinfo
+from datetime import UTC, datetime, tzinfo
 from zoneinfo import ZoneInfo
 
 from underskin.errors import InvalidInput
@@ -18,3 +18,12 @@ def time_zone() -> tzinfo:
         return ZoneInfo(name)
     except (KeyError, ValueError, OSError):
         raise InvalidInput(TIME_ZONE, name, "must be a time zone such as Europe/Rome") from None
+
+
+def in_lab(moment: datetime) -> datetime:
+    """A moment in the lab's zone, taken as UTC where it states none; where the calendar ends in that zone, as it is."""
+    known = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    try:
+        return known.astimezone(time_zone())
+    except OverflowError:
+        return known

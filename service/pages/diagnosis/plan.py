@@ -1,5 +1,6 @@
 """What to measure next within the limits of the reader's rig; planned in a worker process, and not stored."""
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,6 +40,7 @@ _LABELS = {name: f"{words} [{unit}]" if unit else words for name, words, unit, _
     "preload_n": "lowest and highest preload [N]",
     _RECORDINGS: "recordings at most",
 }
+_COUNT = re.compile(r"[0-9]{1,9}")
 _MOST_VALUES = 8
 _MOST_RECORDINGS = 50
 _SURVIVES = 0.02  # less probable ones are not weighed
@@ -156,7 +158,7 @@ def _limits(given: Mapping[str, str]) -> dict[str, Any]:
             limits[name] = values
     count = given.get(_RECORDINGS, "").strip()
     if count:
-        if not (count.isascii() and count.isdigit() and 1 <= int(count[:4]) <= _MOST_RECORDINGS):
+        if not (_COUNT.fullmatch(count) and 1 <= int(count) <= _MOST_RECORDINGS):
             raise out_of_range(_RECORDINGS, count[:80], f"must be a whole number from 1 to {_MOST_RECORDINGS}")
         limits[_RECORDINGS] = int(count)
     return limits

@@ -38,6 +38,7 @@ def mechanisms(request: Request, store: Store, table: Table) -> Response:
         "mechanisms.html",
         own=[one for one in known.entries if one.entry.own],
         others=[one for one in known.entries if not one.entry.own],
+        unusable=usecase.unusable(),
         diagnoses=known.diagnoses,
         shown=_SHOWN,
         sure=EXPLAINED,

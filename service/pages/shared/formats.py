@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from datetime import UTC, datetime, time
+from datetime import datetime, time
 from typing import Any
 
 import orjson
@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 
 from underskin.diagnosis.reporting.typeset import in_readable_units, with_minus
 from underskin.findings.formatting import in_digits, in_percent, significant
-from underskin.recordings.time_zone import time_zone
+from underskin.recordings.time_zone import in_lab
 
 _UNSAFE = {ord("<"): "\\u003c", ord(">"): "\\u003e", ord("&"): "\\u0026", 0x2028: "\\u2028", 0x2029: "\\u2029"}
 
@@ -94,9 +94,9 @@ def moment(text: str | None, *, date_only: bool = False) -> Markup:
     if text is None:
         return Markup("–")
     when = datetime.fromisoformat(text)
-    in_lab = (when if when.tzinfo is not None else when.replace(tzinfo=UTC)).astimezone(time_zone())
-    if in_lab.time() == time():  # midnight to the microsecond is a date that was given without a time
-        return Markup('<time datetime="{0}" data-form="day">{0}</time>').format(in_lab.date())
+    local = in_lab(when)
+    if local.time() == time():  # midnight to the microsecond is a date that was given without a time
+        return Markup('<time datetime="{0}" data-form="day">{0}</time>').format(local.date())
     shown = when.strftime("%Y-%m-%d" if date_only else "%Y-%m-%d %H:%M UTC")
     form = Markup(' data-form="date"') if date_only else ""
     return Markup('<time datetime="{}"{}>{}</time>').format(text, form, shown)

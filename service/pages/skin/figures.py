@@ -12,7 +12,7 @@ from service.pages.shared.history import RESTS, By
 from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import interval
-from underskin.recordings.time_zone import time_zone
+from underskin.recordings.time_zone import in_lab
 
 _MOST_NAMED = 5  # sensors, in a sentence
 
@@ -69,7 +69,7 @@ def _last(of_sensor: SensorHistory | None) -> dict[str, Any]:
 
 def _day(time: str) -> str:
     """The day of a time of the store in the lab's zone, as the axis of a history has it."""
-    return datetime.fromisoformat(time).astimezone(time_zone()).strftime("%d %b %Y")
+    return in_lab(datetime.fromisoformat(time)).strftime("%d %b %Y")
 
 
 def _trend(line: TrendAnswer, count: int) -> dict[str, Any]:

@@ -1,12 +1,12 @@
 """When recordings were made, as the form of an upload says it: in the lab's time zone, unless a zone is typed."""
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Any
 
 from underskin.errors import InvalidInput, wrong_type
 from underskin.recordings.readers.calendar_times import with_zone
-from underskin.recordings.time_zone import time_zone
+from underskin.recordings.time_zone import in_lab, time_zone
 
 FIELD = "recorded_at"
 _NAMES = (
@@ -36,8 +36,7 @@ def shown(value: Any) -> str:
         moment = datetime.fromisoformat(value)
     except (TypeError, ValueError):
         return str(value)
-    in_utc = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)  # as campaigns have it
-    moment = in_utc.astimezone(time_zone()).replace(tzinfo=None)
+    moment = in_lab(moment).replace(tzinfo=None)
     return moment.isoformat(" ", "minutes" if moment.second == moment.microsecond == 0 else "auto")
 
 

@@ -76,7 +76,7 @@ def test_a_diagnosis_for_which_no_thread_starts_is_put_back_and_done_later(
         start(thread)
 
     monkeypatch.setattr(threading.Thread, "start", start_later)
-    processes = WorkerProcesses(tables_folder() / SIGMA_TABLE, table().sha256, 1_000_000_000, keeps_ready=False)
+    processes = WorkerProcesses(tables_folder() / SIGMA_TABLE, table().sha256, 1_000_000_000, 600.0, keeps_ready=False)
     with closing(open_store("", tmp_path)) as store:
         arrival = campaigns.NewCampaign(parse(campaign("array", sensors=1)), "palm")
         campaign_id, _ = store.write(campaigns.add, arrival)

@@ -89,7 +89,20 @@ def test_what_is_not_a_number_is_refused(http: httpx.Client, path_and_body: tupl
     problem_of(answer, 400 if path.startswith("/umbridge/") or answer.status_code == 400 else 422)
 
 
-@pytest.mark.parametrize("path", ["/v1/sigma", "/v1/frf", "/umbridge/Evaluate", "/umbridge/Gradient"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        *(
+            "/v1/sigma",
+            "/v1/frf",
+            "/umbridge/Evaluate",
+            "/umbridge/Gradient",
+            "/v1/skins/a/join",
+            "/v1/skins/a/diagnosis",
+        ),
+        *("/v1/campaigns/a/withdraw", "/v1/campaigns/a/exclusions", "/v1/fleets/diagnosis", "/v1/mechanisms"),
+    ],
+)
 @pytest.mark.parametrize("place", ['{"\\ud800": 1}', '{"name": "\\ud800"}', '{"model": "\\ud800", "input": "\\ud800"}'])
 def test_half_a_character_is_refused(http: httpx.Client, path: str, place: str) -> None:
     answer = post(http, path, place)

@@ -110,6 +110,8 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(
         ({"offset_mm": "-1"}, "distances beside the sensor.*must be 0 or more"),
         ({"dynamic_force_n": "inf"}, "dynamic forces of the shaker.*must be above 0"),
         ({"recordings": "0"}, "recordings at most: 0 – must be a whole number from 1 to 50"),
+        ({"recordings": "00501"}, "recordings at most: 00501 – must be a whole number from 1 to 50"),
+        ({"recordings": "0001" + "9" * 4400}, "must be a whole number from 1 to 50"),
     ],
 )
 def test_limits_that_no_rig_has_are_refused(

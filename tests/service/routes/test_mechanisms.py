@@ -126,6 +126,10 @@ REFUSED = (
     ('{"diagnosis_id": "d-1"}', 422, "name"),
     ('{"name": "a", "name": "b", "diagnosis_id": "d-1"}', 422, "given twice"),
     ("x" * 100_001, 413, "100000 bytes"),
+    (WARM.replace("The amplifier's gain", '"\\ud800" #'), 422, "description: the character U+D800"),
+    ('{"schema": "mechanism/1", "name": "\\ud800"}', 400, "surrogate"),
+    (WARM.replace("low: -0.1", f"low: -{10**30}"), 422, "line 8"),
+    (WARM.replace("prior: {mean: 0, sd: 0.03}", "prior: {mean: 0, sd: 1.0e+20}"), 422, "of the prior"),
 )
 
 
@@ -145,8 +149,13 @@ def test_a_file_that_cannot_be_used_is_named_until_it_is_mended(lab: Server, cli
     file.parent.mkdir()
     file.write_text(WARM.replace("gain", "weather"), encoding="utf-8")
     for _ in range(2):
-        with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
-            client.mechanisms.all()
+        listed = lab.http.get("/v1/mechanisms").json()
+        assert "ageing" in {entry["name"] for entry in listed["mechanisms"]}
+        assert [(one["file"], "line 4: acts_on" in one["reason"]) for one in listed["unusable"]] == [
+            ("warm.yaml", True)
+        ]
+        page = lab.http.get("/mechanisms", headers={"Accept": "text/html"})
+        assert (page.status_code, "warm.yaml cannot be used" in page.text) == (200, True)
         with pytest.raises(ServiceError, match=r"warm.yaml: line 4: acts_on"):
             client.diagnoses.start(campaign_id, without=FEW)
     page = lab.http.get(f"/diagnoses/{before['id']}", headers={"Accept": "text/html"})

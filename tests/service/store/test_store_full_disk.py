@@ -1,6 +1,7 @@
 """A full disk: 507, nothing acknowledged that is not kept, and what is kept can be read."""
 
 import os
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -128,3 +129,18 @@ def test_a_key_that_finds_no_room_leaves_no_digest_behind(small_disk: Path) -> N
     with pytest.raises(OSError, match="No space"):
         KeyStore(small_disk).create("lab", "read")
     assert {path.name for path in small_disk.iterdir()} <= {"filling", "keys.lock"}
+
+
+def test_files_that_may_not_grow_are_told(tmp_path: Path) -> None:
+    """A limit on the size of files (EFBIG) is answered as a disk that takes nothing, for uploads and for the store."""
+    (tmp_path / "data").mkdir()
+    with running(Place(tmp_path / "data"), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
+        assert server.http.post("/v1/campaigns", json=campaign("small")).status_code == 201
+        for most in (1_000_000, 4096):
+            resource.prlimit(server.process.pid, resource.RLIMIT_FSIZE, (most, resource.RLIM_INFINITY))
+            large = orjson.dumps(campaign("large", sensors=20, lines=100)) + b" " * 2_000_000
+            answer = server.http.post("/v1/campaigns", content=large, headers={"Content-Type": "application/json"})
+            assert (answer.status_code, "takes nothing" in answer.text) == (507, True)
+        refused = server.http.post("/v1/campaigns", json=campaign("other"))
+        assert (refused.status_code, "takes nothing" in refused.text) == (507, True)
+        assert server.http.get("/").status_code == 200

@@ -7,6 +7,8 @@ out or stands there for comparison alone. Lines of one meaning are told apart by
 
 import math
 
+import numpy as np
+
 from underskin.units import Floats
 
 SHOWN, PAPER, BOUND = "solid", "dash", "dot"
@@ -32,6 +34,6 @@ def is_logarithmic(magnitudes: Floats, typical: float) -> bool:
 def decade_ticks(values: Floats) -> str | int:
     """The `dtick` of a logarithmic axis of those values that are above 0: 1, 2 and 5 of each decade, or, where these
     would be too close, the powers of ten; plotly's own would label 8, 9 and 10 on top of each other."""
-    shown = values[values > 0]
-    decades = math.log10(shown.max() / shown.min()) if len(shown) else _MOST_POWERS
+    shown = values[(values > 0) & np.isfinite(values)]
+    decades = math.log10(shown.max()) - math.log10(shown.min()) if len(shown) else _MOST_POWERS
     return "D2" if decades <= _FEW_DECADES else math.ceil(decades / _MOST_POWERS)

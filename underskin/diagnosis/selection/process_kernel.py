@@ -3,7 +3,7 @@
 import numpy as np
 
 from underskin.compiled import compiled
-from underskin.units import Floats
+from underskin.units import Floats, Indices
 
 _TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
 _LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
@@ -47,6 +47,37 @@ def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) ->
                 determinant += np.log(total)
                 square += solved[i] ** 2
             gains[number, which] = 0.5 * (a2 * square - determinant)
+
+
+@compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")
+def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats, grams: Floats) -> None:
+    """Take Σ sₙ sₙᵀ off products of columns, sₙ = Σ w x over the n-th sensor's recordings.
+
+    Parameters
+    ----------
+    weights
+        w at each scatter (scatters, pairs), the pairs of a sensor one after another.
+    rows, first
+        The row of `columns` of each pair, and where the pairs of each sensor begin (sensors + 1,).
+    columns
+        x (rows, sets · features).
+    grams
+        (sets, scatters, features, features), to be changed.
+    """
+    count, size = grams.shape[0], grams.shape[2]
+    width = count * size
+    sums = np.empty(width)
+    for scatter in range(len(weights)):
+        for sensor in range(len(first) - 1):
+            sums[:] = 0.0
+            for pair in range(first[sensor], first[sensor + 1]):
+                weight, row = weights[scatter, pair], rows[pair]
+                for column in range(width):
+                    sums[column] += weight * columns[row, column]
+            for number in range(count):
+                for i in range(size):
+                    for j in range(size):
+                        grams[number, scatter, i, j] -= sums[number * size + i] * sums[number * size + j]
 
 
 @compiled()

@@ -43,41 +43,101 @@ class ScatterNodes:
 
 
 @dataclass(frozen=True, eq=False)
-class _WithoutProcess:
-    """At several scatters, with what is fixed taken out: C = V + F Fᵀ, V the variances and F the `fixed` columns.
+class SensorPairs:
+    """Sensors of several recordings with each of these, or with what stands for some (pairs,), one after another.
 
-    `log_density` of the residual r (scatters,); C⁻¹ = V⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ V⁻¹, L Lᵀ = 1 + Fᵀ V⁻¹ F
-    (scatters, columns, recordings); `root` V^(−½) and `weighed` C⁻¹ r (scatters, recordings).
+    `first` is where each begins (sensors + 1,), `row` the recording; `single` are the recordings that have a sensor to
+    themselves, whose spread is a variance like any other.
+    """
+
+    row: Indices
+    first: Indices
+    single: Mask
+
+    @classmethod
+    def of(cls, sensor: Indices) -> "SensorPairs":
+        """By the sensor of each recording (recordings,)."""
+        single = np.bincount(sensor)[sensor] == 1
+        row = np.argsort(sensor, kind="stable")
+        row = row[~single[row]]
+        return cls(row, np.append(np.flatnonzero(np.diff(sensor[row], prepend=-1)), len(row)), single)
+
+    def sums(self, values: Floats) -> Floats:
+        """Over the pairs of each sensor (…, pairs)."""
+        if len(self.row) == 0:
+            return values
+        return np.asarray(np.add.reduceat(values, self.first[:-1], axis=-1))
+
+    def spread(self, values: Floats) -> Floats:
+        """A number of each sensor at its pairs (…, sensors)."""
+        return np.repeat(values, np.diff(self.first), axis=-1)
+
+    def summed(self, alike: Indices, weights: Floats) -> "tuple[SensorPairs, Floats]":
+        """With what recordings of a sensor that are alike weigh together (scatters, pairs)."""
+        if len(self.row) == 0:
+            return self, weights
+        sensor, row = self.spread(np.arange(len(self.first) - 1)), alike[self.row]
+        order = np.lexsort((row, sensor))
+        begins = np.flatnonzero(np.diff(sensor[order] * (int(alike.max()) + 1) + row[order], prepend=-1))
+        first = np.searchsorted(sensor[order][begins], np.arange(len(self.first)))
+        return SensorPairs(row[order][begins], first, self.single), np.add.reduceat(weights[:, order], begins, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class _WithoutProcess:
+    """At several scatters, with what is fixed taken out: C = A + F Fᵀ and A = V + τ² S Sᵀ, V the variances, τ the
+    spread of the sensors S, and F the `fixed` columns.
+
+    `log_density` of the residual r (scatters,); A⁻¹ = V⁻¹ − Σ uₙ uₙᵀ over sensors, with `shared` u (scatters, pairs);
+    C⁻¹ = A⁻¹ − Tᵀ T with `taken` T = L⁻¹ Fᵀ A⁻¹, L Lᵀ = 1 + Fᵀ A⁻¹ F (scatters, columns, recordings); `root` V^(−½)
+    and `weighed` C⁻¹ r (scatters, recordings). Time and memory grow with the recordings, however many sensors they are
+    of.
     """
 
     log_density: Floats
     root: Floats
+    shared: Floats
     taken: Floats
     weighed: Floats
+    pairs: SensorPairs
 
     @classmethod
-    def of(cls, nodes: ScatterNodes, fixed: Floats) -> "_WithoutProcess":
-        """With these columns (recordings, columns)."""
-        precision = 1 / nodes.variances
-        across = fixed.T * precision[:, None]
+    def of(cls, nodes: ScatterNodes, fixed: Floats, pairs: SensorPairs, spread: float) -> "_WithoutProcess":
+        """With these columns (recordings, columns), and sensors that spread so."""
+        variances = nodes.variances + spread**2 * pairs.single
+        precision = 1 / variances
+        by_sensor = precision[:, pairs.row]
+        total = pairs.sums(by_sensor)
+        shared = by_sensor * pairs.spread(spread / np.sqrt(1 + spread**2 * total))
+
+        def weighed_by_sensors(rows: Floats) -> Floats:
+            """A⁻¹ of rows (scatters, rows, recordings)."""
+            weighed = rows * precision[:, None]
+            weighed[..., pairs.row] -= (
+                pairs.spread(pairs.sums(rows[..., pairs.row] * shared[:, None])) * shared[:, None]
+            )
+            return weighed
+
+        across = weighed_by_sensors(fixed.T[None])
         lower = np.linalg.cholesky(across @ fixed + np.eye(fixed.shape[1]))
         taken = np.linalg.solve(lower, across)
         of_fixed = taken @ nodes.residual
-        weighed = nodes.residual * precision - (of_fixed[:, None] @ taken)[:, 0]
-        log_determinant = np.log(nodes.variances).sum(axis=1)
+        weighed = weighed_by_sensors(nodes.residual[None, None])[:, 0] - (of_fixed[:, None] @ taken)[:, 0]
+        log_determinant = np.log(variances).sum(axis=1) + np.log1p(spread**2 * total).sum(axis=1)
         log_determinant += 2 * np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
         log_density = nodes.log_weights - 0.5 * (weighed @ nodes.residual + log_determinant)
-        return cls(log_density, np.sqrt(precision), taken, weighed)
+        return cls(log_density, np.sqrt(precision), shared, taken, weighed, pairs)
 
     @classmethod
     def joined(cls, each: Sequence["_WithoutProcess"]) -> "_WithoutProcess":
-        """The scatters of all of these."""
-        columns = zip(*((entry.log_density, entry.root, entry.taken, entry.weighed) for entry in each), strict=True)
-        return cls(*map(np.concatenate, columns))
+        """The scatters of all of these, which are of the same recordings."""
+        names = ("log_density", "root", "shared", "taken", "weighed")
+        return cls(*(np.concatenate([getattr(entry, name) for entry in each]) for name in names), each[0].pairs)
 
     def at(self, kept: Mask) -> "_WithoutProcess":
         """At some of the scatters."""
-        return _WithoutProcess(self.log_density[kept], self.root[kept], self.taken[kept], self.weighed[kept])
+        of_scatters = (self.log_density, self.root, self.shared, self.taken, self.weighed)
+        return _WithoutProcess(*(values[kept] for values in of_scatters), self.pairs)
 
     def summed(self, alike: Indices) -> "_WithoutProcess":
         """With the sums over recordings that are alike, which have the same features, in their place."""
@@ -86,7 +146,16 @@ class _WithoutProcess:
         square, taken, weighed = (
             np.add.reduceat(values[..., order], first, axis=-1) for values in (self.root**2, self.taken, self.weighed)
         )
-        return replace(self, root=np.sqrt(square), taken=taken, weighed=weighed)
+        pairs, shared = self.pairs.summed(alike, self.shared)
+        return replace(self, root=np.sqrt(square), shared=shared, taken=taken, weighed=weighed, pairs=pairs)
+
+    def products(self, columns: Floats, count: int) -> Floats:
+        """XᵀC⁻¹X of each of `count` blocks of columns X (recordings, columns): (count, scatters, size, size)."""
+        from underskin.diagnosis.selection.process_kernel import less_shared
+
+        grams = np.ascontiguousarray(_weighed_grams(columns, count, self.root) - _grams(self.taken @ columns, count))
+        less_shared(np.ascontiguousarray(self.shared), self.pairs.row, self.pairs.first, columns, grams)
+        return grams
 
 
 def over_recordings(problem: FittingProblem, explanation: Explanation) -> dict[str, float]:
@@ -126,9 +195,8 @@ class GainResidual:
         centre = np.array([entry.start for entry in parameters]) - best.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
         self._known = slopes @ centre
-        sensors = np.eye(int(problem.lines.sensor.max()) + 1)[problem.lines.sensor]
-        sensors = sensors[:, sensors.any(axis=0)]
-        self.fixed = np.concatenate([slopes * scale, best.levels.spread * sensors], axis=1)
+        self._fixed, self._spread = slopes * scale, best.levels.spread
+        self._pairs = SensorPairs.of(problem.lines.sensor)
         self._moving = best.relative_place_slopes
         self.usual = self._scatters(_USUAL_POSITION)
 
@@ -151,13 +219,15 @@ class GainResidual:
     @cached_property
     def _plain(self) -> float:
         """log p(residual) without a process."""
-        each = [_WithoutProcess.of(nodes, self.fixed).log_density for nodes in self._scatters(_ANY_POSITION)]
-        return float(logsumexp(each))
+        return float(logsumexp([self._without(nodes).log_density for nodes in self._scatters(_ANY_POSITION)]))
+
+    def _without(self, nodes: ScatterNodes) -> _WithoutProcess:
+        return _WithoutProcess.of(nodes, self._fixed, self._pairs, self._spread)
 
     @cached_property
     def _usual(self) -> _WithoutProcess:
         """At all scatters of place and gain that can matter: no process gains more in one than half of χ² there."""
-        each = [_WithoutProcess.of(nodes, self.fixed) for nodes in self.usual]
+        each = [self._without(nodes) for nodes in self.usual]
         least = max(float(entry.log_density.max()) for entry in each) - _GONE
         highest = [
             entry.log_density + 0.5 * (entry.weighed @ nodes.residual)
@@ -168,7 +238,7 @@ class GainResidual:
     @cached_property
     def _still(self) -> _WithoutProcess:
         """Without scatter of place, at one usual scatter of gain."""
-        return _WithoutProcess.of(self.usual[0], self.fixed).at(np.arange(len(_GAINS)) == _USUAL_GAIN)
+        return self._without(self.usual[0]).at(np.arange(len(_GAINS)) == _USUAL_GAIN)
 
     def gains(self, sets: Floats, amplitudes: Floats, alike: Indices | None = None) -> Floats:
         """What each set of features (sets, recordings, features) gains over none at all, in log evidence (sets,).
@@ -192,10 +262,10 @@ def _blocks(sets: Floats) -> list[Floats]:
 
 def _most_probable(sets: Floats, without: _WithoutProcess) -> Floats:
     """The most probable amplitudes of features at one scatter (sets, features)."""
-    root, taken, weighed = (values[0] for values in (without.root, without.taken, without.weighed))
-    reduced, turned = taken @ sets, sets.transpose(0, 2, 1)
-    gram = (turned * root**2) @ sets - reduced.transpose(0, 2, 1) @ reduced + np.eye(sets.shape[2])
-    return np.asarray(np.linalg.solve(gram, (turned @ weighed)[..., None])[..., 0])
+    count, rows, size = sets.shape
+    columns = np.ascontiguousarray(sets.transpose(1, 0, 2)).reshape(rows, -1)
+    gram = without.products(columns, count)[:, 0] + np.eye(size)
+    return np.asarray(np.linalg.solve(gram, (sets.transpose(0, 2, 1) @ without.weighed[0])[..., None])[..., 0])
 
 
 def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
@@ -203,8 +273,8 @@ def _with(sets: Floats, amplitudes: Floats, without: _WithoutProcess) -> Floats:
     from underskin.diagnosis.selection.process_kernel import gained
 
     count, rows, size = sets.shape
-    columns = sets.transpose(1, 0, 2).reshape(rows, -1)
-    gram = _weighed_grams(columns, count, without.root) - _grams(without.taken @ columns, count)
+    columns = np.ascontiguousarray(sets.transpose(1, 0, 2)).reshape(rows, -1)
+    gram = without.products(columns, count)
     moment = (without.weighed @ columns).reshape(-1, count, size).swapaxes(0, 1)
     each = np.empty((count * len(without.root), len(amplitudes)))
     gained(gram.reshape(-1, size, size), np.ascontiguousarray(moment).reshape(-1, size), amplitudes, each)

@@ -18,159 +18,128 @@ normal on the value, or on its natural logarithm where `scale` is log (then `mea
 logarithm), or left out: uniform.
 """
 
-import os
 import re
-from collections.abc import Mapping
-from hashlib import sha256
-from pathlib import Path
+import tempfile
+from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
-import yaml
 
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.declared.expressions import Expression, read, together
 from underskin.mechanisms.declared.mechanism import FREQUENCY, DeclaredMechanism, DeclaredOfLines, DeclaredOfRecordings
 from underskin.mechanisms.declared.of_curves import DeclaredOfCurves
-from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
+from underskin.mechanisms.declared.parameters import LONGEST_TEXT, NAME, parameters, require_fields, text
+from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.unnamed.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
+from underskin.recordings.readers import json_file, plain_yaml
+from underskin.recordings.readers.sandbox import call_apart
+from underskin.recordings.shown_values import shown
 from underskin.units import Array
 
 SCHEMA = "mechanism/1"
-FOLDER = "UNDERSKIN_MECHANISMS"  # the setting
 LARGEST_BYTES = 100_000
+_READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 _FIELDS = ("schema", "name", "description", "acts_on", "axes", "law", "parameters", "source")
-_OF_PARAMETER = ("unit", "low", "high", "scale", "prior", "limit", "reason")
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_MOST_PARAMETERS = 6
-_LONGEST_TEXT = 500
 _PLACES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, where a law is looked at
+_FAR_PLACES = (*_PLACES, 1e3, 1e6, 1e9)  # up to load cycles, of which there are the most
 _NEUTRAL = 1e-6
+_ADDED = ("force", "position")  # what a law adds to, where the others are factors
+# Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
+_NOTICED_FACTOR, _NOTICED_ADDED = 1e-9, 1e-15
+_QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, where that is looked for
 
 
-def parse(data: bytes, file: str) -> DeclaredMechanism:
-    """The mechanism of a document; raises FileError that names the file, the line and the reason."""
+def parse(data: bytes, file: str, *, apart: bool = False) -> DeclaredMechanism:
+    """The mechanism of a document; raises FileError that names the file, the line and the reason.
+
+    `apart`: YAML is parsed in a process of its own, under the limits of reading a file.
+    """
     if len(data) > LARGEST_BYTES:
         raise FileError(file, "", f"a mechanism may have up to {LARGEST_BYTES} bytes")
     try:
-        text = data.decode("utf-8")
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text, Loader=yaml.SafeLoader)):
-            raise FileError(file, "", "references (*name) are not allowed")
-        tree = yaml.compose(text, Loader=yaml.SafeLoader)
-        document = yaml.safe_load(text)
-    except yaml.MarkedYAMLError as error:
-        place = f"line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise FileError(file, place, f"not YAML: {error.problem}") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise FileError(file, "", f"not YAML: {error}") from None
+        document, lines = _read(data, apart=apart)
+    except FileError as error:
+        raise FileError(file, error.place, error.reason, code=error.code) from None
     try:
         return from_dict(document)
     except InvalidInput as refusal:
-        value = "" if refusal.value is None else f" = {refusal.value!r:.60}"
-        place = f"line {_line(tree, refusal.field)}"
-        raise FileError(file, place, f"{refusal.field}{value}: {refusal.allowed}") from None
+        value = "" if refusal.value is None else f" = {shown(refusal.value)!r:.60}"
+        line = _line(lines, refusal.field)
+        raise FileError(
+            file, "" if line is None else f"line {line}", f"{refusal.field}{value}: {refusal.allowed}"
+        ) from None
 
 
-def _line(tree: Any, field: str) -> int:
+def _read(data: bytes, *, apart: bool) -> tuple[Any, Mapping[str, int]]:
+    """What a file holds, as YAML or as JSON, which states no lines."""
+    if data.lstrip()[:1] == b"{":
+        try:
+            return json_file.document(data, ""), {}
+        except FileError:
+            pass  # YAML has braces too
+    with tempfile.TemporaryFile() as stream:
+        stream.write(data)
+        stream.seek(0)
+        held = call_apart(_READ_YAML, stream, "", what="a mechanism") if apart else plain_yaml.document(stream)
+    return held["document"], held["lines"]
+
+
+def _line(lines: Mapping[str, int], field: str) -> int | None:
     """The line on which a field of the document stands, or else the nearest one above it."""
-    node, line = tree, 1
-    for key in re.split(r"[.,\s]", field):
-        if not isinstance(node, yaml.MappingNode):
-            break
-        found = [(name, value) for name, value in node.value if name.value == key]
-        if not found:
-            break
-        line, node = found[0][0].start_mark.line + 1, found[0][1]
-    return line
+    if not lines:
+        return None
+    path = re.split(r"[,\s]", field)[0]
+    while path and path not in lines:
+        path = path.rpartition(".")[0]
+    return lines.get(path, 1)
 
 
 def from_dict(document: Any) -> DeclaredMechanism:
     """The mechanism of a document; raises InvalidInput that names the field."""
     if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
         raise InvalidInput("schema", None, f"must be {SCHEMA}")
-    _only(document, _FIELDS, "")
+    require_fields(document, _FIELDS, "")
     name = document.get("name")
-    if not isinstance(name, str) or not _NAME.fullmatch(name):
-        raise InvalidInput("name", name, "must be lower case letters, digits and _")
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        raise InvalidInput("name", shown(name), "must be lower case letters, digits and _")
     acts_on: Any = document.get("acts_on")
     if acts_on not in get_args(ActsOn):
-        raise InvalidInput("acts_on", acts_on, f"must be one of {', '.join(get_args(ActsOn))}")
+        raise InvalidInput("acts_on", shown(acts_on), f"must be one of {', '.join(get_args(ActsOn))}")
     axes = _axes(document.get("axes"), acts_on)
     of_curves = set(axes) <= set(OF_SAMPLES)
-    parameters = _parameters(document.get("parameters"), name)
-    known = {*axes, *parameters}
-    texts = document.get("law")
-    texts = list(texts) if isinstance(texts, list) else [texts]
-    if len(texts) != (2 if acts_on == "position" and not of_curves else 1):
-        raise InvalidInput("law", None, "must be one expression, of a position of FRFs a list of two: x and y")
-    laws = tuple(read(text, "law", known) for text in texts)
-    _used(laws, axes, parameters)
+    declared = parameters(document.get("parameters"), name)
+    laws = _laws(document.get("law"), {*axes, *declared}, 2 if acts_on == "position" and not of_curves else 1)
+    _used(laws, axes, declared)
     kind: type[DeclaredMechanism] = DeclaredOfLines if acts_on == "frequency_response" else DeclaredOfRecordings
     if of_curves:
         kind = DeclaredOfCurves
-        _defined(laws[0], axes, parameters)
-    _neutral(laws, acts_on, axes, parameters)
-    renamed = tuple(parameters.values())
-    return kind(
-        name,
-        _text(document, "description"),
-        acts_on,
-        axes,
-        laws,
-        renamed,
-        _text(document, "source"),
-    )
+        _defined(laws[0], axes, declared)
+    _neutral(laws, acts_on, axes, declared)
+    _noticed(laws, acts_on, axes, declared)
+    description, source = (text(document, field, LONGEST_TEXT, field) for field in ("description", "source"))
+    return kind(name, description, acts_on, axes, laws, tuple(declared.values()), source)
 
 
-def in_folder(folder: Path | None = None) -> list[tuple[DeclaredMechanism, str]]:
-    """The mechanisms of the lab's folder, by file name, each with its file and digest.
-
-    Without a folder that of the setting; none where that is not set. Raises FileError for the first that cannot be
-    used: a diagnosis without it would be another diagnosis.
-    """
-    where = folder or (Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None)
-    if where is None or not where.is_dir():
-        return []
-    found = []
-    for file in sorted(where.glob("*.yaml")):
-        data = file.read_bytes()
-        found.append((parse(data, str(file)), f"{file.name} {sha256(data).hexdigest()[:12]}"))
-    return found
-
-
-def digest() -> str:
-    """SHA-256 of the files of the lab's folder, with their names; empty where there are none."""
-    where = Path(os.environ[FOLDER]) if os.environ.get(FOLDER) else None
-    files = [] if where is None else sorted(where.glob("*.yaml"))
-    whole = sha256()
-    for file in files:
-        whole.update(file.name.encode() + b"\0" + sha256(file.read_bytes()).digest())
-    return whole.hexdigest() if files else ""
-
-
-def _only(document: Mapping[Any, Any], known: tuple[str, ...], prefix: str) -> None:
-    for name in document:
-        if name not in known:
-            raise InvalidInput(f"{prefix}{name}", None, f"is no field; known: {', '.join(known)}")
-
-
-def _text(document: Mapping[str, Any], name: str) -> str:
-    value = document.get(name)
-    if not isinstance(value, str) or not value.strip() or len(value) > _LONGEST_TEXT:
-        raise InvalidInput(name, value, f"must be a text of 1 to {_LONGEST_TEXT} characters")
-    return " ".join(value.split())
+def _laws(value: Any, known: set[str], count: int) -> tuple[Expression, ...]:
+    texts = list(value) if isinstance(value, list) else [value]
+    if len(texts) != count:
+        raise InvalidInput("law", None, "must be one expression, of a position of FRFs a list of two: x and y")
+    return tuple(read(text, "law", known) for text in texts)
 
 
 def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
     good = isinstance(value, list) and value and all(isinstance(name, str) and _AXIS.fullmatch(name) for name in value)
     if not good:
         raise InvalidInput(
-            "axes", value, "must be a list of fields, of axes such as order, or of columns of conditions"
+            "axes", shown(value), "must be a list of fields, of axes such as order, or of columns of conditions"
         )
     sampled = [name for name in value if name in OF_SAMPLES]
     if sampled and len(sampled) < len(value):
-        raise InvalidInput("axes", value, f"{sampled[0]} is of the samples of curves: none of recordings beside it")
+        raise InvalidInput(
+            "axes", shown(value), f"{sampled[0]} is of the samples of curves: none of recordings beside it"
+        )
     if sampled and acts_on not in OF_CURVES:
         raise InvalidInput("acts_on", acts_on, f"must be one of {', '.join(OF_CURVES)} for a law of curves")
     if acts_on == "position" and "force_n" in value:
@@ -178,52 +147,6 @@ def _axes(value: Any, acts_on: str) -> tuple[str, ...]:
     if FREQUENCY in value and acts_on != "frequency_response":
         raise InvalidInput("axes", FREQUENCY, "is an axis of acts_on frequency_response only")
     return tuple(value)
-
-
-def _parameters(value: Any, mechanism: str) -> dict[str, Parameter]:
-    if not isinstance(value, Mapping) or not 0 < len(value) <= _MOST_PARAMETERS:
-        raise InvalidInput("parameters", None, f"must be 1 to {_MOST_PARAMETERS} parameters by name")
-    return {name: _parameter(name, entry, mechanism) for name, entry in value.items()}
-
-
-def _parameter(name: Any, entry: Any, mechanism: str) -> Parameter:
-    field = f"parameters.{name}"
-    if not isinstance(name, str) or not _NAME.fullmatch(name) or not isinstance(entry, Mapping):
-        raise InvalidInput(field, None, "must be a name with unit, low and high")
-    _only(entry, _OF_PARAMETER, f"{field}.")
-    unit = entry.get("unit", "-")
-    if not isinstance(unit, str) or not 0 < len(unit) <= 12:
-        raise InvalidInput(f"{field}.unit", unit, "must be a short text, - for none")
-    scale = entry.get("scale", "linear")
-    if scale not in ("linear", "log"):
-        raise InvalidInput(f"{field}.scale", scale, "must be linear or log")
-    low, high = (_number(entry, key, field) for key in ("low", "high"))
-    if not low < high or (scale == "log" and low <= 0):
-        raise InvalidInput(f"{field}.high", high, f"must be above low, {low:g}, and both above 0 on a log scale")
-    limit = None if entry.get("limit") is None else _number(entry, "limit", field)
-    prior = _prior(entry.get("prior"), scale, field)
-    if isinstance(prior, Normal) and not low <= entry["prior"]["mean"] <= high:
-        raise InvalidInput(f"{field}.prior.mean", entry["prior"]["mean"], f"must lie within {low:g} to {high:g}")
-    reason = entry.get("reason", f"declared by the lab for {mechanism}")
-    return Parameter(name, unit, low, high, prior, scale, limit, str(reason))
-
-
-def _prior(value: Any, scale: str, field: str) -> Prior:
-    if value is None:
-        return Uniform()
-    if not isinstance(value, Mapping) or set(value) != {"mean", "sd"}:
-        raise InvalidInput(f"{field}.prior", None, "must be {mean: …, sd: …}, or be left out")
-    mean, sd = (_number(value, key, f"{field}.prior") for key in ("mean", "sd"))
-    if sd <= 0 or (scale == "log" and mean <= 0):
-        raise InvalidInput(f"{field}.prior.sd", sd, "must be above 0, and on a log scale the mean as well")
-    return Normal(float(np.log(mean)) if scale == "log" else mean, sd)
-
-
-def _number(document: Mapping[str, Any], name: str, field: str) -> float:
-    value = document.get(name)
-    if type(value) not in (int, float) or not np.isfinite(value):  # type: ignore[arg-type]
-        raise InvalidInput(f"{field}.{name}", value, "must be a finite number")
-    return float(value)  # type: ignore[arg-type]
 
 
 def _defined(law: Expression, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
@@ -247,7 +170,7 @@ def _neutral(
         name: entry.from_fit(entry.quantile(0.5)) if entry.limit is None else entry.limit
         for name, entry in parameters.items()
     }
-    nothing = 0.0 if acts_on in ("force", "position") else 1.0
+    nothing = 0.0 if acts_on in _ADDED else 1.0
     for law in laws:
         found = _evaluated(law, axes, values)
         known = found[np.isfinite(found)]
@@ -256,11 +179,39 @@ def _neutral(
             raise InvalidInput("law", law.text, f"{said}; it is {known[np.abs(known - nothing).argmax()]:.3g} there")
 
 
-def _evaluated(law: Expression, axes: tuple[str, ...], values: Mapping[str, float]) -> Array:
+def _noticed(
+    laws: tuple[Expression, ...], acts_on: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]
+) -> None:
+    """Whether each parameter changes a law somewhere within its bounds: one that does not has any value at all."""
+    least = _NOTICED_ADDED if acts_on in _ADDED else _NOTICED_FACTOR
+    for name in parameters:
+        changes = (_change(law, name, axes, parameters) for law in laws if name in law.names)
+        if max(changes, default=0.0) < least:
+            allowed = f"must change the law by more than {least:g} between its bounds, for axes up to 1e9"
+            raise InvalidInput(f"parameters.{name}", None, allowed)
+
+
+def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> float:
+    """The largest change of a law, relative where that is large, by one parameter with the others at some quantile."""
+    largest = 0.0
+    for probability in _QUANTILES:
+        at = {other: entry.from_fit(entry.quantile(probability)) for other, entry in parameters.items()}
+        by_value = [{**at, name: parameters[name].from_fit(parameters[name].quantile(end))} for end in _QUANTILES]
+        found = np.array([_evaluated(law, axes, values, _FAR_PLACES) for values in by_value])
+        with np.errstate(all="ignore"):
+            change = np.abs(found[1:] - found[:-1]) / np.maximum(np.abs(found[1:]), 1.0)
+        largest = max(largest, float(np.max(change, initial=0.0, where=np.isfinite(change))))
+    return largest
+
+
+def _evaluated(
+    law: Expression, axes: tuple[str, ...], values: Mapping[str, float], places: Sequence[float] = _PLACES
+) -> Array:
     """At a few places of all axes together (places,)."""
+    numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
     with np.errstate(all="ignore"):
-        found = np.asarray(law({**values, **dict.fromkeys(axes, np.array(_PLACES))}))
-    return np.asarray(found + np.zeros(len(_PLACES)))
+        found = np.asarray(law({**numbers, **dict.fromkeys(axes, np.array(places))}))
+    return np.asarray(found + np.zeros(len(places)))
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:

@@ -16,7 +16,7 @@ from underskin.units import Array
 
 LONGEST, _MOST_NODES, _LARGEST = 500, 200, 1e12
 Value = Differentiated | Array | complex
-CONSTANTS: Mapping[str, complex] = {"pi": np.pi, "i": 1j}
+CONSTANTS: Mapping[str, np.float64 | np.complex128] = {"pi": np.float64(np.pi), "i": np.complex128(1j)}
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def _check(node: ast.AST, field: str, known: Collection[str], called: Collection
 
 def _value(node: ast.expr, values: Mapping[str, Value]) -> Value:
     if isinstance(node, ast.Constant):
-        return float(node.value)  # type: ignore[arg-type]
+        return np.float64(node.value)  # type: ignore[arg-type]  # which may be divided by 0
     match node:
         case ast.Name(id=name):
             return CONSTANTS[name] if name in CONSTANTS else values[name]

@@ -5,6 +5,7 @@
 
 import math
 import re
+from collections.abc import Iterator
 from typing import Any, BinaryIO
 
 import yaml
@@ -15,6 +16,9 @@ from underskin.recordings.readers import text
 _MOST_NESTED = 100  # LibYAML's composer has no limit but the stack
 _LONGEST_INTEGER = 1 << 63
 _FLOAT = "tag:yaml.org,2002:float"
+_HALF = re.compile(r"\\[uU](?:0000)?([dD][89a-fA-F][0-9a-fA-F]{2})")
+_ESCAPE = 10  # characters of the longest escape
+_KEY = re.compile(r"\s*([A-Za-z_]\w*)\s*:")
 _Base: Any = yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader
 
 
@@ -46,16 +50,25 @@ _PlainLoader.add_implicit_resolver(
 
 
 def document(stream: BinaryIO) -> dict[str, Any]:
-    """`document`: what an open YAML file holds, of what JSON has; raises FileError that names the line."""
+    """`document`: what an open YAML file holds, of what JSON has; `lines`: on which line each field stands, by its
+    path (`parameters.loss.low`). Raises FileError that names the line."""
     written = text.decode(stream.read(), "")
     try:
         _require_plain(written)
-        return {"document": _as_json(yaml.load(written, Loader=_PlainLoader))}  # noqa: S506 (a SafeLoader)
+        loader = _PlainLoader(written)
+        try:
+            tree = loader.get_single_node()
+            lines = dict(_lines(tree, ""))
+            held = None if tree is None else _as_json(loader.construct_document(tree), "", lines)
+        finally:
+            loader.dispose()
     except yaml.MarkedYAMLError as error:
-        place = f"line {error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise FileError("", place, f"not YAML: {error.problem}") from None
+        raise _not_yaml(error, written) from None
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         raise FileError("", "", f"not YAML: {error}") from None
+    except (LookupError, AttributeError, TypeError, ArithmeticError):  # a tag, such as !!bool, of what is none
+        raise FileError("", "", "not YAML: a value is not of the type that its tag states") from None
+    return {"document": held, "lines": lines}
 
 
 def _require_plain(written: str) -> None:
@@ -74,20 +87,62 @@ def _refused(event: yaml.Event, problem: str) -> FileError:
     return FileError("", place, f"not YAML: {problem}")
 
 
-def _as_json(value: Any) -> Any:
+def _not_yaml(error: yaml.MarkedYAMLError, written: str) -> FileError:
+    """A problem at a mark; where it is half of a surrogate pair, which LibYAML refuses, with the field."""
+    mark = error.problem_mark
+    if mark is None:
+        return FileError("", "", f"not YAML: {error.problem}")
+    lines, place = written.split("\n"), f"line {mark.line + 1}"
+    half = _HALF.search(lines[min(mark.line, len(lines) - 1)], max(0, mark.column - _ESCAPE))
+    if half is None:
+        return FileError("", place, f"not YAML: {error.problem}")
+    keys = (_KEY.match(line) for line in lines[mark.line :: -1])
+    return _no_text(next((key[1] for key in keys if key), "a key"), int(half[1], 16), place)
+
+
+def _no_text(field: str, character: int, place: str) -> FileError:
+    return FileError("", place, f"{field}: the character U+{character:04X}, half of a surrogate pair, is no text")
+
+
+def _lines(node: Any, path: str) -> Iterator[tuple[str, int]]:
+    """The line of each key of a mapping, and of those within it."""
+    if not isinstance(node, yaml.MappingNode):
+        return
+    for key, value in node.value:
+        place = _below(path, str(key.value)) if isinstance(key, yaml.ScalarNode) else path
+        yield place.encode("utf-8", "replace").decode(), key.start_mark.line + 1
+        yield from _lines(value, place)
+
+
+def _as_json(value: Any, path: str, lines: dict[str, int]) -> Any:
     """What YAML has beyond JSON, as text: nothing that a field takes."""
     if isinstance(value, dict):
-        return {_as_text(name): _as_json(entry) for name, entry in value.items()}
+        return {
+            _as_text(name, path, lines): _as_json(entry, _below(path, str(name)), lines)
+            for name, entry in value.items()
+        }
     if isinstance(value, list):
-        return [_as_json(entry) for entry in value]
+        return [_as_json(entry, path, lines) for entry in value]
     if value is None or isinstance(value, bool):
         return value
     if isinstance(value, int):
         return value if abs(value) < _LONGEST_INTEGER else str(value)
     if isinstance(value, float) and math.isfinite(value):
         return value
-    return _as_text(value)
+    return _as_text(value, path, lines)
 
 
-def _as_text(value: Any) -> str:
-    return str(value).encode("utf-8", "replace").decode()
+def _below(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def _as_text(value: Any, path: str, lines: dict[str, int]) -> str:
+    """Raises FileError that names line, field and character, where a text has half of a surrogate pair."""
+    written = str(value)
+    try:
+        written.encode()
+    except UnicodeEncodeError as error:
+        field = path.encode("utf-8", "replace").decode() or "a key"
+        place = f"line {lines[field]}" if field in lines else ""
+        raise _no_text(field, ord(written[error.start]), place) from None
+    return written
