@@ -8,9 +8,9 @@ The change between the first and the last date is that of a course with a gain e
     a_c = m + b t_c + w(t_c) + ε_c,    w a random walk, Var w(t) = q² t, ε_c ~ N(0, g²),
 with t from 0 to 1, flat priors of m and b, and w for what the course is beside a straight line: g, the scatter of
 mounting and amplifier that all sensors of a date share, is no change, and widens the interval. (q, g) are marginalised
-on a grid: each is zero, or q half-Cauchy (Gelman 2006) and g half-normal. Of two dates no scatter can be estimated: q = g = 0. Of few dates
-the change is a at the last less a at the first, ± √2 g, as the values beside it have it; of many, which smoothing makes
-surer, b + w(1).
+on a grid: each is zero, or q half-Cauchy (Gelman 2006) and g half-normal. Of two dates no scatter can be estimated:
+q = g = 0. Of few dates the change is a at the last less a at the first, ± √2 g, as the values beside it have it; of
+many, which smoothing makes surer, b + w(1).
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ FEWEST_DATES = 3  # that tell scatter from change
 _SMOOTHED = 6  # dates: of five the smoothed change is no more than a fourth surer than the difference of the two ends
 FEWEST_SENSORS = 3  # of which one can be told from the others
 _PRIOR_SENSORS = 4.0  # sensors that the stated uncertainties are worth beside the scatter that is seen
-# Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 % (PHYSICS.md, section 8),
-# of which mounting and amplifier are a part; a chain that is as it was differs by a percent from date to date, seldom by
-# three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
+# Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 %, of which mounting
+# and amplifier are a part (PHYSICS.md, section 8); a chain that stays as it was differs by a percent from date to date,
+# seldom by three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
 _NO_GAIN, _GAIN_SCALE = 0.25, 0.0125
 _NO_WALK, _WALK_SCALE = 0.6, 0.05
 _NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
