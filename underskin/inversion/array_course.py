@@ -6,9 +6,11 @@ the others take no part in a.
 
 The change between the first and the last date is that of a course with a gain error on each date,
     a_c = m + b t_c + w(t_c) + ε_c,    w a random walk, Var w(t) = q² t, ε_c ~ N(0, g²),
-with t from 0 to 1, flat priors of m and b, and w for what the course is beside a straight line. It is b + w(1): g, the
-scatter of mounting and amplifier that all sensors of a date share, is no change, and widens the interval. (q, g) are
-marginalised on a grid: each is zero or half-Cauchy (Gelman 2006). Of two dates no scatter can be estimated: q = g = 0.
+with t from 0 to 1, flat priors of m and b, and w for what the course is beside a straight line: g, the scatter of
+mounting and amplifier that all sensors of a date share, is no change, and widens the interval. (q, g) are marginalised
+on a grid: each is zero, or q half-Cauchy (Gelman 2006) and g half-normal. Of two dates no scatter can be estimated:
+q = g = 0. Of few dates the change is a at the last less a at the first, ± √2 g, as the values beside it have it; of
+many, which smoothing makes surer, b + w(1).
 """
 
 from dataclasses import dataclass
@@ -20,12 +22,13 @@ from underskin.inversion.beyond_chance import BY_CHANCE
 from underskin.units import Floats, Mask
 
 FEWEST_DATES = 3  # that tell scatter from change
+_SMOOTHED = 6  # dates: of five the smoothed change is no more than a fourth surer than the difference of the two ends
 FEWEST_SENSORS = 3  # of which one can be told from the others
 _PRIOR_SENSORS = 4.0  # sensors that the stated uncertainties are worth beside the scatter that is seen
-# Priors of g and q: the probability of none, and the scale of the half-Cauchy one. Gains scatter by 1 to 5 %, of which
-# mounting and amplifier are a part (PHYSICS.md, section 8), and few chains are calibrated anew on each date; walks are
-# as wide as the sensors of an array are spread (mixed_model).
-_NO_GAIN, _GAIN_SCALE = 0.25, 0.01
+# Priors: the probability of none, and the scale. g: gains of single recordings scatter by 1 to 5 %, of which mounting
+# and amplifier are a part (PHYSICS.md, section 8); a chain that stays as it was differs by a percent from date to date,
+# seldom by three, so half-normal. q: as wide as the sensors of an array are spread (mixed_model), half-Cauchy.
+_NO_GAIN, _GAIN_SCALE = 0.25, 0.0125
 _NO_WALK, _WALK_SCALE = 0.6, 0.05
 _NODES = np.concatenate([[0.0], np.geomspace(1e-3, 0.5, 12)])
 _LEAST_DEVIATION = 1e-6  # relative: values without noise
@@ -106,20 +109,29 @@ def changes(time: Floats, value: Floats, deviation: Floats, *, gain_scatters: bo
     The random walk is a Kalman filter over y and the columns of m and b; the rest is generalised least squares.
     """
     known = np.isfinite(value) & np.isfinite(deviation)
-    enough = known.sum(axis=1) > 1
-    first = time[np.argmax(known, axis=1)]
-    last = time[len(time) - 1 - np.argmax(known[:, ::-1], axis=1)]
-    enough &= last > first
-    t = np.clip((time - first[:, None]) / np.where(enough, last - first, 1.0)[:, None], 0.0, 1.0)
-    weights, mean, spread = _posterior(
-        t, np.where(known, value, 0.0), np.where(known, deviation, 1.0), known, gain_scatters
-    )
+    begin, end = np.argmax(known, axis=1), known.shape[1] - 1 - np.argmax(known[:, ::-1], axis=1)
+    enough = (known.sum(axis=1) > 1) & (time[end] > time[begin])
+    span = np.where(enough, time[end] - time[begin], 1.0)
+    t = np.clip((time - time[begin][:, None]) / span[:, None], 0.0, 1.0)
+    y, u = np.where(known, value, 0.0), np.where(known, deviation, 1.0)
+    gains = _NODES if gain_scatters else _NODES[:1]
+    walk, gain = (grid.ravel() for grid in np.meshgrid(_NODES, gains, indexing="ij"))
+    weights, *of_course = _posterior(t, y, u, known, walk, gain)
+    rows = np.arange(len(value))
+    apart = (y[rows, end] - y[rows, begin])[:, None] + np.zeros(len(gain))
+    of_ends = apart, np.sqrt((u[rows, end] ** 2 + u[rows, begin] ** 2)[:, None] + 2 * gain**2)
+    few = known.sum(axis=1) < _SMOOTHED
+    stated = np.where(few, *(_summary(weights, mean, spread) for mean, spread in (of_ends, of_course)))
+    return Changes(*(np.where(enough, column, np.nan) for column in stated))
+
+
+def _summary(weights: Floats, mean: Floats, spread: Floats) -> Floats:
+    """Of mixtures of normals (series, nodes): mean, standard deviation, interval, p-value (5, series)."""
     centre = (weights * mean).sum(axis=1)
     variance = (weights * (spread**2 + (mean - centre[:, None]) ** 2)).sum(axis=1)
     low, high = (_quantile(weights, mean, spread, q) for q in ((1 - _LEVEL) / 2, (1 + _LEVEL) / 2))
     below = (weights * ndtr(-mean / spread)).sum(axis=1)
-    columns = (centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below))
-    return Changes(*(np.where(enough, column, np.nan) for column in columns))
+    return np.array([centre, np.sqrt(variance), low, high, 2 * np.minimum(below, 1 - below)])
 
 
 def _joined_dates(known: Mask) -> Mask:
@@ -192,11 +204,9 @@ def _weighted(y: Floats, known: Mask, deviation: Floats) -> tuple[Floats, Floats
 
 
 def _posterior(
-    t: Floats, value: Floats, deviation: Floats, known: Mask, gain_scatters: bool
+    t: Floats, value: Floats, deviation: Floats, known: Mask, walk: Floats, gain: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Weight, mean and standard deviation of the change at each node of (q, g), (series, nodes) each."""
-    gains = _NODES if gain_scatters else _NODES[:1]
-    walk, gain = (grid.ravel() for grid in np.meshgrid(_NODES, gains, indexing="ij"))
+    """Weight, mean and standard deviation of b + w(1) at each node of (q, g), (series, nodes) each."""
     columns = np.stack([value, np.ones_like(value), t], axis=2)
     series = len(value)
     at = np.zeros((series, len(walk), 3))
@@ -229,12 +239,13 @@ def _posterior(
 
 def _log_prior(walk: Floats, gain: Floats) -> Floats:
     """ln of the prior weight of each node, the cells of the grid included."""
+    densities = 1 / (1 + (_NODES / _WALK_SCALE) ** 2), np.exp(-0.5 * (_NODES / _GAIN_SCALE) ** 2)
     total = np.zeros(len(walk))
-    for at, scale, none in ((walk, _WALK_SCALE, _NO_WALK), (gain, _GAIN_SCALE, _NO_GAIN)):
-        cells = np.gradient(_NODES) / (1 + (_NODES / scale) ** 2)
+    for at, density, none in zip((walk, gain), densities, (_NO_WALK, _NO_GAIN), strict=True):
+        cells = np.gradient(_NODES) * density
         cells *= (1 - none) / cells[1:].sum()
         cells[0] = none
-        total += np.log(cells[np.searchsorted(_NODES, at)])
+        total += np.log(np.maximum(cells[np.searchsorted(_NODES, at)], 1e-300))
     return total
 
 
