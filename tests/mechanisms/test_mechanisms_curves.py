@@ -67,7 +67,9 @@ def test_the_layer_pushes_back_as_the_independent_contact_says() -> None:
     a = H_MM * np.array([row["a_over_h"] for row in rows])
     depth = a**2 / R_MM * [row["indentation_r_over_a2"] for row in rows]
     force = 4 / 3 * E_MPA / 0.75 * a**3 / R_MM * [row["force_over_hertz"] for row in rows]
-    assert force_at(["layered_contact"], depth) == pytest.approx(force, rel=1e-5)
+    shallow = depth < 0.4 * R_MM  # beyond, the sphere is no paraboloid
+    assert shallow.sum() > 20
+    assert force_at(["layered_contact"], depth[shallow]) == pytest.approx(force[shallow], rel=1e-5)
 
 
 def test_adhesion_pulls_until_it_lets_go_at_the_jkr_depth() -> None:
@@ -154,7 +156,7 @@ def test_what_relaxes_and_stiffens_is_stiffer_by_the_contact_of_the_moment() -> 
 def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
     recorded = compression_campaign()
     ramp = CompressionRecording(
-        "c", 30.0, 30.0, np.linspace(0, 3, 200), np.linspace(0, 141.4, 200), time_s=np.linspace(0, 40, 200)
+        "c", 30.0, 30.0, np.linspace(0, 3e-4, 200), np.linspace(0, 0.01414, 200), time_s=np.linspace(0, 40, 200)
     )
     time = ramp.time_s
     assert time is not None
@@ -164,7 +166,7 @@ def test_a_ramp_of_force_relaxes_as_its_closed_form() -> None:
     relaxed = predicted(["contact_creep"], recorded, **begins, relaxed_fraction=0.5, relaxation_time=8.0)
     ratio = relaxed[1:200] / predicted([], recorded, **begins)[1:200]
     memory = 1 - (1 - np.exp(-time[1:] / 8.0)) * 8.0 / time[1:]
-    assert ratio == pytest.approx(1 - 0.5 * memory, rel=1e-9)
+    assert ratio == pytest.approx(1 - 0.5 * memory, rel=1e-4)  # so little strain is linear to that
 
 
 def test_a_body_that_relaxed_is_softer_on_the_way_back() -> None:
@@ -188,11 +190,13 @@ def stress_over_modulus(names: Sequence[str], strain: Floats, **values: float) -
     return force / (E_MPA * np.pi / 4 * 30.0**2)
 
 
-def test_a_cylinder_follows_one_modulus_or_yeoh_s_law() -> None:
-    strain = np.linspace(0.0, 0.6, 61)
-    assert stress_over_modulus([], strain) == pytest.approx(strain)
-    found = stress_over_modulus(["strain_stiffening"], strain, second_over_first=0.0, third_over_first=0.0)
-    assert found == pytest.approx(((1 - strain) ** -2 - (1 - strain)) / 3)  # neo-Hookean
+def test_a_cylinder_is_neo_hookean_or_follows_yeoh_s_law() -> None:
+    strain = np.linspace(-0.6, 0.6, 61)
+    neo_hookean = pytest.approx(((1 - strain) ** -2 - (1 - strain)) / 3)
+    assert stress_over_modulus([], strain) == neo_hookean
+    assert (
+        stress_over_modulus(["strain_stiffening"], strain, second_over_first=0.0, third_over_first=0.0) == neo_hookean
+    )
     small = 1e-4 * strain
     found = stress_over_modulus(["strain_stiffening"], small, second_over_first=0.3, third_over_first=0.3)
     assert found == pytest.approx(small, rel=1e-4, abs=1e-12)
@@ -243,11 +247,11 @@ def test_a_sphere_in_a_well_feels_the_thin_layer() -> None:
 
 
 @NEEDS_RECORDINGS
-def test_measured_silicone_is_not_linear_but_yeoh_s() -> None:
+def test_measured_silicone_is_nearly_neo_hookean_and_yeoh_s() -> None:
     path = Path(os.environ["UNDERSKIN_RECORDINGS"]) / "silicone-compression/EF30_0T/EF30_0T_A1.csv"
     rows = np.array([line.split(",")[:3] for line in path.read_text().splitlines()[8:-1:4]], dtype=float)
     recording = CompressionRecording("c", 30.0, 50.0, rows[:, 1], rows[:, 2])
     recorded = Campaign("measured", replace(SKIN, youngs_modulus_mpa=None), (recording,))
     residual = [fitted(names, recorded, rows[:, 2])[1] for names in ([], ["strain_stiffening"])]
-    assert residual[0] > 5
+    assert 0.5 < residual[0] < 1.5
     assert residual[1] < 0.4

@@ -34,7 +34,6 @@ REFUSALS: list[tuple[str, Campaign, str]] = [
         "50 or 60 Hz",
     ),
     ("modulus_error", replace(indentation_campaign(), skin=replace(SKIN, youngs_modulus_mpa=None)), "not declared"),
-    ("layered_contact", replace(indentation_campaign(), skin=replace(SKIN, thickness_mm=None)), "thickness_mm"),
     ("platen_friction", frf_campaign(), "does not act on recordings of kind frf"),
 ]
 

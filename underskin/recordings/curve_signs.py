@@ -28,6 +28,7 @@ _SAMPLED = 20_000  # samples among which turns are sought
 _NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is read
 _STIFFER = 1.15  # times as stiff: less does not tell the deep end from the other
 _ONE_WAY = 0.1  # of the largest force, of the other sign: less is none
+_LONGEST = 0.9  # of a block's height: what moves farther is no compression
 _BOW = 0.02  # of the range of force, by which a curve lies above its chord on average where it softens plainly
 
 
@@ -55,7 +56,11 @@ def counted_negative(recording: CurveRecording) -> tuple[str, ...]:
 def orientation(recording: CurveRecording) -> Orientation:
     """How a recording counts, by its finite samples; `turns` are numbered among these."""
     force, travel = np.asarray(recording.force_n), np.asarray(recording.displacement_mm)
-    return _oriented(force, travel, sphere=isinstance(recording, IndentationRecording))
+    if isinstance(recording, IndentationRecording):
+        return _oriented(force, travel, sphere=True)
+    oriented = _oriented(force, travel, sphere=False)
+    is_pulled = len(oriented.negative) > 1 and np.nanmax(np.abs(travel)) > _LONGEST * recording.sample_height_mm
+    return replace(oriented, negative=()) if is_pulled else oriented
 
 
 def falling(force: Floats, travel: Floats, *, sphere: bool) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ _STEP = 1e-3  # of that, the tolerance on steps: a contact point's prior is far 
 _PASSED = 4  # samples at most, either way, past which a contact point is moved
 _RETURN = 0.5  # of the range of displacement: a way back that may end a contact
 _INSIDE = 1e-9  # of a parameter's range, off its bounds
+_SAME = 1e-9  # of the range of displacement: what rounding alone tells apart
 
 
 class LeastSquares:
@@ -54,7 +55,7 @@ class LeastSquares:
         priors = np.array([curvature_of_prior(entry) for entry in model.parameters])
         self._precision, self._centre = np.sqrt(priors[:, 0]), priors[:, 1]
         travels = [entry.displacement_mm for entry in curves_of(lines.campaign)]
-        self._approach = [np.unique(travel[: int(travel.argmax()) + 1]) for travel in travels]
+        self._approach = [_distinct(travel[: int(travel.argmax()) + 1]) for travel in travels]
         self._jumps = any(lines.mechanisms[name].moves_contact_points for name in model.names)
         curves = curves_of(lines.campaign) if self._jumps else []
         self._snapped = [_snapped(entry) for entry in curves]
@@ -133,6 +134,12 @@ class LeastSquares:
             coefficients.append(rows[..., own] @ solved.T)
             parts.append(rows[..., own] - coefficients[-1] @ columns.T)
         return np.concatenate([*parts, *coefficients], axis=-1)
+
+
+def _distinct(travel: Floats) -> Floats:
+    """The displacements in order, without those that rounding alone tells apart."""
+    values = np.unique(travel)
+    return values[np.append(True, np.diff(values) > _SAME * np.ptp(values))]
 
 
 def _snapped(curve: CurveConditions) -> tuple[float, float, float] | None:

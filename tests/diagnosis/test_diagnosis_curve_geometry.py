@@ -1,0 +1,146 @@
+"""What a curve's declared geometry, its tip and its course make of a diagnosis: no confident number of a wrong law."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import underskin
+from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
+from tests.support.sphere_curves import campaign, pressed, ways
+from underskin.diagnosis.inference import across_bounds
+from underskin.recordings.campaign import from_dict
+from underskin.units import Floats
+
+
+def modulus_mpa(report: underskin.Report) -> float:
+    fit: Any = report.fit
+    return float(fit.after.youngs_modulus.value if hasattr(fit, "after") else fit["after"]["youngs_modulus"]["value"])
+
+
+def block(strain: Floats, stress_mpa: Floats) -> underskin.Campaign:
+    """A cylinder of 10 by 10 mm; compression positive."""
+    curve = {
+        "id": "b1",
+        "kind": "compression",
+        "sample_height_mm": 10.0,
+        "sample_diameter_mm": 10.0,
+        "displacement_mm": (10 * strain).tolist(),
+        "force_n": (np.pi / 4 * 100 * stress_mpa).tolist(),
+    }
+    read, problems = from_dict(
+        {"schema": "campaign/1", "name": "block", "skin": {"poisson_ratio": 0.5}, "recordings": [curve]}
+    )
+    assert problems == []
+    return read
+
+
+def neo_hookean(strain: Floats) -> Floats:
+    """Nominal stress [MPa] of 1 MPa, compression positive, with noise of 0.1 % of the largest."""
+    stress = ((1 - strain) ** -2 - (1 - strain)) / 3
+    return np.asarray(stress + 1e-3 * np.abs(stress).max() * np.random.default_rng(3).normal(size=len(strain)))
+
+
+@pytest.mark.parametrize("largest", [0.08, 0.3])
+def test_a_neo_hookean_block_lacks_nothing(largest: float) -> None:
+    strain = np.linspace(0.0, largest, 200)
+    report = underskin.diagnose(block(strain, neo_hookean(strain)))
+    assert report.verdict == "no_mismatch"
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_pulled_strip_is_told_of_without_spheres() -> None:
+    strain = -np.linspace(0.0, 2.0, 120)
+    stretch = 1 - strain
+    stiffens = neo_hookean(strain) * (1 + 0.2 * (stretch**2 + 2 / stretch - 3))
+    report = underskin.diagnose(block(strain, stiffens))
+    assert [one.name for one in report.mechanisms] == ["strain_stiffening"]
+    assert "sphere" not in report.statement
+    assert "pressed" not in report.statement
+
+
+def test_a_declared_layer_is_no_guess() -> None:
+    """The layer stands beside the half space with equal odds: it explains, and is not ambiguous with stiffening."""
+    depth = ways(-0.05, 0.2, samples=400)
+    force = pressed(depth, bonded_layer(2.0, 2.0))
+    report = underskin.diagnose(campaign(depth, force, timed=False, skin={"thickness_mm": 2.0}))
+    assert (report.verdict, [one.name for one in report.mechanisms]) == ("explained", ["layered_contact"])
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+    assert "0.1 of the thickness" in report.statement
+
+
+def test_a_layer_of_unknown_thickness_is_not_told_from_stiffening() -> None:
+    depth = ways(-0.05, 0.2, samples=400)
+    report = underskin.diagnose(campaign(depth, pressed(depth, bonded_layer(2.0, 2.0)), timed=False))
+    assert report.verdict == "ambiguous"
+    assert "declare thickness_mm" in report.statement
+    assert "stiffening" in report.statement
+
+
+def test_a_sphere_pressed_deep_lacks_nothing() -> None:
+    depth = ways(-0.1, 0.3, -0.1)
+    report = underskin.diagnose(campaign(depth, pressed(depth, whole_sphere(0.2)), indenter_radius_mm=0.2))
+    assert report.verdict == "no_mismatch"
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+    assert "1.5 of the radius" in report.statement
+
+
+@pytest.mark.parametrize("skin", [{}, {"thickness_mm": 20.0, "youngs_modulus_mpa": 1.0}])
+def test_a_flat_punch_stated_as_a_sphere_concludes_nothing(skin: dict[str, float]) -> None:
+    depth = ways(-0.1, 0.3, samples=400)
+    report = underskin.diagnose(
+        campaign(depth, pressed(depth, lambda at: 8 / 3 * at), timed=False, skin=skin, indenter_radius_mm=1.0)
+    )
+    assert report.verdict == "insufficient_data"
+    assert "flat punch" in report.statement
+
+
+def test_a_cone_stated_as_a_sphere_explains_nothing_for_certain() -> None:
+    depth = ways(-0.1, 0.3, samples=120)
+    curve = campaign(depth, pressed(depth, lambda at: at**2), timed=False, indenter_radius_mm=5.0)
+    report = underskin.diagnose(curve)
+    assert report.verdict not in ("explained", "no_mismatch")
+    assert "cone" in report.statement
+
+
+def test_displacement_of_the_wrong_sign_is_turned_and_told() -> None:
+    depth = ways(-0.1, 0.25)
+    report = underskin.diagnose(campaign(-depth, pressed(depth), timed=False))
+    assert report.verdict == "no_mismatch"
+    assert "displacement is counted negative" in report.statement
+    assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
+
+
+def test_what_was_not_tried_is_said_where_it_may_be_missing() -> None:
+    """Two presses in one recording, of what relaxes: creep is not tried, and the statement says why."""
+    depth = ways(-0.1, 0.3, -0.1, 0.3, -0.1, samples=80)
+    time = 0.02 * np.arange(len(depth))
+    relaxed = 1 - 0.4 * (1 - np.exp(-(time % 3.2) / 0.8))
+    report = underskin.diagnose(campaign(depth, pressed(depth) * relaxed))
+    assert report.verdict in ("unexplained", "ambiguous")
+    assert "contact creep was not tried" in report.statement
+    assert "presses again" in report.statement
+
+
+def test_a_swapped_pair_of_columns_ends_in_no_traceback() -> None:
+    depth = ways(-0.1, 0.3, -0.1, samples=60)
+    assert underskin.diagnose(campaign(pressed(depth), depth)).verdict in ("unexplained", "insufficient_data")
+
+
+def test_a_parameter_that_is_held_in_cells_keeps_their_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One cell may have all of the probability: what is known of the parameter is its cell, and not its middle."""
+
+    class Held:
+        def __init__(self, log_evidence: float) -> None:
+            self.log_evidence, self.covariance = log_evidence, np.eye(1)
+            self.point = type("Point", (), {"fit": np.zeros(2)})()
+
+    bounded = type("Parameter", (), {"bounds": (0.0, 1.0)})()
+    model = type("Model", (), {"parameters": (bounded, bounded)})()
+    hypothesis = type("Hypothesis", (), {"model": model, "mean_places": [0, 1]})()
+    evidence: Any = type("Evidence", (), {"hypothesis": hypothesis, "covariance": np.eye(2)})()
+    monkeypatch.setattr(across_bounds, "_traded", lambda *_: 1)
+    monkeypatch.setattr(across_bounds, "_along", lambda *_: [Held(1e3 * (number == 2)) for number in range(5)])
+    parts = across_bounds.parts(evidence, 0)
+    total = np.sum([part.share * part.covariance for part in parts], axis=0)
+    assert total[1, 1] == pytest.approx(0.2**2 / 12)
