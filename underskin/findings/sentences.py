@@ -242,8 +242,8 @@ def behind_filter(high_pass_hz: float, low_pass_hz: float, percent: float, low_h
     filters += [f"a low-pass of about {in_digits(low_pass_hz, 2)} Hz"] if low_pass_hz < float("inf") else []
     return (
         f"from {low_hz:.4g} to {high_hz:.4g} Hz the response is that behind {' and '.join(filters)}, and does not "
-        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis takes "
-        "the filter into account, or record a band further off its corner"
+        f"reach its plateau: d33 is too small by about {in_digits(percent, 2)} %, and not to be quoted; a diagnosis "
+        "takes the filter into account, or record a band further off its corner"
     )
 
 

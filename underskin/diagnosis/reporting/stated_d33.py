@@ -125,8 +125,8 @@ def stated_d33(
     `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
     search (`at_bounds`, in words), no unlisted `law` over frequency acts within the band, d33 is plausible, the answer
     fits the recordings to their noise, which is a fifth of the response at most, and no wrong declared number
-    that would not show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that noise in their
-    channels leaves. `skin_pc_per_n`: the skin's declared one.
+    that would not show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that
+    noise in their channels leaves. `skin_pc_per_n`: the skin's declared one.
     """
     d33 = None if problem.lines.curves else averaged.d33(search, problem, unsure)
     if d33 is None:
