@@ -75,7 +75,7 @@ EFFECTS: dict[str, Effect] = {
     "amplifier_low_pass": Effect(
         "one pole, 1/(1 + iωτ), or Butterworth's two, 1/(1 + √2 iωτ − (ωτ)²)",
         (FRF,),
-        {"corner_hz": (1e-2, 1e5)},
+        {"corner_hz": (1e-2, 1e9)},
         ("first_order", "second_order"),
     ),
     "sensor_relaxation": Effect(

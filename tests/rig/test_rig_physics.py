@@ -139,7 +139,13 @@ def test_resonance_where_tip_mass_and_contact_spring_say() -> None:
 
 @pytest.mark.parametrize(
     ("name", "sign"),
-    [("contact_resonance", -1), ("amplifier_high_pass", 1), ("sensor_relaxation", -1), ("timing_delay", -1)],
+    [
+        ("contact_resonance", -1),
+        ("amplifier_high_pass", 1),
+        ("amplifier_low_pass", -1),
+        ("sensor_relaxation", -1),
+        ("timing_delay", -1),
+    ],
 )
 def test_signs_of_phase(name: str, sign: int) -> None:
     """e^(+iωt): what comes late or follows with inertia has a negative phase, a high-pass leads."""
@@ -176,6 +182,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "compressible_layer": {"poisson_ratio": 0.5}, "interface_slip": {"glue_stiffness": 1e6},
     "preload_dependent_d33": {"beta_per_mpa": 0}, "sensor_spread": {"sd": 0}, "ageing": {"rate": 0, "cycles": 10},
     "contact_resonance": {"tip_mass_g": 0, "damping": 0.1}, "amplifier_high_pass": {"corner_hz": 0},
+    "amplifier_low_pass": {"corner_hz": 1e9},
     "sensor_relaxation": {"exponent": 0}, "contact_creep": {"fraction": 0, "time_s": 10},
     "amplitude_nonlinearity": {"mobility": 0}, "crosstalk": {"fraction": 0}, "timing_delay": {"delay_us": 0},
     "modulus_error": {"factor": 1}, "thickness_error": {"factor": 1},

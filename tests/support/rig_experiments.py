@@ -15,6 +15,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "ageing": {"rate": 0.1, "cycles": 300.0, "law": "exponential"},
     "contact_resonance": {"tip_mass_g": 2.0, "damping": 0.05},
     "amplifier_high_pass": {"corner_hz": 1.0},
+    "amplifier_low_pass": {"corner_hz": 300.0},
     "sensor_relaxation": {"exponent": 0.05},
     "contact_creep": {"fraction": 0.6, "time_s": 20.0},
     "mains_pickup": {"charge_pc": 0.05, "mains_hz": 50.0},

@@ -98,8 +98,8 @@ def advanced(values: Complexes, frequency: Floats, delay: float) -> Complexes:
 
 
 def _phase_factors(values: Complexes) -> Complexes:
-    size = np.abs(values)
-    return np.where(np.isfinite(size) & (size > 0), values / np.where(size > 0, size, 1.0), 0.0)
+    known = np.isfinite(values) & (values != 0)
+    return np.where(known, np.exp(1j * np.angle(np.where(known, values, 1.0))), 0.0)
 
 
 def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
