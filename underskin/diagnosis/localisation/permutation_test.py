@@ -24,6 +24,7 @@ PERMUTATIONS = 999
 SEED = 20180205
 _LEAST_ARRANGEMENTS = 40
 _ALIASED = 0.98  # share of an axis' functions that the other axes' determine
+_MOST_SENSORS = 64  # of which each has a function of its own: time grows with the square of their number
 _LEVELS = 6  # up to as many levels an axis is a set of levels, beyond it a polynomial
 SIGNIFICANT = 0.05
 _WORTH_TELLING = 0.005  # share of the misfit below which an axis is no cause to look for
@@ -90,7 +91,11 @@ def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
     gain_misfit = float(((residuals.gain * weight) ** 2).sum())
     line_misfit = max(float((residuals.line_weight * np.abs(residuals.line) ** 2).sum()) - 2 * len(residuals.line), 0.0)
     total = gain_misfit + line_misfit
-    results: list[AxisResult] = []
+    results = [
+        AxisResult(name, None, 0.0, Undecidable.FEW_RECORDINGS)
+        for name in recording_axes(lines.campaign)
+        if name not in bases
+    ]
     statistics: dict[str, Floats] = {}
     for name, basis in bases.items():
         others = [other for key, other in bases.items() if key != name]
@@ -116,10 +121,12 @@ def _standardised(values: Floats) -> Floats:
 
 
 def _bases(lines: Lines) -> dict[str, Floats]:
-    """Of each axis a few functions over the recordings, their mean taken off."""
+    """Of each axis a few functions over the recordings, their mean taken off; none of too many sensors."""
     bases = {}
     for name, column in recording_axes(lines.campaign).items():
         levels, level = np.unique(np.round(column, 9), axis=0, return_inverse=True)
+        if name == "sensor" and len(levels) > _MOST_SENSORS:
+            continue
         if name == "sensor" or (len(levels) <= _LEVELS and column.shape[1] == 1):
             basis = np.eye(len(levels))[level.reshape(-1)][:, 1:]
         else:

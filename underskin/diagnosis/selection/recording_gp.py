@@ -5,7 +5,7 @@ Matérn-3/2 process over one axis of the campaign, or over all of them. Scatters
 over their priors. The residual that it works on is also what laws that nobody listed are screened against.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from underskin.diagnosis.selection.gaussian_process import AMPLITUDES, features,
 from underskin.mechanisms.models.frf import FAINT
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Array, Floats, Indices, Mask
 
 _LENGTHS = (0.15, 0.4, 1.2)  # of a recording's axis, over its range
 _LEAST_RECORDINGS = 4
@@ -68,7 +68,7 @@ class SensorPairs:
             return values
         return np.asarray(np.add.reduceat(values, self.first[:-1], axis=-1))
 
-    def spread(self, values: Floats) -> Floats:
+    def spread(self, values: Array) -> Array:
         """A number of each sensor at its pairs (…, sensors)."""
         return np.repeat(values, np.diff(self.first), axis=-1)
 
@@ -131,13 +131,17 @@ class _WithoutProcess:
     @classmethod
     def joined(cls, each: Sequence["_WithoutProcess"]) -> "_WithoutProcess":
         """The scatters of all of these, which are of the same recordings."""
-        names = ("log_density", "root", "shared", "taken", "weighed")
-        return cls(*(np.concatenate([getattr(entry, name) for entry in each]) for name in names), each[0].pairs)
+        return each[0].with_scatters(lambda name: np.concatenate([getattr(entry, name) for entry in each]))
 
     def at(self, kept: Mask) -> "_WithoutProcess":
         """At some of the scatters."""
-        of_scatters = (self.log_density, self.root, self.shared, self.taken, self.weighed)
-        return _WithoutProcess(*(values[kept] for values in of_scatters), self.pairs)
+        return self.with_scatters(lambda name: getattr(self, name)[kept])
+
+    def with_scatters(self, values: Callable[[str], Floats]) -> "_WithoutProcess":
+        """The same recordings at other scatters, each field by its name."""
+        return _WithoutProcess(
+            values("log_density"), values("root"), values("shared"), values("taken"), values("weighed"), self.pairs
+        )
 
     def summed(self, alike: Indices) -> "_WithoutProcess":
         """With the sums over recordings that are alike, which have the same features, in their place."""

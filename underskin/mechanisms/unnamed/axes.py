@@ -4,6 +4,7 @@ An axis holds one number a recording, by the recording's id: laws are bound to i
 recordings are left out has the same order, the same preload before, and the same range.
 """
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -162,7 +163,8 @@ def _previous(entries: Sequence[FrfConditions], rank: Floats) -> list[Axis]:
 
 def _worded(name: str, ids: Sequence[str], words: Sequence[str]) -> Axis:
     known = sorted(set(words))
-    return Axis(name, {key: float(known.index(word)) for key, word in zip(ids, words, strict=True)}, tuple(known))
+    number = {word: float(place) for place, word in enumerate(known)}
+    return Axis(name, {key: number[word] for key, word in zip(ids, words, strict=True)}, tuple(known))
 
 
 def _further(entries: Sequence[FrfConditions]) -> list[Axis]:
@@ -175,7 +177,8 @@ def _further(entries: Sequence[FrfConditions]) -> list[Axis]:
             continue
         if any(isinstance(value, str) for value in known.values()):
             words = [str(value) for value in known.values()]
-            common = max(sorted(set(words)), key=words.count)
+            counts = Counter(words)
+            common = max(sorted(counts), key=counts.__getitem__)
             axes.append(_worded(name, list(given), [str(known.get(key, common)) for key in given]))
         else:
             middle = float(np.median([float(value) for value in known.values()]))

@@ -25,6 +25,7 @@ Features = Callable[[Floats, Values], Sequence[Feature]]
 
 FORMS: tuple[Form, ...] = get_args(Form)
 _LEAST_LEVELS = {"power": 3, "exponential": 5, "saturating": 4, "threshold": 4, "periodic": 6, "peak": 6, "free": 4}
+_MOST_WORDS = 64  # of an axis that has a law of each
 _MOST_EDGES, _MOST_PERIODS = 24, 48
 _SHORTEST_PERIOD = 3.0  # levels
 _LANDMARKS, _LENGTH = 6, 0.3  # of a free process, over the range
@@ -232,7 +233,10 @@ def _free(axis: Axis) -> list[Shape]:
 
 
 def _of_words(axis: Axis) -> list[Shape]:
-    """One word's recordings are off, or those of each word."""
+    """One word's recordings are off, or those of each word; nothing of as many words as serial numbers are, of which
+    laws would grow with the square of the recordings."""
+    if len(axis.words) > _MOST_WORDS:
+        return []
 
     def of(word: int) -> Shape:
         return Shape(
