@@ -79,7 +79,7 @@ def codes(report: dict[str, Any]) -> set[tuple[str, str, str]]:
 
 
 ONE = [
-    (noise(1e-2), of_s1, ("no_response", "r8", "frf_re_pc_per_n"), 1.0),
+    (noise(1e-2), of_s1, ("no_response", "", "frf_re_pc_per_n"), 1.0),
     (times(1e-3, "dynamic_force_n"), of_all, ("units_off_by_1000", "", "dynamic_force_n"), 1.0),
     (times(1e-3, *LINES), of_all, ("units_off_by_1000", "", "frf_re_pc_per_n"), 1e-3),
     (times(1000.0, "preload_n"), of_r3, ("units_off_by_1000", "r3", "preload_n"), 1.0),

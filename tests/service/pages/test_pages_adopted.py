@@ -257,3 +257,14 @@ def test_a_tag_says_how_sure_it_is(
     assert cannot.count() == (0 if verdict == "explained" or "a law" in tag else 1)
     assert visitor.page.get_by_role("button", name="Adopt this model").count() == 1 - cannot.count()
     visitor.require_accessible()
+
+
+@pytest.mark.parametrize(("probability", "settled"), [(0.341, False), (0.998, True)])
+def test_the_first_button_adopts_what_is_settled_alone(server: Server, probability: float, settled: bool) -> None:
+    """A law that holds a third of the probability can still be adopted, at the foot of the page, where that is said."""
+    found = {**report(), "verdict": "unexplained", "probability": probability, "mechanisms": [], "unnamed": WARMTH}
+    _, diagnosis_id = diagnosed(server, resonant("law"), found, f"law {settled}")
+    shown = server.http.get(f"/diagnoses/{diagnosis_id}").text
+    assert ('<a class="button" href="#adopt">' in shown) == settled
+    assert "Adopt this model" in shown
+    assert ("It is not settled: " in shown) != settled

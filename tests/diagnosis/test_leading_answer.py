@@ -1,0 +1,40 @@
+"""The leading answer is of the most probable kind: nothing, known mechanisms together, or something without a name."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from underskin.diagnosis.reporting.answer_statement import answer_statement
+from underskin.diagnosis.selection.answers import Answer, leading_first
+
+
+def answers(unlisted: float, nothing: float, *sets: float) -> list[Answer]:
+    """Sorted by probability; each set is one mechanism of the catalogue."""
+    names = ("ageing", "adhesion", "timing_delay", "crosstalk")
+    found: list[tuple[Any, float]] = [(None, unlisted), (SimpleNamespace(names=()), nothing)]
+    found += [(SimpleNamespace(names=(name,)), share) for name, share in zip(names, sets, strict=False)]
+    return [Answer(one, share) for one, share in sorted(found, key=lambda entry: -entry[1])]
+
+
+@pytest.mark.parametrize(
+    ("shares", "leader"),
+    [
+        ((0.34, 0.05, 0.21, 0.2, 0.2), "ageing"),  # known ones hold 61 %, though none holds a third
+        ((0.45, 0.15, 0.2, 0.2), "none_of_these"),
+        ((0.02, 0.5, 0.28, 0.2), "nothing_missing"),
+        ((0.02, 0.4, 0.3, 0.28), "ageing"),
+    ],
+)
+def test_the_most_probable_kind_leads(shares: tuple[float, ...], leader: str) -> None:
+    ranked = leading_first(answers(*shares))
+    assert ranked[0].names == (leader,)
+    others = [answer.probability for answer in ranked[1:]]
+    assert others == sorted(others, reverse=True)
+    assert len(ranked) == len(shares)
+
+
+def test_what_leads_together_is_said_with_its_sum() -> None:
+    statement = answer_statement(leading_first(answers(0.34, 0.05, 0.21, 0.2, 0.2)), "ambiguous")
+    assert statement.startswith("Known mechanisms explain this (61 % together), best ageing (21 %), but these rivals")
+    assert "something without a name (34 %)" in statement
