@@ -62,6 +62,8 @@ def _of_sphere(entry: IndentationRecording, skin: SkinDescription) -> tuple[floa
         return found.modulus, None
     require_depth(found)
     tip = tip_of(travel, force, radius, skin.poisson_ratio, thickness)
-    if tip is not None and tip.is_blunt:
+    if tip is None or not tip.is_plain:
+        return found.modulus, None
+    if tip.is_blunt:
         raise tip.refusal
-    return found.modulus, None if tip is None else tip.refusal
+    return found.modulus, tip.refusal
