@@ -26,6 +26,7 @@ _POINTS = 400
 _FEWEST = 8
 _LEAST_STRETCH = 0.05  # of λ: a sample that is pressed to less is none
 _FOOT_ROUNDS = 2  # by which the foot of the curve is found, from which strain counts
+_FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that stands for a curve of few points
 _LONGER = 1.15  # times as much strain: a law that holds over so much more is the better one
 _BETTER = 0.8  # of the other's departure: of two that hold equally far, the line is the better law then
@@ -55,7 +56,8 @@ class CompressionModulus:
     def statement(self) -> str:
         """Which law, and where it holds, in words."""
         law = "straight" if self.is_straight else "neo-Hookean"
-        follows = f"{law} from {100 * self.first_strain:.3g} to {100 * self.last_strain:.3g} % strain"
+        first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+        follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
         if self.leaves_at_strain is None or self.leaves_at_stress is None:
             return f"{follows}, and not seen to leave the {'line' if self.is_straight else 'law'}"
         stress = float(to_lab("mean_stress_mpa", self.leaves_at_stress))
