@@ -239,8 +239,9 @@ def test_a_modulus_holds_the_true_value_wherever_the_displacement_has_its_zero_a
         assert stated["low"] < 2.0 < stated["high"]
         fits.append(report["fit"]["before"]["rmse_percent"])
     assert fits[3] == pytest.approx(fits[2], rel=1e-4)
-    thin = of_curve(depth, force, thickness=1e-3)
-    assert looked_at(thin, table, "strain_stiffening")["verdict"] != "insufficient_data"
+    thin = looked_at(of_curve(depth, force, thickness=1e-3), table, "strain_stiffening")
+    assert thin["verdict"] == "insufficient_data"
+    assert "of the declared thickness" in thin["statement"]
 
 
 def cylinders(heights_mm: list[float], table: SigmaTable, *known: str, **effects: Any) -> dict[str, Any]:

@@ -26,6 +26,7 @@ _POINTS = 400
 _FEWEST = 8
 _LEAST_STRETCH = 0.05  # of λ: a sample that is pressed to less is none
 _FOOT_ROUNDS = 2  # by which the foot of the curve is found, from which strain counts
+_FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
 _SMOOTH = 5  # degree of the polynomial that stands for a curve of few points
 _LONGER = 1.15  # times as much strain: a law that holds over so much more is the better one
 _BETTER = 0.8  # of the other's departure: of two that hold equally far, the line is the better law then
@@ -55,7 +56,8 @@ class CompressionModulus:
     def statement(self) -> str:
         """Which law, and where it holds, in words."""
         law = "straight" if self.is_straight else "neo-Hookean"
-        follows = f"{law} from {100 * self.first_strain:.3g} to {100 * self.last_strain:.3g} % strain"
+        first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+        follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
         if self.leaves_at_strain is None or self.leaves_at_stress is None:
             return f"{follows}, and not seen to leave the {'line' if self.is_straight else 'law'}"
         stress = float(to_lab("mean_stress_mpa", self.leaves_at_stress))
@@ -83,8 +85,10 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
     sign = 1.0 if stress[-1] >= stress[0] else -1.0
     noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
     foot = float(along[np.abs(load).argmin()])
-    neo_hookean = _by_law(along, stress, height, sign, noise, foot, straight=False)
     line = _by_law(along, stress, height, sign, noise, foot, straight=True)
+    if (along.max() - foot) / height > 1 - _LEAST_STRETCH:  # through all of the sample: a slip of units
+        return line
+    neo_hookean = _by_law(along, stress, height, sign, noise, foot, straight=False)
     by_law, by_line = (one.last_strain - one.first_strain for one in (neo_hookean, line))
     if max(by_law, by_line) > _LONGER * min(by_law, by_line):
         return line if by_line > by_law else neo_hookean
@@ -162,7 +166,8 @@ def _noise(along: Floats, values: Floats) -> float:
     by_difference = float(1.4826 * np.median(np.abs(np.diff(values, n=2))) / np.sqrt(6))
     place = 2 * (along - along.min()) / np.ptp(along) - 1
     degree = min(_SMOOTH, len(values) - 3)
-    left = values - np.polyval(np.polyfit(place, values, degree), place)
+    powers = np.polynomial.legendre.legvander(place, degree)
+    left = values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
     freedom = max(len(values) - degree - 1, 1)
     return min(by_difference, float(np.sqrt(left @ left / freedom)))
 

@@ -31,6 +31,7 @@ _MISSES = 0.01  # of the force that it spans, root mean square, beyond which a l
 _BEYOND_NOISE = 4.0  # times a sample's noise, that it leaves then
 _POWERS = np.arange(0.7, 3.05, 0.1)  # of the depth, that are tried in place of the law's own
 _TAKES = 0.4  # of the law's residual, at most, that another power leaves where the law misses plainly
+_AS_NOISE, _AS_IDEAL = 1.5, 1e-3  # times the noise, and of the force: less is left where the power says all
 _SPHERES = 1.25, 1.8  # powers that adhesion, creep, stiffening and a stage that gives make of a sphere's 3/2
 
 
@@ -161,6 +162,7 @@ class Tip:
 
     power: float
     refusal: InvalidInput
+    is_plain: bool  # nothing but noise is left of that power: no law of a sphere beside another effect is needed
 
     @property
     def is_blunt(self) -> bool:
@@ -198,7 +200,8 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
         f"{fit.left / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
         "of known modulus"
     )
-    return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed))
+    is_plain = fits[power].left < max(_AS_NOISE * noise, _AS_IDEAL * span)
+    return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
 
 
 def loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:

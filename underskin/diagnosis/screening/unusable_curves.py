@@ -15,7 +15,7 @@ from underskin.recordings.campaign import Campaign, CompressionRecording, Indent
 from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.exchanged_columns import require_own_columns
 from underskin.recordings.sphere_modulus import estimate, require_depth, tip_of
-from underskin.units import to_si
+from underskin.units import Floats, to_si
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
@@ -26,8 +26,9 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
     for entry in campaign.recordings:
         lacking, doubt = None, None
         if entry.kind == kind:
-            exchanged = _exchanged(entry)
-            lacking, doubt = (exchanged, None) if exchanged else _lacking(thinned.get(entry.id), campaign.skin)
+            lacking = _exchanged(entry) or _lacking(thinned.get(entry.id), campaign.skin)
+        if lacking is None and isinstance(entry, IndentationRecording) and entry.kind == kind:
+            lacking, doubt = _of_other_tip(entry, campaign.skin)
         if lacking is None:
             usable.append(entry)
         else:
@@ -47,33 +48,44 @@ def _exchanged(entry: object) -> InvalidInput | None:
     return None
 
 
-def _lacking(entry: object, skin: SkinDescription) -> tuple[InvalidInput | None, InvalidInput | None]:
-    """Why nothing can be concluded from a curve, and why its tip may be no sphere."""
+def _lacking(entry: object, skin: SkinDescription) -> InvalidInput | None:
+    """Why nothing can be concluded from a curve, thinned."""
     if isinstance(entry, IndentationRecording | CompressionRecording) and not np.ptp(entry.displacement_mm):
-        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change"), None
+        return unusable("displacement_mm", float(entry.displacement_mm[0]), "must change")
     try:
-        doubt = None
         if isinstance(entry, IndentationRecording):
-            modulus, doubt = _of_sphere(entry, skin)
+            found = estimate(*_columns(entry), skin.poisson_ratio, _thickness(skin))
+            modulus = found.modulus
+            if modulus > 0:
+                require_depth(found)
         elif isinstance(entry, CompressionRecording):
             modulus = of_compression(entry).modulus
         else:
-            return too_few("force_n", "too few finite samples", "must have at least 5"), None
+            return too_few("force_n", "too few finite samples", "must have at least 5")
     except InvalidInput as refusal:
-        return refusal, None
-    return (None if modulus > 0 else unusable("force_n", "does not rise as it is pressed", "must rise")), doubt
+        return refusal
+    return None if modulus > 0 else unusable("force_n", "does not rise as it is pressed", "must rise")
 
 
-def _of_sphere(entry: IndentationRecording, skin: SkinDescription) -> tuple[float, InvalidInput | None]:
-    """E [Pa] of the law, and why the tip may be no sphere; raises InvalidInput where no law of a sphere holds."""
-    thickness = None if skin.thickness_mm is None else float(to_si("thickness_mm", skin.thickness_mm))
-    travel, force = to_si("displacement_mm", entry.displacement_mm), to_si("force_n", entry.force_n)
+def _of_other_tip(
+    entry: IndentationRecording, skin: SkinDescription
+) -> tuple[InvalidInput | None, InvalidInput | None]:
+    """Why nothing can be concluded from a curve, with every sample, that another tip than a sphere explains to its
+    noise; and why the tip may be another."""
+    try:
+        tip = tip_of(*_columns(entry), skin.poisson_ratio, _thickness(skin))
+    except InvalidInput:  # of a way of too few samples, which its means do not have
+        return None, None
+    if tip is None or not tip.is_plain:
+        return None, None
+    return (tip.refusal, None) if tip.is_blunt else (None, tip.refusal)
+
+
+def _columns(entry: IndentationRecording) -> tuple[Floats, Floats, float]:
+    """Displacement [m], force [N] and radius [m]."""
     radius = float(to_si("indenter_radius_mm", entry.indenter_radius_mm))
-    found = estimate(travel, force, radius, skin.poisson_ratio, thickness)
-    if not found.modulus > 0:
-        return found.modulus, None
-    require_depth(found)
-    tip = tip_of(travel, force, radius, skin.poisson_ratio, thickness)
-    if tip is not None and tip.is_blunt:
-        raise tip.refusal
-    return found.modulus, None if tip is None else tip.refusal
+    return to_si("displacement_mm", entry.displacement_mm), to_si("force_n", entry.force_n), radius
+
+
+def _thickness(skin: SkinDescription) -> float | None:
+    return None if skin.thickness_mm is None else float(to_si("thickness_mm", skin.thickness_mm))
