@@ -211,7 +211,8 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     """E of curves, and what it is under."""
     modulus = after["youngs_modulus"]
     if modulus.get("at_bound"):
-        return f"Young's modulus {how} lies at or beyond {modulus['value']:.3g} {modulus['unit']}, where its search ends: no result"
+        bound = f"{modulus['value']:.3g} {modulus['unit']}"
+        return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
     interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
     return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 
