@@ -218,6 +218,9 @@ def first_and_rest(statement: str) -> tuple[str, str]:
 def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     """E of curves, and what it is under."""
     modulus = after["youngs_modulus"]
+    if modulus.get("at_bound"):
+        bound = f"{modulus['value']:.3g} {modulus['unit']}"
+        return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
     interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
     return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 

@@ -52,7 +52,9 @@ class MainsPickup(Mechanism):
     parameters_stated = (
         _of_lines("pickup_charge", "pC", 1e-4, 1e3, Normal(-3.0, 1.5), limit=0.0, shown=0.05, reason=_CHARGE),
         _of_lines("pickup_width", "Hz", 0.2, 6.0, Normal(0.4, 0.6), limit=None, shown=1.5, reason=_WIDTH),
-        _of_lines("pickup_harmonics", "-", 1e-3, 10.0, Normal(0.0, 1.5), limit=None, shown=1.0, reason=_SHARE),
+        _of_lines(
+            "pickup_harmonics", "-", 1e-3, 10.0, Normal(0.0, 1.5), limit=None, shown=1.0, reason=_SHARE, closed=(1e-3,)
+        ),
     )
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
