@@ -13,6 +13,7 @@ from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
+from underskin.recordings.readers.dimensions import exponents, ratio_of
 from underskin.recordings.readers.unit_labels import meanings, unit
 from underskin.recordings.readers.unit_words import DECIBEL
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
@@ -22,6 +23,7 @@ from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats, readable_unit
 
 _PERCENT = 100.0
+_SAME_RATE = 1e-3  # relative
 _NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
 
@@ -198,9 +200,13 @@ class MappedBlock:
             (above, below, 1 / mapping.sensitivity),
             (below, above, mapping.sensitivity),  # nm/V, as those of cantilevers are stated
         ):
-            divided = unit(signal)
-            if given is not None and divided is not None and given.dimension == divided.dimension:
+            divided, measured = unit(signal), unit(quantity)
+            if given is None or divided is None:
+                continue
+            if given.dimension == divided.dimension:
                 return given.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
+            if measured is not None and ratio_of(label, signal, quantity) == exponents(LAB[field].unit):  # V/N by mV/pC
+                return given.to_si / divided.to_si * measured.to_si * sensitivity / LAB[field].to_si
         raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -260,9 +266,17 @@ class MappedBlock:
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")
             return {name: column[1:] for name, column in columns.items()}
-        if "force_n" in columns and "sample_rate_hz" not in self.rig.recording:
-            rate = self.block.sample_rate_hz if time is None else self._rate(time)
+        rate = self.block.sample_rate_hz if time is None else None
+        stated = self.rig.recording.get("sample_rate_hz")
+        if "force_n" in columns and stated is None:
+            rate = rate if time is None else self._rate(time)
             columns |= {} if rate is None else {"sample_rate_hz": rate}
+        elif (
+            rate is not None and isinstance(stated, int | float) and not math.isclose(rate, stated, rel_tol=_SAME_RATE)
+        ):
+            self.warnings.append(
+                f"the file states {rate:g} samples a second; the rig description {stated:g}, which counts"
+            )
         return {**columns, **self._measured_force(columns)}
 
     def _measured_force(self, columns: Mapping[str, Any]) -> dict[str, float]:

@@ -71,7 +71,11 @@ _OTHERS: Mapping[tuple[str, float], str] = {
     ("force", 1e-3): "мн",
     ("voltage", 1e-3): "мв",
     ("pressure", 1e6): "мпа",
+    ("length", 1e-10): "å angstrom angstroms",
+    ("frequency", 1 / 60): "rpm r/min cpm 1/min",
     ("angle", 1.0): "rad rads radian radians radiant",
+    ("angle", 1e-3): "mrad milliradian milliradians",
+    ("angle", 6.283185307179586): "rev revs revolutions turns cycles",
     ("angle", 3.141592653589793 / 180): "deg degs degree degrees grad ° degré degrés gradi grado grados",
 }
 DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
