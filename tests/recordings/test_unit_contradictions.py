@@ -183,6 +183,7 @@ def test_an_frf_in_volts_per_newton_becomes_charge_by_the_amplifier(formula: boo
     described = rig_description.from_dict({**common, "channels": {"frequency_hz": {"channel": "f"}, **parts}})
     (recording,) = read_file(f"f (Hz);Re (V/N);Im (V/N)\n{rows}".encode(), "frf.csv", described).campaign.recordings
     assert isinstance(recording, FrfRecording)
+    assert recording.frf_re_pc_per_n is not None
     np.testing.assert_allclose(recording.frf_re_pc_per_n, [7.4 + 0.01 * n for n in range(1, 9)])
 
 
