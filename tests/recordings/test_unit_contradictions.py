@@ -56,6 +56,7 @@ def force_of(reading: Reading) -> Any:
     ("label", "stated"),
     [
         ("lbs", "N"), ("mN", "N"), ("kgf", "N"), ("Millinewton", "N"), ("MN", "mN"), ("дин. Н", "mN"), ("牛", "mN"),
+        ("Pikonewton", "N"),
         ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"), ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
     ],
 )  # fmt: skip
@@ -145,7 +146,10 @@ def spectrum(heading: str, angle: str = "deg", **unit_of: str) -> Reading:
     }
     common = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "channels": channels}
     return read_file(
-        SPECTRUM.format(heading, angle).replace(";17.", f";{unit_of.get('sign', '')}17.").encode(),
+        (unit_of.get("above", "") + SPECTRUM)
+        .format(heading, angle)
+        .replace(";17.", f";{unit_of.get('sign', '')}17.")
+        .encode(),
         "frf.csv",
         rig_description.from_dict(common),
     )
@@ -158,6 +162,8 @@ def test_decibels_are_refused() -> None:
             spectrum(heading)
     with pytest.raises(FileError, match="decibels are a logarithm"):
         spectrum("Magnitude (dB)", magnitude="dB")
+    with pytest.raises(FileError, match="property 'Y-axis unit': is 'dB': decibels are a logarithm"):
+        spectrum("Magnitude", above="Y-axis unit: dB\n")
     with pytest.raises(FileError, match="below 0, as no magnitude is: decibels"):
         spectrum("Magnitude", sign="-")
 

@@ -84,6 +84,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
         result: CompressionModulus | IndentationModulus | InvalidInput
         try:
             if isinstance(recording, CompressionRecording):
+                _require_height(recording)
                 result = of_compression(recording)
             elif isinstance(recording, IndentationRecording):
                 result = of_indentation(recording, campaign.skin.poisson_ratio)
@@ -117,6 +118,17 @@ def of_indentation(recording: IndentationRecording, poisson_ratio: float) -> Ind
         float(to_si("indenter_radius_mm", recording.indenter_radius_mm)),
         poisson_ratio,
     )
+
+
+def _require_height(recording: CompressionRecording) -> None:
+    """Raises InvalidInput where a block would be pressed by more than its height, from where its force is least."""
+    if len(recording.displacement_mm) != len(recording.force_n):
+        return
+    rest = recording.displacement_mm[np.argmin(np.abs(recording.force_n))]
+    moved = float(np.max(recording.displacement_mm) - rest)
+    if moved >= recording.sample_height_mm:
+        height = f"must stay below sample_height_mm, {recording.sample_height_mm:g}"
+        raise unusable("displacement_mm", moved, f"{height}: is it in mm, or exchanged with force_n, or tension?")
 
 
 def require_own_columns(recording: CurveRecording) -> None:

@@ -1,6 +1,7 @@
 """The fields of one recording, out of the channels of one block, as a rig description has them."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -23,6 +24,7 @@ from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats, readable_unit
 
 _PERCENT = 100.0
+_OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
 _SAME_RATE = 1e-3  # relative
 _NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
@@ -67,6 +69,7 @@ class MappedBlock:
         rest = {field: column for field, column in values.items() if field not in (MAGNITUDE, PHASE)}
         if MAGNITUDE not in values:
             return rest
+        self._refuse_stated_decibels()
         magnitude, phase = values[MAGNITUDE], values[PHASE]
         if (magnitude < 0).any():
             raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
@@ -74,6 +77,13 @@ class MappedBlock:
             raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
         frf = magnitude * np.exp(1j * np.radians(phase))
         return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+
+    def _refuse_stated_decibels(self) -> None:
+        """Refuses a magnitude where a line of the file, such as `Y-axis unit: dB`, says that its unit is a decibel."""
+        for name, value in self.stated.items():
+            known = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
+            if known is not None and known.dimension == DECIBEL:
+                raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
 
     def spring(self) -> dict[str, float]:
         """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
