@@ -138,3 +138,14 @@ def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
     report = diagnose(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True))
     assert report["verdict"] == "insufficient_data"
     assert "reload_n and indenter_radius_mm look exchanged" in report["statement"]
+
+
+def test_a_block_pressed_by_more_than_its_height_gives_no_modulus() -> None:
+    """Force and displacement of a block of 10 mm are exchanged: the "displacement" is 18 mm."""
+    travel = np.linspace(0, 1, 60)
+    columns = {"displacement_mm": (18 * travel).tolist(), "force_n": travel.tolist()}
+    block = {"id": "b", "kind": "compression", "sample_height_mm": 10, "sample_diameter_mm": 12, **columns}
+    document = {"schema": "campaign/1", "name": "b", "skin": {"poisson_ratio": 0.5}, "recordings": [block]}
+    (found,) = elastomer.of_campaign(parse(document))
+    assert isinstance(found.result, InvalidInput)
+    assert "exchanged with force_n" in str(found.result)

@@ -56,6 +56,7 @@ def force_of(reading: Reading) -> Any:
     ("label", "stated"),
     [
         ("lbs", "N"), ("mN", "N"), ("kgf", "N"), ("Millinewton", "N"), ("MN", "mN"), ("дин. Н", "mN"), ("牛", "mN"),
+        ("Pikonewton", "N"),
         ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"), ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
     ],
 )  # fmt: skip
@@ -145,7 +146,10 @@ def spectrum(heading: str, angle: str = "deg", **unit_of: str) -> Reading:
     }
     common = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "channels": channels}
     return read_file(
-        SPECTRUM.format(heading, angle).replace(";17.", f";{unit_of.get('sign', '')}17.").encode(),
+        (unit_of.get("above", "") + SPECTRUM)
+        .format(heading, angle)
+        .replace(";17.", f";{unit_of.get('sign', '')}17.")
+        .encode(),
         "frf.csv",
         rig_description.from_dict(common),
     )
@@ -158,6 +162,8 @@ def test_decibels_are_refused() -> None:
             spectrum(heading)
     with pytest.raises(FileError, match="decibels are a logarithm"):
         spectrum("Magnitude (dB)", magnitude="dB")
+    with pytest.raises(FileError, match="property 'Y-axis unit': is 'dB': decibels are a logarithm"):
+        spectrum("Magnitude", above="Y-axis unit: dB\n")
     with pytest.raises(FileError, match="below 0, as no magnitude is: decibels"):
         spectrum("Magnitude", sign="-")
 
@@ -170,3 +176,27 @@ def test_a_phase_in_other_angles_is_refused() -> None:
     assert isinstance(recording, FrfRecording)
     assert recording.frf_im_pc_per_n is not None
     assert recording.frf_im_pc_per_n[0] == pytest.approx(17.41 * np.sin(-0.1))
+
+
+@pytest.mark.parametrize("formula", [True, False])
+def test_an_frf_in_volts_per_newton_becomes_charge_by_the_amplifier(formula: bool) -> None:
+    """V/N over mV/pC is pC/N, by a sensitivity and by a formula."""
+    rows = "\n".join(f"{5 * n};{0.074 + 1e-4 * n};0.001" for n in range(1, 9))
+    amplifier = {} if formula else {"sensitivity": 10, "sensitivity_unit": "mV/pC"}
+    parts = {name: {"channel": part.lower() if formula else part, **amplifier} for name, part in PARTS.items()}
+    derived = {part.lower(): f"{part} / 10 [mV/pC]" for part in PARTS.values()} if formula else {}
+    common = {"schema": "rig/1", "skin": document(FRF)["skin"], "recording": COMMON, "derived": derived}
+    described = rig_description.from_dict({**common, "channels": {"frequency_hz": {"channel": "f"}, **parts}})
+    (recording,) = read_file(f"f (Hz);Re (V/N);Im (V/N)\n{rows}".encode(), "frf.csv", described).campaign.recordings
+    assert isinstance(recording, FrfRecording)
+    assert recording.frf_re_pc_per_n is not None
+    np.testing.assert_allclose(recording.frf_re_pc_per_n, [7.4 + 0.01 * n for n in range(1, 9)])
+
+
+PARTS = {"frf_re_pc_per_n": "Re", "frf_im_pc_per_n": "Im"}
+
+
+def test_a_rate_that_the_file_states_otherwise_is_told() -> None:
+    force = {"channel": "Force", "unit": "N"}
+    reading = read_file(lvm("N"), "a.lvm", rig(force, recording={**COMMON, "sample_rate_hz": 500}))
+    assert "the file states 1000 samples a second; the rig description 500, which counts" in reading.warnings

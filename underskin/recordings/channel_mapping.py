@@ -41,10 +41,10 @@ def _percent(name: str, value: Any, units_checked: bool) -> float:
 class SignalMapping:
     """A channel and what its numbers mean.
 
-    `channel` is the name in the file. `unit` is its true unit, which counts for more than the file's own label of the
-    same dimension; `labelled` repeats a label that is known to be wrong, and no other is accepted. `sign` -1 turns the
-    values round, `auto` does where they fall as a curve is pressed. `sensitivity` leads from a signal to a quantity: in
-    signal over quantity (mV/N) it divides the signal, in quantity over signal (nm/V) it multiplies it.
+    `channel` is the name in the file. `unit` is its true unit, which the file's own label must not contradict;
+    `labelled` repeats a label that is known to be wrong, and no other is accepted. `sign` -1 turns the values round,
+    `auto` does where they fall as a curve is pressed. `sensitivity` leads from a signal to a quantity: in signal over
+    quantity (mV/N) it divides the signal, in quantity over signal (nm/V) it multiplies it.
     """
 
     channel: field.Name

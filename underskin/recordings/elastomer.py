@@ -3,6 +3,8 @@ sphere pressed in (sphere_modulus). Curves are read as curve_preparation leaves 
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from underskin.errors import InvalidInput, unusable
 from underskin.recordings.block_modulus import CompressionModulus, of_compression
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
@@ -30,6 +32,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
             if isinstance(recording, CompressionRecording | IndentationRecording):
                 require_own_columns(recording)
             if isinstance(recording, CompressionRecording):
+                _require_height(recording)
                 result = of_compression(recording)
             elif isinstance(recording, IndentationRecording):
                 result = of_indentation(recording, skin.poisson_ratio, skin.thickness_mm)
@@ -43,3 +46,14 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
             result = unusable("force_n", None, f"no modulus can be computed from these numbers ({error})")
         moduli.append(RecordingModulus(recording.id, recording.kind, result))
     return moduli
+
+
+def _require_height(recording: CompressionRecording) -> None:
+    """Raises InvalidInput where a block would be pressed by more than its height, from where its force is least."""
+    if len(recording.displacement_mm) != len(recording.force_n):
+        return
+    rest = recording.displacement_mm[np.argmin(np.abs(recording.force_n))]
+    moved = float(np.max(recording.displacement_mm) - rest)
+    if moved >= recording.sample_height_mm:
+        height = f"must stay below sample_height_mm, {recording.sample_height_mm:g}"
+        raise unusable("displacement_mm", moved, f"{height}: is it in mm, or exchanged with force_n, or tension?")

@@ -1,6 +1,7 @@
 """The fields of one recording, out of the channels of one block, as a rig description has them."""
 
 import math
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,7 @@ from underskin.recordings.channels import Block, Channel, Values
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
+from underskin.recordings.readers.dimensions import exponents, ratio_of
 from underskin.recordings.readers.unit_labels import meanings, unit
 from underskin.recordings.readers.unit_words import DECIBEL
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
@@ -22,6 +24,8 @@ from underskin.recordings.stated_values import Stated, factor, spring_constant
 from underskin.units import LAB, Floats, readable_unit
 
 _PERCENT = 100.0
+_OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
+_SAME_RATE = 1e-3  # relative
 _NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
 _LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
 
@@ -65,6 +69,7 @@ class MappedBlock:
         rest = {field: column for field, column in values.items() if field not in (MAGNITUDE, PHASE)}
         if MAGNITUDE not in values:
             return rest
+        self._refuse_stated_decibels()
         magnitude, phase = values[MAGNITUDE], values[PHASE]
         if (magnitude < 0).any():
             raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
@@ -72,6 +77,13 @@ class MappedBlock:
             raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
         frf = magnitude * np.exp(1j * np.radians(phase))
         return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+
+    def _refuse_stated_decibels(self) -> None:
+        """Refuses a magnitude where a line of the file, such as `Y-axis unit: dB`, says that its unit is a decibel."""
+        for name, value in self.stated.items():
+            known = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
+            if known is not None and known.dimension == DECIBEL:
+                raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
 
     def spring(self) -> dict[str, float]:
         """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
@@ -198,9 +210,13 @@ class MappedBlock:
             (above, below, 1 / mapping.sensitivity),
             (below, above, mapping.sensitivity),  # nm/V, as those of cantilevers are stated
         ):
-            divided = unit(signal)
-            if given is not None and divided is not None and given.dimension == divided.dimension:
+            divided, measured = unit(signal), unit(quantity)
+            if given is None or divided is None:
+                continue
+            if given.dimension == divided.dimension:
                 return given.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
+            if measured is not None and ratio_of(label, signal, quantity) == exponents(LAB[field].unit):  # V/N by mV/pC
+                return given.to_si / divided.to_si * measured.to_si * sensitivity / LAB[field].to_si
         raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
 
     def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
@@ -260,9 +276,17 @@ class MappedBlock:
         if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
             self.warnings.append("the line at 0 Hz is left out")
             return {name: column[1:] for name, column in columns.items()}
-        if "force_n" in columns and "sample_rate_hz" not in self.rig.recording:
-            rate = self.block.sample_rate_hz if time is None else self._rate(time)
+        rate = self.block.sample_rate_hz if time is None else None
+        stated = self.rig.recording.get("sample_rate_hz")
+        if "force_n" in columns and stated is None:
+            rate = rate if time is None else self._rate(time)
             columns |= {} if rate is None else {"sample_rate_hz": rate}
+        elif (
+            rate is not None and isinstance(stated, int | float) and not math.isclose(rate, stated, rel_tol=_SAME_RATE)
+        ):
+            self.warnings.append(
+                f"the file states {rate:g} samples a second; the rig description {stated:g}, which counts"
+            )
         return {**columns, **self._measured_force(columns)}
 
     def _measured_force(self, columns: Mapping[str, Any]) -> dict[str, float]:

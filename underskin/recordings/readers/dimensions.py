@@ -21,7 +21,8 @@ _EXPONENTS: dict[str, Exponents] = {
 }
 _SI = ("m", "N", "C", "s", "Pa", "Hz", "V", "A", "m/s^2")
 _PARTS = ("m", "N", "C", "s", "V")
-_SI_RATIOS = tuple(f"{above}/{below}" for above, below in product(_PARTS, _PARTS) if above != below)
+_FRF = "C/N"  # before m/V, which has the same dimension
+_SI_RATIOS = (_FRF, *(f"{above}/{below}" for above, below in product(_PARTS, _PARTS) if above != below))
 
 
 def times(first: Exponents, second: Exponents, sign: int = 1) -> Exponents:
@@ -42,6 +43,14 @@ def exponents(label: str) -> Exponents | None:
     for part in below:
         result = None if result is None or part is None else times(result, part, -1)
     return result
+
+
+def ratio_of(label: str, signal: str, quantity: str) -> Exponents | None:
+    """The exponents of label/signal · quantity; None where a unit is not known here."""
+    given, divided, measured = exponents(label), exponents(signal), exponents(quantity)
+    if given is None or divided is None or measured is None:
+        return None
+    return times(times(given, divided, -1), measured)
 
 
 def label_of(dimension: Exponents, preferred: Iterable[str]) -> str | None:

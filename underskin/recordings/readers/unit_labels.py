@@ -30,6 +30,11 @@ _LONGEST = 40
 _NO_UNITS = ("n/a",)  # although either side is one
 _WHOLE = {
     "cm": ("length", 1e-2),
+    "dm": ("length", 1e-1),
+    "daN": ("force", 10.0),
+    "dN": ("force", 1e-1),
+    "cN": ("force", 1e-2),
+    "hPa": ("pressure", 1e2),
     "m/s^2": ("acceleration", 1.0),
     "m/s2": ("acceleration", 1.0),
     "g": ("acceleration", STANDARD_GRAVITY),

@@ -12,16 +12,18 @@ _INCH = 25.4e-3  # m
 # Of each SI unit, in English, French, German, Italian, Spanish, Russian, Chinese and Japanese where they differ.
 _SI_WORDS: Mapping[str, str] = {
     "m": "meter meters metre metres mètre mètres metro metri metros метр м 米",
-    "N": "newton newtons newtones ньютон н 牛顿 牛 ニュートン",
+    "N": "newton newtons newtones ньютон ньютоны н niuton niutony 뉴턴 牛顿 牛 ニュートン",
     "Pa": "pascal pascals pascales паскаль па 帕斯卡 帕",
     "C": "coulomb coulombs culombio culombios кулон кл 库仑 库",
-    "s": "sec secs second seconds seconde secondes sekunde sekunden secondo secondi segundo segundos сек с 秒",
+    "s": "sec secs second seconds seconde secondes sekunde sekunden secondo secondi segundo segundos секунда секунды "
+    "сек с sekunda sekundy 초 秒",
     "Hz": "hertz герц гц 赫兹 赫 ヘルツ",
-    "V": "volt volts voltio voltios вольт в 伏特 伏 ボルト",
+    "V": "volt volts voltio voltios вольт вольты в wolt wolty 볼트 伏特 伏 ボルト",
     "A": "amps ampere amperes ampère ampères amperio amperios ампер",
 }
 _PREFIX_WORDS: Mapping[str, float] = {
     "pico": 1e-12,
+    "piko": 1e-12,
     "nano": 1e-9,
     "micro": 1e-6,
     "mikro": 1e-6,
@@ -33,6 +35,12 @@ _PREFIX_WORDS: Mapping[str, float] = {
     "chilo": 1e3,
     "mega": 1e6,
     "giga": 1e9,
+    "пико": 1e-12,
+    "нано": 1e-9,
+    "микро": 1e-6,
+    "милли": 1e-3,
+    "кило": 1e3,
+    "мега": 1e6,
     "п": 1e-12,
     "н": 1e-9,
     "мк": 1e-6,
@@ -71,7 +79,11 @@ _OTHERS: Mapping[tuple[str, float], str] = {
     ("force", 1e-3): "мн",
     ("voltage", 1e-3): "мв",
     ("pressure", 1e6): "мпа",
+    ("length", 1e-10): "å angstrom angstroms",
+    ("frequency", 1 / 60): "rpm r/min cpm 1/min",
     ("angle", 1.0): "rad rads radian radians radiant",
+    ("angle", 1e-3): "mrad milliradian milliradians",
+    ("angle", 6.283185307179586): "rev revs revolutions turns cycles",
     ("angle", 3.141592653589793 / 180): "deg degs degree degrees grad ° degré degrés gradi grado grados",
 }
 DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
