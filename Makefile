@@ -12,9 +12,9 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium iproute2
 PEERS = tesseract nanite
 GENERATOR = openapi-client
 
-# Four processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of
+# Two processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of
 # them, since they share servers. They come in the order of tests/conftest.py.
-PYTEST = $(PYTHON) -m pytest --numprocesses 6 --dist loadfile --no-loadscope-reorder
+PYTEST = $(PYTHON) -m pytest --numprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # Modules stay compiled: servers, workers and commands start some hundred times in the tests.
 unexport PYTHONDONTWRITEBYTECODE

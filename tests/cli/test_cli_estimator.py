@@ -53,7 +53,7 @@ def test_what_the_command_says_counts_for_more_than_the_file_and_lines_are_left(
     assert "H2 is for time series" not in by_file.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_diagnosis_takes_it_too(tmp_path: Path) -> None:
     file = written(tmp_path)
     fewer = [part for name in BESIDE_SKINS for part in ("--without", name)]

@@ -130,6 +130,7 @@ def turned(travel: Floats) -> Floats:
     return (np.arange(len(travel)) > last).astype(float)
 
 
+@pytest.mark.soak
 def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(
     reports: Callable[[str], dict[str, Any]],
 ) -> None:
@@ -144,6 +145,7 @@ def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_
     assert "friction that turns with the sphere" in report["statement"]
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("back", first(1, [False, True]))
 def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaTable) -> None:
     """Also where no way back tells it a second time."""

@@ -161,7 +161,7 @@ def nanoindentation(samples: int = 3100) -> tuple[Floats, Floats]:
     return 1e3 * (depth + 1.2e-5), 1.01 * pressed_by + noise + 2e-9 + drift
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradict_it(table: SigmaTable) -> None:
     depth, force = nanoindentation()
     wave = 0.004 * force.max() * np.sin(2 * np.pi * (depth - depth.min()) / 0.5 / np.ptp(depth))
@@ -171,7 +171,7 @@ def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradic
     assert names(report) == ["adhesion"]
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.skipif(CAMPAIGNS is None, reason="UNDERSKIN_CAMPAIGNS names no folder of concealed campaigns")
 @pytest.mark.parametrize(
     "name", first(1, ["v1x2sxf5n", "v48jbeq3p", "v4j8zegt1", "v7bb8mnv4", "vb2c4z9ma", "v0w0qva2y"])

@@ -113,6 +113,7 @@ def test_evidence_agrees_with_importance_sampling(
     assert found.log_evidence == pytest.approx(importance(found), abs=0.5)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("names", "offsets_mm"), first(2, [((), (0.0,)), (("preload_dependent_d33",), (0.0, 0.3)), ((), (0.0, 1.0))])
 )

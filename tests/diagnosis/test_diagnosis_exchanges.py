@@ -129,6 +129,7 @@ def test_two_sensors_that_fall_silent_together_are_left_out_and_may_share_a_fail
     assert report["d33"]["low"] < 15.0 < report["d33"]["high"]
 
 
+@pytest.mark.soak
 def test_a_failure_that_sensors_do_not_share_is_no_exchange(good: Campaign, table: SigmaTable) -> None:
     """The last recording of s0 and of s2, both before s1; all sensors, of which the amplifier may have failed; and a
     sensor that steps to just the level that another one has."""

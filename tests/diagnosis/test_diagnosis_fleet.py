@@ -121,6 +121,7 @@ def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike
     assert re.search(r"where the others have (1\.9\d*|2(\.0\d*)?) for the same declared", fleet["statement"])
 
 
+@pytest.mark.soak
 def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(table: SigmaTable) -> None:
     """E is 9 where 16 is declared of all, which FRFs of three skins do not tell: none departs."""
     skins = {f"s{number}": [made(f"c{number}", seed=10 + number, modulus=9.0)] for number in range(3)}
@@ -171,6 +172,7 @@ def test_where_skins_differ_as_those_of_one_make_none_departs_and_strengths_are_
     assert all(entry["low"] < 4.0 < entry["high"] for entry in mass["skins"])
 
 
+@pytest.mark.soak
 def test_a_skin_of_few_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
     """Of two its own recordings tell no d33 to quote; of four alone the interval is wider than of two among sisters,
     which holds the true d33 in all draws but one. In what one of them departs is open, so that the verdict is

@@ -75,6 +75,7 @@ def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
     assert "A compressed block" not in ((together["next_experiment"] or {}).get("statement") or "")
 
 
+@pytest.mark.soak
 def test_curves_that_agree_rule_out_what_frfs_alone_leave_open(table: SigmaTable) -> None:
     measured = lines(effects={"thickness_error": {"factor": 1.2}})
     open_before = {tuple(entry["mechanisms"]) for entry in report(measured, [], table, *DECLARED)["alternatives"]}
@@ -112,6 +113,7 @@ def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: f
     assert told["high"] < 1.07 * 16.0 * (1 + friction * (bonded - 1))
 
 
+@pytest.mark.soak
 def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: SigmaTable) -> None:
     """Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both."""
     layer: Effects = {"layered_contact": {}}
@@ -216,6 +218,7 @@ def test_relaxation_is_told_by_the_kind_that_shows_it(
     assert time["low"] < time_s < time["high"]
 
 
+@pytest.mark.soak
 def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wrongly(table: SigmaTable) -> None:
     """E of such curves holds although the declared thickness is 15 % too large."""
     both: Effects = {"layered_contact": {}, "thickness_error": {"factor": 0.87}}

@@ -64,6 +64,7 @@ def test_a_plan_keeps_within_the_limits_and_names_all_that_it_separates(narrow: 
     assert f"probability of {in_percent(plan['probability_of_deciding'])}." in plan["statement"]
 
 
+@pytest.mark.soak
 def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Campaign, table: SigmaTable) -> None:
     """At one dynamic force a moving edge and a finite amplitude are the same; another one tells them apart."""
     report = whole_report(twins, table)

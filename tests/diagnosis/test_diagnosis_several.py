@@ -64,6 +64,7 @@ def test_what_appeared_between_two_campaigns_is_named_with_its_date(appeared: di
     assert mass["low"] < 4.0 < mass["high"]
 
 
+@pytest.mark.soak
 def test_what_acts_in_all_is_known_better_than_from_one(appeared: dict[str, Any], table: SigmaTable) -> None:
     report = reported(dates(effects=HEAVY_TIP), table, "contact_resonance")
     assert scopes(report) == {"contact_resonance": {"campaigns": ["may", "september"]}}
@@ -234,6 +235,7 @@ def test_the_command_writes_one_report_of_several_files_and_its_page() -> None:
     assert list(figure.layout.xaxis.ticktext) == ["&lt;b&gt;may", "september"]
 
 
+@pytest.mark.soak
 def test_a_block_measured_apart_tells_the_modulus_of_all_dates(table: SigmaTable) -> None:
     """E is 9 where 16 is declared: FRFs leave open whether it is the thickness; the block counts for both dates, also
     where a campaign before them cannot be used, and once where it was joined to both."""
@@ -271,6 +273,7 @@ def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(table: SigmaT
     assert "compression" in {entry["kind"] for entry in report["by_kind"]}
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(("stiffness", "scatter"), first(1, [(0.25, 0.16), (0.15, 0.0)]))
 def test_a_glue_line_that_begins_to_slip_is_listed_with_its_date(
     stiffness: float, scatter: float, table: SigmaTable

@@ -67,6 +67,7 @@ def test_a_raw_curve_with_snap_in_and_pull_off_is_no_all_clear(table: SigmaTable
     assert "agree within the noise" not in report["statement"]
 
 
+@pytest.mark.soak
 def test_a_resonance_in_many_recordings_brings_no_mains(table: SigmaTable) -> None:
     """The flank of a resonance counted as line noise, and mains were credited with the difference."""
     made = Made(

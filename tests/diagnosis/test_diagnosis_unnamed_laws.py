@@ -85,6 +85,7 @@ def warming_report(warming: Campaign, table: SigmaTable) -> dict[str, Any]:
     return reported(warming, table)
 
 
+@pytest.mark.soak
 def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: dict[str, Any]) -> None:
     law = warming_report["unnamed"]
     assert warming_report["verdict"] == "unexplained"
@@ -134,6 +135,7 @@ def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, 
     assert "would do this" not in followed["statement"]
 
 
+@pytest.mark.soak
 def test_what_followed_the_order_is_confirmed_by_repeating_recordings_of_both_ends(
     quiet: Campaign, table: SigmaTable
 ) -> None:
@@ -269,6 +271,7 @@ def test_a_thickness_that_is_off_everywhere_is_found_without_its_mechanism(table
     assert "changes the thickness, the same in all recordings: +" in found["statement"]
 
 
+@pytest.mark.soak
 def test_a_place_that_is_off_everywhere_can_be_adopted(table: SigmaTable) -> None:
     found = left_out("misalignment", (0.5, -0.3), table, without=[name for name in FEW if name != "misalignment"])
     assert law_of(found) == ("position", "x_mm", "linear")
@@ -300,6 +303,7 @@ def test_other_mechanisms_are_found_without_their_names(table: SigmaTable) -> No
     assert found["unnamed"]["axis"] in ("load_cycles", "order", "recorded_at")  # one and the same here
 
 
+@pytest.mark.soak
 def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_another_exponent(
     table: SigmaTable,
 ) -> None:

@@ -31,6 +31,7 @@ def report_on(name: str, table: SigmaTable) -> dict[str, Any]:
     return lean_report(parse(document), table, *FEW)
 
 
+@pytest.mark.soak
 @needs_campaigns
 def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out(table: SigmaTable) -> None:
     truths = [entry for entry in json.loads((SHARED / TRUTH).read_text()).items() if entry[1]["identifiable"]]

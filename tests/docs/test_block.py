@@ -42,7 +42,7 @@ def test_a_very_wide_block_is_the_endless_layer(depth: float, bonded: bool) -> N
     np.testing.assert_allclose(block.sigma, deep_layer.sigma(depth, A, RHO, bonded=bonded), rtol=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_error_falls_with_the_order_of_the_elements() -> None:
     """Of a very wide block, which is the endless layer."""
     exact = linear_layer.sigma(A, RHO)

@@ -68,7 +68,7 @@ def test_the_page_says_what_the_service_answered(run: ArrayRun) -> None:
     assert_same_but_for_rounding(made, committed_section(made))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_page_says_what_is_computed(table: SigmaTable) -> None:
     presses = [press(table, radius, PRELOADS_N) for radius in INDENTERS_MM]
     for section in (summary_section(table), claims_section(table), load_section(presses), cylinder_section(table)):
@@ -82,7 +82,7 @@ def drawn(table: SigmaTable, tmp_path_factory: pytest.TempPathFactory) -> list[P
     return figures.draw(table, tmp_path_factory.mktemp("drawn"))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_the_figures_are_those_that_are_drawn(drawn: list[Path]) -> None:
     assert [path.name for path in drawn] == [f"paper-fig{number}.svg" for number in FIGURES]
     for path in drawn:

@@ -262,7 +262,7 @@ def test_what_would_settle_the_paper_s_question_does() -> None:
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.skipif(RECORDINGS is None, reason="UNDERSKIN_RECORDINGS names no folder of recordings")
 def test_real_recordings() -> None:
     """The main outcomes: stiffening PDMS, creeping gel, relaxing cell, a well that no law fits to its noise."""

@@ -67,6 +67,7 @@ def kept(server: Server, skin: str) -> int:
     return len(server.http.get("/v1/campaigns", params={"skin": skin, "limit": 200}).json()["campaigns"])
 
 
+@pytest.mark.soak
 def test_a_request_of_files_that_unfold_to_too_much_is_refused(small: Server, zeros: bytes) -> None:
     before = family_mb(small.process.pid)
     answer = small.http.post("/v1/campaigns?skin=many", files=files(zeros, MANY))

@@ -122,6 +122,7 @@ def place(server: Server, printed: Made) -> str:
     return keep(server, f"sheet{len(printed.report['statement'])}", with_long_names(with_numbers(printed)))
 
 
+@pytest.mark.soak
 def test_the_summary_of_a_page_is_one_sheet_on_which_no_texts_overlap(visitor: Visit, place: str) -> None:
     page = visitor.page
     visitor.go(place)

@@ -65,6 +65,7 @@ def test_files_that_are_read_while_their_upload_makes_room_are_read(small: Serve
         assert "not here any more" in gone.text
 
 
+@pytest.mark.soak
 def test_what_is_being_kept_while_its_upload_makes_room_is_kept(small: Server) -> None:
     files = binary(small, "kept")
     with browser(small) as client, ThreadPoolExecutor(1) as pool:

@@ -69,6 +69,7 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     np.testing.assert_allclose(recording["displacement_mm"], DEPTH_MM - 1e-6 * OFFSET_NM, atol=1e-9)
 
 
+@pytest.mark.soak
 def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
     page = sized.page
     look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
