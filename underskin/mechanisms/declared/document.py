@@ -35,7 +35,7 @@ from underskin.mechanisms.unnamed.vocabulary import OF_CURVES, OF_SAMPLES, ActsO
 from underskin.recordings.readers import json_file, plain_yaml
 from underskin.recordings.readers.sandbox import call_apart
 from underskin.recordings.shown_values import shown
-from underskin.units import Array
+from underskin.units import Array, Floats
 
 SCHEMA = "mechanism/1"
 LARGEST_BYTES = 100_000
@@ -43,7 +43,7 @@ _READ_YAML = "underskin.recordings.readers.plain_yaml:document"
 _FIELDS = ("schema", "name", "description", "acts_on", "axes", "law", "parameters", "source")
 _AXIS = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 _PLACES = (0.0, 0.01, 0.3, 1.0, 10.0)  # of an axis, where a law is looked at
-_FAR_PLACES = (*_PLACES, 1e3, 1e6, 1e9)  # up to load cycles, of which there are the most
+_FAR_PLACES = np.concatenate([[0.0], np.geomspace(1e-3, 1e9, 61), -np.geomspace(1e-3, 1e9, 61)])  # up to load cycles
 _NEUTRAL = 1e-6
 _ADDED = ("force", "position")  # what a law adds to, where the others are factors
 # Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
@@ -192,12 +192,15 @@ def _noticed(
 
 
 def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> float:
-    """The largest change of a law, relative where that is large, by one parameter with the others at some quantile."""
+    """The largest change of a law, relative where that is large, by one parameter with the others at some quantile: at
+    places far and near, and between the values of parameters, which may be edges."""
+    each = {other: [entry.from_fit(entry.quantile(at)) for at in _QUANTILES] for other, entry in parameters.items()}
+    values = np.array(list(each.values()))
+    places = np.concatenate([_FAR_PLACES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
     largest = 0.0
-    for probability in _QUANTILES:
-        at = {other: entry.from_fit(entry.quantile(probability)) for other, entry in parameters.items()}
-        by_value = [{**at, name: parameters[name].from_fit(parameters[name].quantile(end))} for end in _QUANTILES]
-        found = np.array([_evaluated(law, axes, values, _FAR_PLACES) for values in by_value])
+    for number in range(len(_QUANTILES)):
+        at = {other: quantiles[number] for other, quantiles in each.items()}
+        found = np.array([_evaluated(law, axes, {**at, name: value}, places) for value in each[name]])
         with np.errstate(all="ignore"):
             change = np.abs(found[1:] - found[:-1]) / np.maximum(np.abs(found[1:]), 1.0)
         largest = max(largest, float(np.max(change, initial=0.0, where=np.isfinite(change))))
@@ -205,7 +208,7 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
 
 
 def _evaluated(
-    law: Expression, axes: tuple[str, ...], values: Mapping[str, float], places: Sequence[float] = _PLACES
+    law: Expression, axes: tuple[str, ...], values: Mapping[str, float], places: Sequence[float] | Floats = _PLACES
 ) -> Array:
     """At a few places of all axes together (places,)."""
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
