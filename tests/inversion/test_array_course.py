@@ -45,7 +45,7 @@ def test_a_steady_fall_is_told_with_its_interval() -> None:
 def test_intervals_cover_the_change_with_the_gain_that_a_date_has(gain: float) -> None:
     """The scatter common to a date is no change of d33: five dates tell it, and the interval holds it."""
     generator, covered, apart = np.random.default_rng(2), 0, 0
-    course, unchanged, number = np.log(np.linspace(1.0, 0.92, 5)), np.zeros(5), 300
+    course, unchanged, number = np.log(np.linspace(1.0, 0.92, 5)), np.zeros(5), 150
     times = np.arange(5.0)
     for truth in (course, unchanged):
         rows = [

@@ -19,7 +19,7 @@ class Fault(StrEnum):
 
     DEAD = "dead: no charge above noise"
     WEAK = "nearly dead: a small share of the others' charge"
-    OTHER = "left out: none of its recordings can be used"
+    OTHER = "without a usable recording: see the findings"
 
 
 Faults = Mapping[str, Fault | None]  # by recorded sensor, None of one that is used
@@ -96,17 +96,19 @@ def _runs(states: Sequence[Fault | str | None]) -> list[_Run]:
 
 def _clause(run: _Run, own: Sequence[str], sensors: Sequence[SensorsOfCampaign | None], dated: Dated) -> str:
     """ "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
-    are = f"sensor {own[0]} is" if len(own) == 1 else f"sensors {listed(own)} are"
+    one = len(own) == 1
+    who = f"sensor {own[0]}" if one else f"sensors {listed(own)}"
     state, _, why = run.fault.partition(": ")
-    when = "in all campaigns" if run.before is None and run.after is None else f"since {dated.called(run.first)}"
+    begun = dated.called(run.first)
     if run.after is not None:
-        where = dated.called(run.first)
-        are = are.removesuffix(" is" if len(own) == 1 else " are") + (" was" if len(own) == 1 else " were")
-        when = f"on {where}, and answers again on {dated.called(run.after)}"
-    parts = [f"{are} {state} {when}: {why}"]
-    if run.before is not None:
-        parts.append(f"after {_earlier(own, sensors[run.before])} on {dated.called(run.before)}")
-    return f"{', '.join(parts)}; left out of all that follows"
+        again = f"answer{'s' if one else ''} again on {dated.called(run.after)}"
+        were = "was" if one else "were"
+        return f"{who} {were} {state} on {begun} ({why}) and {again}; left out of what is compared there"
+    when = "in all campaigns" if run.before is None else f"since {begun}"
+    earlier = (
+        "" if run.before is None else f", after {_earlier(own, sensors[run.before])} on {dated.called(run.before)}"
+    )
+    return f"{who} {'is' if one else 'are'} {state} {when}: {why}{earlier}; left out of all that follows"
 
 
 def _earlier(own: Sequence[str], before: SensorsOfCampaign | None) -> str:
