@@ -28,6 +28,7 @@ _UNIT_FACTORS = (1e3, 1e-3)
 _FACTOR_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
 _LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
+_UPPER = 0.75  # quantile of the lines: a resonance is narrower
 _LOWEST = 5  # one line of so many counts as low, and of evenly spaced ones only the lowest third in log frequency
 _D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
 
@@ -58,7 +59,7 @@ def against_model(
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
     inside, beyond, findings = within_tables(campaign, entries, model, table, kept)
     inside |= beyond
-    ratio, expected = _apparent(entries, model, inside & ~unresponsive)
+    ratio, largest, expected = _apparent(entries, model, inside & ~unresponsive)
     lost, dead_findings = dead(entries, unresponsive & inside, variance, np.where(inside, expected, 0.0))
     findings += dead_findings
     usable = inside & ~lost
@@ -66,26 +67,32 @@ def against_model(
     contradiction = _contradiction(ratio, turned) if len(entries) == 2 else None
     if contradiction is not None:
         return Consistent([], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
-    ratio, turned = np.where(usable, ratio, np.nan), np.where(usable, turned, np.nan)
+    ratio, turned, largest = (np.where(usable, column, np.nan) for column in (ratio, turned, largest))
     off, off_findings = _off_by_1000(entries, ratio)
     usable &= ~off
     found = signs_of(entries, turned, usable)
-    findings += [*off_findings, *_of_all(ratio, campaign.skin.d33_pc_per_n), *found.findings]
+    findings += [*off_findings, *_of_all(largest, campaign.skin.d33_pc_per_n), *found.findings]
     usable &= found.signs != 0
     entries = [_reversed(entry) if sign < 0 else entry for entry, sign in zip(entries, found.signs, strict=True)]
     far = frozenset(entry.id for entry, chosen in zip(entries, usable & beyond, strict=True) if chosen)
     return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings, beyond=far)
 
 
-def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats]:
-    """Each recording's level over the base model's, NaN where it says nothing; and the level to be expected [C/N]."""
+def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats, Floats]:
+    """Each recording's level over the base model's, NaN where it says nothing; the same of what a quarter of its lines
+    exceed, which no filter takes from all of them; and the level to be expected [C/N]."""
     predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
     shape = predicted[np.searchsorted(model.recording, np.arange(len(entries)))].real
-    level = np.array([float(np.nanmedian(values.real)) for values in aligned_lines(entries)])
+    aligned = aligned_lines(entries)
+    level = np.array([float(np.nanmedian(values.real)) for values in aligned])
+    upper = np.array([float(np.nanquantile(np.abs(values), _UPPER)) for values in aligned])
     telling = usable & (np.abs(shape) > _LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
-    ratio = np.where(telling, level / np.where(shape == 0, 1.0, shape), np.nan)
+    ratio, largest = (
+        np.where(telling, column / np.where(shape == 0, 1.0, divisor), np.nan)
+        for column, divisor in ((level, shape), (upper, np.abs(shape)))
+    )
     usual = float(np.nanmedian(np.abs(ratio))) if telling.any() else 0.0
-    return ratio, np.abs(shape) * usual
+    return ratio, largest, np.abs(shape) * usual
 
 
 def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list[Finding]]:

@@ -22,8 +22,8 @@ _IN_PHASE = (
     0.9  # of the lines' power that is in phase at the best delay: as much as this without one, and there is none
 )
 _EXPLAINED = 0.5  # of the lines' power, in phase at the best delay: a turn by half past a resonance leaves 0.4
-_STEPS = 4  # delays that are tried for each by which the phase turns once over the band
-_MOST_DELAYS = 4096
+_STEPS = 6  # delays that are tried for each by which the highest line turns once
+_MOST_DELAYS = 8192
 _CHUNK = 256  # delays at a time
 
 
@@ -54,9 +54,9 @@ def lag_between(force: Floats, charge: Floats, block: int) -> int:
 def common_delay(stacks: Sequence[Stack]) -> float:
     """The delay [s] of the charge that all recordings share, negative where the force is late.
 
-    That of the phase's slope: the largest Σ |Σ w u e^(iωτ)|² of the lines' phase factors u with weights w. It is 0
-    where the lines are in phase without one, but for the sign of a recording, or where none brings most of them in
-    phase, as above a resonance, and of noise.
+    That which brings most lines in phase with the force, or in antiphase: the largest Σ (Re Σ w u e^(iωτ))² of the
+    lines' phase factors u with weights w. It is 0 where the lines are in phase without one, but for the sign of a
+    recording, or where none brings most of them in phase, as above a resonance, and of noise.
     """
     parts = [(stack, stack.weights * _phase_factors(stack.values)) for stack in stacks if len(stack.frequency) > 1]
     whole = sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
@@ -71,10 +71,10 @@ def common_delay(stacks: Sequence[Stack]) -> float:
     without = float(in_phase(np.zeros(1))[0])
     if without >= _IN_PHASE:
         return 0.0
-    widest = max(float(np.ptp(stack.frequency)) for stack, _ in parts)
+    highest = max(float(stack.frequency.max()) for stack, _ in parts)
     spacing = max(float(np.median(np.diff(stack.frequency))) for stack, _ in parts)
-    count = min(int(np.ceil(_STEPS * widest / spacing)), _MOST_DELAYS)
-    step = 1 / (_STEPS * widest)
+    count = min(int(np.ceil(_STEPS * highest / spacing)), _MOST_DELAYS)
+    step = 1 / (_STEPS * highest)
     delays: Floats = step * np.arange(-(count // 2), count // 2 + 1).astype(np.float64)
     for _ in range(3):
         power = in_phase(delays)
@@ -103,12 +103,9 @@ def _phase_factors(values: Complexes) -> Complexes:
 
 
 def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
-    """Σ over recordings of |Σ over lines of factors · e^(2πifτ)|² at each delay."""
+    """Σ over recordings of (Re Σ over lines of factors · e^(2πifτ))² at each delay."""
     return np.concatenate(
-        [
-            (np.abs(factors @ np.exp(2j * np.pi * np.outer(frequency, some))) ** 2).sum(axis=0)
-            for some in _chunks(delays)
-        ]
+        [((factors @ np.exp(2j * np.pi * np.outer(frequency, some))).real ** 2).sum(axis=0) for some in _chunks(delays)]
     )
 
 

@@ -169,6 +169,17 @@ def _medians(values: Floats, used: Mask) -> Floats:
         return np.asarray(np.nanmedian(np.where(used, values, np.nan), axis=1, keepdims=True))
 
 
+def _of_the_largest(real: Floats, used: Mask) -> Floats:
+    """The median of the largest quarter of each recording's lines (recordings,): of those behind a low-pass most have
+    none; NaN where no line is used."""
+    largest = np.full(len(real), np.nan)
+    for row, lines in enumerate(used):
+        if lines.any():
+            by_size = real[row, lines][np.argsort(np.abs(real[row, lines]))]
+            largest[row] = np.median(by_size[-(len(by_size) // 4 + 1) :])
+    return largest
+
+
 def _mains_lines(stacks: Sequence[Stack]) -> tuple[float, ...]:
     """Lines at mains harmonics that scatter far more about their neighbours than those do."""
     harmonics = np.outer(MAINS_HZ, HARMONICS).ravel()
@@ -198,6 +209,7 @@ def _binned(stacks: Sequence[Stack], edges: Floats, mains: tuple[float, ...]) ->
         level, noise = _medians(real, used)[:, 0], np.zeros(len(real))
         if real.shape[1] > 1:
             noise = _medians(np.abs(np.diff(real, axis=1)), used[:, 1:] & used[:, :-1])[:, 0]
+        level = np.where(np.abs(level) > 2 * noise, level, _of_the_largest(real, used))
         plain = np.abs(level) > 2 * noise  # a dead sensor has no level
         kept = ~np.isin(np.round(stack.frequency, 6), mains)
         bins = bin_of(stack.frequency, edges)

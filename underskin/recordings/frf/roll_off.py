@@ -1,8 +1,8 @@
 """Whether the band that d33 is averaged over lies behind a high-pass or a low-pass: what its level is of the plateau's.
 
 The magnitude over frequency, gathered in bins over all recordings, is fitted by a plateau with a slight power law (a
-sensor's relaxation) and the two filters of first order,
-    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − ½ ln(1 + (f/f2)²),   0 ≤ n ≤ `STEEPEST`,
+sensor's relaxation) and two filters,
+    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − (m/2) ln(1 + (f/f2)^(2k)),   0 ≤ n ≤ `STEEPEST`,
 up to where a resonance lifts it. A filter counts where it explains the fall and the plateau lies beyond the band: then
 the band's average is no d33, however flat the band is.
 """
@@ -21,6 +21,8 @@ from underskin.units import Floats
 _FEWEST_BINS = 6
 _CORNERS = 60  # of each filter, that are tried
 _BELOW, _ABOVE = 30.0, 10.0  # times the band's ends: how far off corners are tried
+_LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
+_ONE_POLE = (1, 1)
 _SLOPES = np.linspace(0.0, STEEPEST, 6)
 _LEAST_NOISE = 0.003  # of a bin's magnitude
 _SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that tell their scatter, and one where none does
@@ -58,9 +60,12 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
         return None
     highs = [0.0, *np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS).tolist()]
     lows = [np.inf, *np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS).tolist()]
-    single = [(high, np.inf) for high in highs] + [(0.0, low) for low in lows]
-    best = min(single, key=lambda pair: _fitted(x, y, weight, *pair)[0])
-    both = min(product(highs[1::2], lows[1::2]), key=lambda pair: _fitted(x, y, weight, *pair)[0])
+    single = [(high, np.inf, _ONE_POLE) for high in highs] + [
+        (0.0, low, order) for low in lows for order in _LOW_PASSES
+    ]
+    best = min(single, key=lambda one: _fitted(x, y, weight, *one)[0])
+    in_order = [(high, low, _ONE_POLE) for high, low in product(highs[1::2], lows[1::2]) if high < low]
+    both = min(in_order, key=lambda one: _fitted(x, y, weight, *one)[0])
     if _fitted(x, y, weight, *best)[0] - _fitted(x, y, weight, *both)[0] > _SPEAKS:
         best = both
     misfit, plateau = _fitted(x, y, weight, *best)
@@ -75,11 +80,14 @@ def _falls_after(magnitude: Floats, place: int) -> bool:
     return bool(magnitude[-1] < 0.8 * magnitude[place:].max())
 
 
-def _fitted(x: Floats, y: Floats, weight: Floats, high: float, low: float) -> tuple[float, float]:
-    """χ² of the best plateau and slope with these corners, and the logarithm of the plateau where the slope is that of
-    none: at the band's middle."""
+def _fitted(
+    x: Floats, y: Floats, weight: Floats, high: float, low: float, kind: tuple[int, int] = _ONE_POLE
+) -> tuple[float, float]:
+    """χ² of the best plateau and slope with these corners and this kind of low-pass (k, m), and the logarithm of the
+    plateau where the slope is that of none: at the band's middle."""
     frequency = np.exp(x)
-    filters = -0.5 * (np.log1p((high / frequency) ** 2) + np.log1p((frequency / low) ** 2))
+    order, times = kind
+    filters = -0.5 * (np.log1p((high / frequency) ** 2) + times * np.log1p((frequency / low) ** (2 * order)))
     laws = filters - np.outer(_SLOPES, x - x.mean())
     plateaus = (weight * (y - laws)).sum(axis=1) / weight.sum()
     misfits = (weight * (y - laws - plateaus[:, None]) ** 2).sum(axis=1)
