@@ -64,7 +64,7 @@ def test_an_old_store_answers_as_it_did(place: Place, version: str) -> None:
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         assert sorted(asked_of(server.http)) == sorted(before)
         found = {path: server.http.get(path).raise_for_status().json() for path in before}
-        assert differences(*(without_tolerances(each) for each in (before, found))) == []
+        assert differences(without_tolerances(before), without_tolerances(found)) == []
         again = server.http.post(f"/v1/campaigns?skin={SECOND}", json=campaign("stays")).raise_for_status().json()
         assert again["notes"][0].startswith("these recordings are in campaign stays of skin finger already")
     store = database(place.database_url, place.folder)
