@@ -74,7 +74,10 @@ def test_what_was_not_given_has_no_unit() -> None:
 
 @pytest.mark.parametrize("second", [1.0, 0.7])
 def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(server: Server, second: float) -> None:
+    """Of a skin declared exactly: usual tolerances hide how the interval lies."""
     skin, document = f"second sensor {second}", campaign("two sensors", sensors=2)
+    exact = dict.fromkeys(("thickness_percent", "sensor_radius_percent", "youngs_modulus_percent"), 0)
+    document["skin"] = {**document["skin"], "tolerances": exact}
     for recording in document["recordings"][2:]:
         recording["frf_re_pc_per_n"] = [second * value for value in recording["frf_re_pc_per_n"]]
     kept = server.http.post("/v1/campaigns", json=document, params={"skin": skin}).raise_for_status().json()["id"]
