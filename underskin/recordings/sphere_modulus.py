@@ -26,6 +26,7 @@ _CONTACTS = 200  # contact points tried
 _THINNED = 300  # samples by which powers are compared
 _DEEPEST_OF_RADIUS = 2.0  # a/R is 0.96 there: a sphere pressed deeper is held at its equator
 _DEEPEST_OF_THICKNESS = 0.5  # a linear layer pressed to half its thickness: strains are of order 1 beyond
+_NOT_ALL = 3.0  # times a sample's noise, that a law leaves where more than it is at work
 _PLAINLY = 0.7  # of the other's residual: one of layer and half space is then the better law
 _MISSES = 0.01  # of the force that it spans, root mean square, beyond which a law may miss plainly
 _BEYOND_NOISE = 4.0  # times a sample's noise, that it leaves then
@@ -39,9 +40,9 @@ _SPHERES = 1.25, 1.8  # powers that adhesion, creep, stiffening and a stage that
 class IndentationModulus:
     """The modulus [Pa] with its standard uncertainty, the contact point d0 [m] and what the fit leaves [N].
 
-    `depth` [m] is the largest; `radius` and `thickness` are those of the law, None of a half space. The uncertainty
-    goes by the residuals and their correlation from point to point. `residual` far above the sensor's noise says that
-    the law is not the whole story, and that E is a number for this curve only.
+    `noise` [N] is a sample's, `depth` [m] the largest; `radius` and `thickness` are those of the law, None of a half
+    space. The uncertainty goes by the residuals and their correlation from point to point. `residual` far above the
+    noise says that the law is not the whole story, and that E is a number for this curve only.
     """
 
     modulus: float
@@ -52,6 +53,7 @@ class IndentationModulus:
     radius: float
     thickness: float | None
     declared_thickness: float | None
+    noise: float
 
     @property
     def statement(self) -> str:
@@ -60,9 +62,11 @@ class IndentationModulus:
         over = f"{self.depth / self.radius:.2g} of the radius"
         if self.declared_thickness is not None:
             over += f", {self.depth / self.declared_thickness:.2g} of the thickness"
+        times = self.residual / self.noise if self.noise > 0 else 0.0
+        misses = f", {times:.2g} times the noise: the law is not all" if times > _NOT_ALL else ""
         return (
             f"sphere on a {self._body}, contact from {contact:.4g} mm, pressed {over} deep; it leaves "
-            f"{self.residual:.2g} N (root mean square)"
+            f"{self.residual:.2g} N (root mean square{misses})"
         )
 
     @property
@@ -282,6 +286,7 @@ def _modulus(
         radius=radius,
         thickness=thickness,
         declared_thickness=declared,
+        noise=roughness(load),
     )
 
 
