@@ -210,10 +210,11 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     unseen |= {entry.mechanism for entry in d33.hidden}
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
+    untried = _not_tried(stated, search, problem, findings)
     around = Around(
         slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
         contradictions=[entry["statement"] for entry in contradictory],
-        reserves=[*reserves(findings), *_not_tried(stated, search, problem, findings)],
+        reserves=[*reserves(findings), *untried],
         quoted=[
             of_kinds,
             _depths_clause(problem, shown),
@@ -235,7 +236,8 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             mechanisms=mechanisms,
             told=_told(problem, mechanisms) if named is not None else (),
         )
-        shape = statements.shape_clause(diagnosis.shape)
+        # What remains tells no form where a mechanism that may explain it was not tried
+        shape = "" if untried else statements.shape_clause(diagnosis.shape)
         statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
     whole = {
         **document,
