@@ -116,8 +116,8 @@ def _calculations(walked: Walk) -> None:
 def _mechanisms(walked: Walk) -> None:
     walked.ask("keep_mechanism", "POST", "/v1/mechanisms", mechanisms.EXAMPLE)
     walked.ask("mechanisms", "GET", "/v1/mechanisms")
-    entries = walked.examples["mechanisms"]["answer"]["mechanisms"]
-    walked.examples["mechanisms"]["answer"] = {"mechanisms": [entries[0], entries[-1]]}
+    answer = walked.examples["mechanisms"]["answer"]
+    answer["mechanisms"] = [answer["mechanisms"][0], answer["mechanisms"][-1]]
     walked.ask("discard_mechanism", "DELETE", "/v1/mechanisms/{name}", name=mechanisms.EXAMPLE["name"])
 
 
