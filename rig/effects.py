@@ -43,7 +43,8 @@ EFFECTS: dict[str, Effect] = {
         only_curves=("work_of_separation_j_per_m2",),
     ),
     "strain_stiffening": Effect(
-        "with the contact strain e = 0.2 a/R (of a cylinder: u/H): linear E (1 + c e), limited E/(1 − c e)",
+        "with the contact strain e = 0.2 a/R (of a cylinder, beside its neo-Hookean law: u/H): linear E (1 + c e), "
+        "limited E/(1 − c e)",
         (FRF, INDENTATION, COMPRESSION),
         {"coefficient": (0, 20)},
         ("linear", "limited"),

@@ -18,7 +18,7 @@ _READ_ELSEWHERE = tuple(  # by the library, commands and tests
     f"{_PREFIX}{name}"
     for name in (
         "URL", "API_KEY", "MECHANISMS", "TIME_ZONE", "READING_MEMORY_MB", "READING_SECONDS", "READING_EXPANSION",
-        "SOAK", "ORACLE", "RECORDINGS", "CAMPAIGNS",
+        "SOAK", "ORACLE", "RECORDINGS", "CAMPAIGNS", "CASES",
     )
 )  # fmt: skip
 _HOST_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*|\[[0-9A-Fa-f:.]+\]")

@@ -8,7 +8,6 @@ import pytest
 import underskin
 from tests.recordings.test_sphere_modulus import bonded_layer, whole_sphere
 from tests.support.sphere_curves import campaign, pressed, ways
-from underskin.diagnosis.inference import across_bounds
 from underskin.recordings.campaign import from_dict
 from underskin.units import Floats
 
@@ -125,22 +124,3 @@ def test_what_was_not_tried_is_said_where_it_may_be_missing() -> None:
 def test_a_swapped_pair_of_columns_ends_in_no_traceback() -> None:
     depth = ways(-0.1, 0.3, -0.1, samples=60)
     assert underskin.diagnose(campaign(pressed(depth), depth)).verdict in ("unexplained", "insufficient_data")
-
-
-def test_a_parameter_that_is_held_in_cells_keeps_their_width(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One cell may have all of the probability: what is known of the parameter is its cell, and not its middle."""
-
-    class Held:
-        def __init__(self, log_evidence: float) -> None:
-            self.log_evidence, self.covariance = log_evidence, np.eye(1)
-            self.point = type("Point", (), {"fit": np.zeros(2)})()
-
-    bounded = type("Parameter", (), {"bounds": (0.0, 1.0)})()
-    model = type("Model", (), {"parameters": (bounded, bounded)})()
-    hypothesis = type("Hypothesis", (), {"model": model, "mean_places": [0, 1]})()
-    evidence: Any = type("Evidence", (), {"hypothesis": hypothesis, "covariance": np.eye(2)})()
-    monkeypatch.setattr(across_bounds, "_traded", lambda *_: 1)
-    monkeypatch.setattr(across_bounds, "_along", lambda *_: [Held(1e3 * (number == 2)) for number in range(5)])
-    parts = across_bounds.parts(evidence, 0)
-    total = np.sum([part.share * part.covariance for part in parts], axis=0)
-    assert total[1, 1] == pytest.approx(0.2**2 / 12)

@@ -100,7 +100,7 @@ def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_m
     assert found.campaign_d33 is not None
     assert rest.campaign_d33 is not None
     assert float(found.campaign_d33.value) == pytest.approx(float(rest.campaign_d33.value), rel=1e-6)
-    assert found.recordings.inside.tolist() == [False] + 9 * [True]
+    assert found.recordings.inside.sum() == 9
     assert [left.sentence.split(":")[0] for left in found.left_out] == ["recording r0"]
 
 

@@ -110,9 +110,10 @@ def test_an_indentation_follows_hertz_from_displacement_zero() -> None:
     np.testing.assert_allclose(predict(curve(), table()).value, hertz_force(DEPTH_MM, 4.0, 2.0), rtol=1e-6, atol=1e-9)
 
 
-def test_a_compression_follows_hooke_from_displacement_zero() -> None:
+def test_a_compression_is_neo_hookean_from_displacement_zero() -> None:
     conditions = Conditions("block", SKIN, (CompressionConditions("c", 10.0, 20.0, DEPTH_MM),))
-    expected: Floats = 2.0 * np.pi / 4 * 20.0**2 * DEPTH_MM / 10.0
+    stretch: Floats = 1.0 - DEPTH_MM / 10.0
+    expected = 2.0 * np.pi / 4 * 20.0**2 * (stretch**-2 - stretch) / 3
     np.testing.assert_allclose(predict(conditions, table()).value, expected, rtol=1e-12)
 
 

@@ -37,7 +37,9 @@ def test_what_is_hidden_is_as_asked(what: str, count: int) -> None:
 def test_all_effects_of_the_kind_are_drawn() -> None:
     seen = Counter(name for number in range(150) for name in drawn(5, number, "single")["effects"])
     assert set(seen) == set(CATALOGUED)
-    assert set(CATALOGUED) == {name for name, effect in EFFECTS.items() if "frf" in effect.kinds}
+    assert set(CATALOGUED) == {name for name, effect in EFFECTS.items() if "frf" in effect.kinds} - {
+        "amplifier_low_pass"
+    }
     assert len(UNKNOWN) >= 5
     assert not set(UNKNOWN) & set(EFFECTS)
 

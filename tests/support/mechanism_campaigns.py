@@ -97,13 +97,14 @@ def compression_campaign() -> Campaign:
     recordings = []
     for number, height in enumerate((30.0, 15.0)):
         displacement = height * np.concatenate([np.linspace(0, 0.4, 40), np.linspace(0.39, 0, 40)])
+        stretch = 1 - displacement / height
         recordings.append(
             CompressionRecording(
                 id=f"c{number}",
                 sample_height_mm=height,
                 sample_diameter_mm=30.0,
                 displacement_mm=displacement,
-                force_n=2.0 * np.pi / 4 * 30.0**2 * displacement / height,
+                force_n=2.0 * np.pi / 4 * 30.0**2 * (stretch**-2 - stretch) / 3,
                 time_s=np.linspace(0.0, 39.5, len(displacement)),
             )
         )

@@ -34,10 +34,10 @@ def d33(server: Server, campaign_id: str) -> float:
 
 
 def require_estimated(server: Server, ids: dict[str, str]) -> None:
-    """d33 is as the noise makes it: 0.3² of the power too small by H1, too large by H2, and right by Hv."""
+    """Noise of 0.3² of the power in both channels is taken off whichever estimator is asked for, which is kept."""
     values = {name: d33(server, campaign_id) for name, campaign_id in ids.items()}
-    assert values["H1"] / values["Hv"] == pytest.approx(1 / 1.09, abs=0.02)
-    assert values["H2"] / values["Hv"] == pytest.approx(1.09, abs=0.02)
+    assert values["H1"] == pytest.approx(values["Hv"], rel=0.03)
+    assert values["H2"] == pytest.approx(values["Hv"], rel=0.03)
     for name, campaign_id in ids.items():
         (first, *_) = server.http.get(f"/v1/campaigns/{campaign_id}/document").json()["recordings"]
         assert first["estimator"] == name

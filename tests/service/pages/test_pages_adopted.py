@@ -134,7 +134,7 @@ def test_what_comes_later_is_told_by_the_adopted_model_too(server: Server) -> No
     row = said(server, "/", "palm-b")
     assert "later" in row
     by_model = d33(server, later, "adopted")["array"]["d33_pc_per_n"]
-    assert f"array {by_model:.1f} pC/N" in row
+    assert f"array {by_model:.4g} pC/N" in row
 
 
 def test_an_outdated_model_is_said_to_serve_nothing(server: Server) -> None:

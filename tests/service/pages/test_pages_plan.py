@@ -58,7 +58,8 @@ def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dic
     row = plan.get_by_role("region", name="Recordings to make").locator("tbody tr").first
     assert f"✓ {planned[0]['repeats']} of {planned[0]['repeats']}" in row.inner_text()
     count, repeats = sum(entry["repeats"] for entry in planned), planned[0]["repeats"]
-    assert f"{repeats} of {count} recordings have arrived." in plan.locator("[role=status]").inner_text()
+    verb = "has" if repeats == 1 else "have"
+    assert f"{repeats} of {count} recordings {verb} arrived." in plan.locator("[role=status]").inner_text()
     visitor.require_accessible()
 
 

@@ -61,7 +61,11 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
     page.wait_for_url("**/campaigns/*")
     expect(page.get_by_text(f"channel 'load' is derived: {LOAD}")).to_be_attached()
     expect(
-        page.get_by_text(re.compile(r"contact from [−-]?[\d.]+ (µm|nm); it leaves [\d.e-]+ (nN|pN) "))
+        page.get_by_text(
+            re.compile(
+                r"contact from [−-]?[\d.]+ (µm|nm), pressed [\d.e-]+ of the radius deep; it leaves [\d.e-]+ (nN|pN) "
+            )
+        )
     ).to_be_visible()
     (kept,) = campaigns_of(server, skin)
     (recording,) = server.http.get(f"/v1/campaigns/{kept}/document").json()["recordings"]

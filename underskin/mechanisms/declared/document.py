@@ -48,6 +48,7 @@ _NEUTRAL = 1e-6
 _ADDED = ("force", "position")  # what a law adds to, where the others are factors
 # Least change of a law that each parameter can make: a thousandth of what any data show; an AFM shows 1e-12 N.
 _NOTICED_FACTOR, _NOTICED_ADDED = 1e-9, 1e-15
+_APART = 5  # places from one axis to the next
 _QUANTILES = (0.01, 0.25, 0.5, 0.75, 0.99)  # of priors, where that is looked for
 
 
@@ -197,10 +198,11 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
     each = {other: [entry.from_fit(entry.quantile(at)) for at in _QUANTILES] for other, entry in parameters.items()}
     values = np.array(list(each.values()))
     places = np.concatenate([_FAR_PLACES, values.ravel(), (values[:, 1:] + values[:, :-1]).ravel() / 2])
+    apart = np.array([np.roll(places, _APART * number) for number in range(len(axes))])  # a law may be of their ratio
     largest = 0.0
     for number in range(len(_QUANTILES)):
         at = {other: quantiles[number] for other, quantiles in each.items()}
-        found = np.array([_evaluated(law, axes, {**at, name: value}, places) for value in each[name]])
+        found = np.array([_evaluated(law, axes, {**at, name: value}, apart) for value in each[name]])
         with np.errstate(all="ignore"):
             change = np.abs(found[1:] - found[:-1]) / np.maximum(np.abs(found[1:]), 1.0)
         largest = max(largest, float(np.max(change, initial=0.0, where=np.isfinite(change))))
@@ -210,11 +212,12 @@ def _change(law: Expression, name: str, axes: tuple[str, ...], parameters: Mappi
 def _evaluated(
     law: Expression, axes: tuple[str, ...], values: Mapping[str, float], places: Sequence[float] | Floats = _PLACES
 ) -> Array:
-    """At a few places of all axes together (places,)."""
+    """At a few places of all axes together (places,), or each at its own of these (axes, places)."""
     numbers = {name: np.float64(value) for name, value in values.items()}  # which may be divided by 0
+    along = np.broadcast_to(places, (len(axes), np.shape(places)[-1]))
     with np.errstate(all="ignore"):
-        found = np.asarray(law({**numbers, **dict.fromkeys(axes, np.array(places))}))
-    return np.asarray(found + np.zeros(len(places)))
+        found = np.asarray(law({**numbers, **dict(zip(axes, along, strict=True))}))
+    return np.asarray(found + np.zeros(along.shape[1]))
 
 
 def _used(laws: tuple[Expression, ...], axes: tuple[str, ...], parameters: Mapping[str, Parameter]) -> None:
