@@ -55,10 +55,10 @@ def test_sensors_of_one_recording_and_of_several_are_weighed_alike(table: SigmaT
     change = random.normal(size=(1, 6, 1))
     nodes = own.usual
     sensor = np.repeat(np.arange(3), 2)
-    shared = own._spread**2 * np.equal.outer(sensor, sensor)
+    shared = own.spread**2 * np.equal.outer(sensor, sensor)
 
     def log_density(amplitude: float) -> float:
-        fixed = own._fixed @ own._fixed.T + shared + amplitude**2 * change[0] @ change[0].T
+        fixed = own.fixed @ own.fixed.T + shared + amplitude**2 * change[0] @ change[0].T
         terms = []
         for node in nodes:
             for weight, variances in zip(node.log_weights, node.variances, strict=True):

@@ -199,7 +199,7 @@ class GainResidual:
         centre = np.array([entry.start for entry in parameters]) - best.point.fit
         scale = np.array([_prior_sd(entry) for entry in parameters])
         self._known = slopes @ centre
-        self._fixed, self._spread = slopes * scale, best.levels.spread
+        self.fixed, self.spread = slopes * scale, best.levels.spread
         self._pairs = SensorPairs.of(problem.lines.sensor)
         self._moving = best.relative_place_slopes
         self.usual = self._scatters(_USUAL_POSITION)
@@ -226,7 +226,7 @@ class GainResidual:
         return float(logsumexp([self._without(nodes).log_density for nodes in self._scatters(_ANY_POSITION)]))
 
     def _without(self, nodes: ScatterNodes) -> _WithoutProcess:
-        return _WithoutProcess.of(nodes, self._fixed, self._pairs, self._spread)
+        return _WithoutProcess.of(nodes, self.fixed, self._pairs, self.spread)
 
     @cached_property
     def _usual(self) -> _WithoutProcess:
