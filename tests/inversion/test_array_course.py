@@ -69,7 +69,7 @@ def test_a_sensor_that_departs_does_not_move_the_array() -> None:
     (departure,) = [one for one in found.departures if one.significant]
     assert departure.sensor == "s03"
     assert departure.low < -0.15 < departure.high
-    assert "s03 besides by -1" in found.statement
+    assert "s03 changed by -1" in found.statement
 
 
 def test_a_sensor_that_dies_is_left_out_and_told_with_its_date() -> None:
