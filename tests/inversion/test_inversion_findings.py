@@ -188,3 +188,7 @@ def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -
     (left,) = found.left_out
     assert left.sentence.startswith("recording exchanged: ")
     assert "force and charge look exchanged. Left out" in left.sentence
+    meant = invert(replace(campaign, recordings=tuple(both), units_checked=True), table)
+    assert meant.recordings.ids == ("right", "exchanged")
+    (looked_at,) = meant.findings
+    assert looked_at.sentence.endswith("force and charge look exchanged.")
