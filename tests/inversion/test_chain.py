@@ -47,7 +47,14 @@ def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: Sigm
     assert low < D33 < high
     assert inversion.flags == ()
     assert inversion.findings == ()
-    assert "ms late, which is taken off" in inversion.zone.reason
+    assert "ms late (a delay, a filter or a resonance), which is taken off" in inversion.zone.reason
+
+
+def test_a_turn_by_a_filter_is_not_stated_as_a_delay(table: SigmaTable) -> None:
+    """Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named."""
+    reason = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table).zone.reason
+    assert "the phases turn as if the charge came" in reason
+    assert "(a delay, a filter or a resonance)" in reason
 
 
 def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:

@@ -207,11 +207,12 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
 
 
 def _delayed(delay: float) -> str:
-    """In words, the delay [s] that was taken off; empty without one."""
+    """In words, the delay [s] that was taken off, which phases do not tell from a filter; empty without one."""
     if delay == 0.0:
         return ""
     late = "charge" if delay > 0 else "force"
-    return f"; the {late} comes {in_digits(1e3 * abs(delay), 3)} ms late, which is taken off"
+    late_by = f"{in_digits(1e3 * abs(delay), 3)} ms late"
+    return f"; the phases turn as if the {late} came {late_by} (a delay, a filter or a resonance), which is taken off"
 
 
 def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
