@@ -8,6 +8,8 @@ import pytest
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
 from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, invert
+from underskin.recordings.frf.channel_noise import without_noise_bias
+from underskin.recordings.frf.estimation import broadband
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
@@ -45,7 +47,14 @@ def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: Sigm
     assert low < D33 < high
     assert inversion.flags == ()
     assert inversion.findings == ()
-    assert "ms late, which is taken off" in inversion.zone.reason
+    assert "ms late (a delay, a filter or a resonance), which is taken off" in inversion.zone.reason
+
+
+def test_a_turn_by_a_filter_is_not_stated_as_a_delay(table: SigmaTable) -> None:
+    """Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named."""
+    reason = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table).zone.reason
+    assert "the phases turn as if the charge came" in reason
+    assert "(a delay, a filter or a resonance)" in reason
 
 
 def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:
@@ -75,6 +84,19 @@ def test_where_nothing_tells_which_channel_is_noisy_the_interval_holds_d33(
     value, low, high = array_d33(invert(campaign, table))
     assert low < D33 < high
     assert value == pytest.approx(D33, rel=0.12)
+
+
+@pytest.mark.parametrize(("in_force", "in_charge"), [(0.0, 0.003), (0.0, 0.0045), (0.0, 0.01), (0.02, 0.0)])
+def test_a_little_noise_over_all_lines_leaves_an_frf(in_force: float, in_charge: float) -> None:
+    """Force and charge are white: no noise has a larger share of either's power than γ² lost, and what γ² does not tell
+    apart is in the uncertainty."""
+    random, samples, gain = np.random.default_rng(1), 2**16, 7.4e-12
+    force, noise = 0.05 * random.standard_normal(samples), random.standard_normal((2, samples))
+    charge = gain * (force + 0.05 * np.sqrt(in_charge) * noise[1])
+    frf = broadband(force + 0.05 * np.sqrt(in_force) * noise[0], charge, 2000.0)
+    level = without_noise_bias(frf, np.ones(len(frf.frequency), dtype=bool))
+    assert level.bias_unsure > 0.003
+    assert np.median(level.values.real) == pytest.approx(gain, rel=0.002 + 1.3 * level.bias_unsure)
 
 
 @pytest.mark.parametrize(

@@ -150,6 +150,27 @@ def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTab
         assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused
 
 
+def test_zeros_outside_an_analyzers_band_are_no_response(table: SigmaTable) -> None:
+    """They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others."""
+    campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(22))
+    lines = np.arange(1, 401.0)
+    noise = 1 + 0.01 * np.random.default_rng(23).standard_normal((len(campaign.recordings), 400))
+    recordings = []
+    for recording, scatter in zip(campaign.recordings, noise, strict=True):
+        assert isinstance(recording, FrfRecording)
+        assert recording.frf_re_pc_per_n is not None
+        real = np.where(lines <= 200, np.median(recording.frf_re_pc_per_n) * scatter, 0.0)
+        recordings.append(
+            replace(recording, frequency_hz=lines, frf_re_pc_per_n=real, frf_im_pc_per_n=0 * lines, coherence=None)
+        )
+    found = invert(replace(campaign, recordings=tuple(recordings)), table)
+    assert found.campaign_d33 is not None
+    assert found.campaign_d33.d33_rows()[0][0] == pytest.approx(14.0, rel=0.02)
+    assert found.zone.high_hz == 200
+    assert "mains" not in found.zone.reason
+    assert found.findings == ()
+
+
 def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -> None:
     random = np.random.default_rng(21)
     campaign = simulate(table, Rig(d33=np.array([14.0])), random)
@@ -167,3 +188,7 @@ def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -
     (left,) = found.left_out
     assert left.sentence.startswith("recording exchanged: ")
     assert "force and charge look exchanged. Left out" in left.sentence
+    meant = invert(replace(campaign, recordings=tuple(both), units_checked=True), table)
+    assert meant.recordings.ids == ("right", "exchanged")
+    (looked_at,) = meant.findings
+    assert looked_at.sentence.endswith("force and charge look exchanged.")

@@ -121,7 +121,7 @@ def frfs(preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float, 
 def test_exchanged_preloads_and_spheres_give_no_d33(
     table: SigmaTable, preloads: tuple[float, ...], radii: tuple[float, ...], modulus: float
 ) -> None:
-    with pytest.raises(NoD33, match="preload_n and indenter_radius_mm look exchanged"):
+    with pytest.raises(NoD33, match="or preload_n and indenter_radius_mm are exchanged"):
         invert(frfs(preloads, radii, modulus, exchanged=True), table)
     assert invert(frfs(preloads, radii, modulus, exchanged=False), table).campaign_d33 is not None
 
@@ -134,10 +134,17 @@ def test_preloads_and_spheres_that_are_meant_are_used(table: SigmaTable) -> None
     assert len(found.left_out) == 3
 
 
+def test_a_small_sphere_pressed_hard_is_not_exchanged(table: SigmaTable) -> None:
+    """R = 1 mm under 1 to 3 N: as one preload does not exceed the radius, what lies beyond the tables is left out."""
+    found = invert(frfs((1.0, 2.0, 3.0), (1.0,), 16.0, exchanged=False), table)
+    assert found.recordings.inside.tolist() == [True, False, False]
+    assert len(found.left_out) == 2
+
+
 def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
     report = diagnose(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True))
     assert report["verdict"] == "insufficient_data"
-    assert "reload_n and indenter_radius_mm look exchanged" in report["statement"]
+    assert "or preload_n and indenter_radius_mm are exchanged" in report["statement"]
 
 
 def test_a_block_pressed_by_more_than_its_height_gives_no_modulus() -> None:

@@ -12,7 +12,7 @@ from tests.support.instrument_files import COMMON
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.readers.unit_labels import labelled_unit, meanings, unit
+from underskin.recordings.readers.unit_labels import contradicts, labelled_unit, meanings, unit
 from underskin.recordings.reading import Reading
 from underskin.recordings.rig_description import RigDescription
 
@@ -113,6 +113,27 @@ def test_synonyms_are_one_unit(one: str, other: str) -> None:
         assert meanings(one) == (unit(other),)
     else:
         assert unit(one) is not None
+
+
+@pytest.mark.parametrize("heading", ["F_m", "Q_A", "F_s", "Force CH1, A", "Load cycles", "Force (g)"])
+def test_the_end_of_a_name_is_no_label_against_the_rig(heading: str) -> None:
+    """An axis, a channel or a statistic is named so; g is a gram-force as well."""
+    stated = "gf" if heading == "Force (g)" else "N"
+    newtons = 9.80665e-3 if stated == "gf" else 1.0
+    for data, name in ((table(heading), "a.csv"), (tdms(heading, ""), "a.tdms")):
+        reading = read_file(data, name, rig({"channel": heading, "unit": stated}))
+        np.testing.assert_allclose(force_of(reading), FORCE * newtons, rtol=1e-9)
+
+
+def test_one_unit_by_other_prefixes_is_no_contradiction() -> None:
+    assert not contradicts("mN/µm", "N/mm", "Stiffness (mN/µm)", "force/length")
+    assert contradicts("mN/µm", "N/m", "Stiffness (mN/µm)", "force/length")
+
+
+@pytest.mark.parametrize("heading", ["F_mN", "Force lbs", "Force mV", "Force / V", "Force (V)", "Force dB"])
+def test_the_end_of_a_name_that_is_a_unit_contradicts_the_rig(heading: str) -> None:
+    with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'N'"):
+        read_file(tdms(heading, ""), "a.tdms", rig({"channel": heading, "unit": "N"}))
 
 
 def test_letters_of_no_unit_have_every_meaning_of_them() -> None:

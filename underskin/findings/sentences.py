@@ -163,8 +163,8 @@ def needed_modulus(against: str) -> Callable[..., str]:
 def preload_and_radius_exchanged(beyond: int, recordings: int) -> str:
     """Loads beyond the tables that come within once preload and sphere are exchanged."""
     return (
-        f"preload_n and indenter_radius_mm look exchanged: L = F/(R²E) of {beyond} of {recordings} contacts is beyond "
-        "what the tables hold, and within if the two columns are exchanged"
+        "the spheres are pressed harder than the tables hold, or preload_n and indenter_radius_mm are exchanged: "
+        f"L = F/(R²E) of {beyond} of {recordings} contacts is beyond the tables, and within if they are exchanged"
     )
 
 

@@ -161,7 +161,7 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
         raise NoD33("recordings", campaign.name, "it holds no frequency responses (FRFs), from which d33 is calculated")
     for excess in excesses(campaign.skin):
         raise NoD33(f"skin.{excess.field}", excess.largest, f"skin.{excess.error}")
-    measured, recorded, left_out = _measured(recorded)
+    measured, recorded, left_out, doubted = _measured(recorded, units_checked=campaign.units_checked)
     if not recorded:
         raise _none_usable(campaign, left_out)
     frfs = stacked(measured)
@@ -201,16 +201,18 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     unsure = float(np.median([frf.bias_unsure for frf, good in zip(measured, inside, strict=True) if good]))
     inversion = _estimated(ids, rows, contact, zone).wider(unsure)
     filtered = of_roll_off(roll_off(frfs, zone, level), zone)
-    findings = (*at_reading(campaign), *filtered, *findings_of(recorded, measured, level, inversion.campaign_d33))
+    others = findings_of(recorded, measured, level, inversion.campaign_d33)
+    findings = (*at_reading(campaign), *doubted, *filtered, *others)
     return replace(inversion, left_out=(*left_out, *inversion.left_out), findings=findings)
 
 
 def _delayed(delay: float) -> str:
-    """In words, the delay [s] that was taken off; empty without one."""
+    """In words, the delay [s] that was taken off, which phases do not tell from a filter; empty without one."""
     if delay == 0.0:
         return ""
     late = "charge" if delay > 0 else "force"
-    return f"; the {late} comes {in_digits(1e3 * abs(delay), 3)} ms late, which is taken off"
+    late_by = f"{in_digits(1e3 * abs(delay), 3)} ms late"
+    return f"; the phases turn as if the {late} came {late_by} (a delay, a filter or a resonance), which is taken off"
 
 
 def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
@@ -222,11 +224,17 @@ def _none_usable(campaign: Campaign, left_out: Sequence[Finding]) -> NoD33:
     return NoD33("recordings", campaign.name, allowed)
 
 
-def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfRecording], list[Finding]]:
-    """The usable lines of each recording that has an FRF, those recordings, and findings on the others."""
-    frfs, with_frf, left_out = [], [], []
+def _measured(
+    recorded: Sequence[FrfRecording], *, units_checked: bool
+) -> tuple[list[Frf], list[FrfRecording], list[Finding], list[Finding]]:
+    """The usable lines of each recording that has an FRF, those recordings, findings on the others, and findings on
+    those whose channels look exchanged and were checked."""
+    frfs, with_frf, left_out, doubted = [], [], [], []
     for recording in recorded:
-        if (exchanged := exchanged_channels(recording)) is not None:
+        exchanged = exchanged_channels(recording)
+        if exchanged is not None and units_checked:
+            doubted.append(exchanged)
+        elif exchanged is not None:
             left_out.append(replace(exchanged, arguments={**exchanged.arguments, "left_out": True}))
             continue
         beyond = next((excess for excess in excesses(recording) if not excess.is_faint), None)
@@ -239,7 +247,7 @@ def _measured(recorded: Sequence[FrfRecording]) -> tuple[list[Frf], list[FrfReco
             with_frf.append(recording)
         except InvalidInput as refusal:
             left_out.append(Finding(Reason.NO_FRF, recording.id, refusal.field, {"refusal": refusal}))
-    return [one.frf for one in usable_lines(frfs)], with_frf, left_out
+    return [one.frf for one in usable_lines(frfs)], with_frf, left_out, doubted
 
 
 class _Contact:

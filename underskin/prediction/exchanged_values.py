@@ -1,7 +1,8 @@
 """Preloads and spheres that look exchanged: loads beyond what a skin bears, which all come within once they are.
 
 Contact radius and depth go with F R, which an exchange of the numbers of F [N] and R [mm] leaves as it is; the load
-parameter L = F/(R² E) tells.
+parameter L = F/(R² E) tells. A small sphere that is pressed hard makes L as large: an exchange is one of two
+explanations where every preload [N] is above every radius [mm], and none elsewhere.
 """
 
 from collections.abc import Sequence
@@ -35,7 +36,7 @@ def exchanged_values(skin: SkinDescription, recorded: Sequence[FrfRecording], ta
 
     as_declared = beyond(preload, radius_mm)
     as_exchanged = ~beyond(radius_mm, preload) & (preload < _LARGEST_MM)
-    if as_declared.mean() < _BEYOND or as_exchanged.mean() < _WITHIN:
+    if as_declared.mean() < _BEYOND or as_exchanged.mean() < _WITHIN or preload.min() <= radius_mm.max():
         return []
     arguments = {"beyond": int(as_declared.sum()), "recordings": len(recorded)}
     return [Finding(Reason.PRELOAD_AND_RADIUS_EXCHANGED, "", "preload_n", arguments)]

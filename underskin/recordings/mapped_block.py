@@ -15,7 +15,7 @@ from underskin.recordings.curve_signs import falling
 from underskin.recordings.readable_values import range_of, readable
 from underskin.recordings.readers.derived_channels import FIELD
 from underskin.recordings.readers.dimensions import exponents, ratio_of
-from underskin.recordings.readers.unit_labels import meanings, unit
+from underskin.recordings.readers.unit_labels import contradicts, field_unit, meanings, unit
 from underskin.recordings.readers.unit_words import DECIBEL
 from underskin.recordings.rig_description import COMPLEX_FRF, MAGNITUDE, PHASE, RigDescription
 from underskin.recordings.sampling import even_rate, mean_step
@@ -122,7 +122,7 @@ class MappedBlock:
             in_percent = (mapping.unit or channel.label) == "%"
             return channel.values / (_PERCENT if in_percent else 1.0), repr(channel.name)
         target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
-        label = self._true_unit(channel, mapping, place)
+        label = self._true_unit(channel, mapping, "angle" if field == PHASE else field_unit(target).dimension)
         scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
         through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
         sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
@@ -166,21 +166,20 @@ class MappedBlock:
             )
         return column - zero
 
-    def _true_unit(self, channel: Channel, mapping: SignalMapping, place: str) -> str:
+    def _true_unit(self, channel: Channel, mapping: SignalMapping, dimension: str) -> str:
         """The rig's unit, else the file's label, which must not contradict it unless the rig says that it is wrong."""
-        label = channel.label
+        label, place = channel.label, f"channel {channel.name!r}"
         if mapping.labelled is not None:
             if mapping.labelled != label:
                 raise self._error(place, f"is labelled {label!r}, not {mapping.labelled!r} as the rig says")
             self.warnings.append(f"{place} is labelled {label!r}; the rig description says {mapping.unit!r}")
             return mapping.unit or ""
-        labelled = meanings(label)
-        if mapping.unit and labelled and unit(mapping.unit) not in labelled:
+        if mapping.unit and contradicts(label, mapping.unit, channel.name, dimension):
             reason = f"is labelled {label!r}, but the rig description says {mapping.unit!r}"
             raise self._error(
                 place, f"{reason}: correct the one that is wrong; if it is the label, add labelled: {label}"
             )
-        if not mapping.unit and len(labelled) > 1:
+        if not mapping.unit and len(meanings(label)) > 1:
             raise self._error(
                 place, f"its unit {label!r} has several meanings: say it, as `unit` of the rig description"
             )

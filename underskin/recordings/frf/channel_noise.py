@@ -61,6 +61,8 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
     if measured.estimator == "H2":
         size = np.sqrt(charge / np.maximum(coherence * force, _TINY)) * (1 - in_charge)
         sensitive = noise.charge_sd / charge
+    elif noise.force == noise.charge == 0.0:
+        return replace(measured, bias_unsure=loss / float(np.sqrt(3.0)))
     else:
         size = _total_least_squares(force, charge, coherence, noise)
         sensitive = noise.force_sd / force
@@ -76,12 +78,15 @@ def without_noise_bias(measured: Frf, used: Mask) -> Frf:
 def _total_least_squares(force: Floats, charge: Floats, coherence: Floats, noise: "_Noise") -> Floats:
     """|FRF| of the line through (F, Q), whose noise has these powers: Hv of `estimators` with κ = k/m known, which is
     H1 for m = 0 and H2 for k = 0."""
+    unit_force, unit_charge = float(force.max()), float(charge.max())  # N²/Hz, C²/Hz: their squares underflow
+    force, charge = force / unit_force, charge / unit_charge
+    of_force, of_charge = noise.force / unit_force, noise.charge / unit_charge
     cross = np.sqrt(np.maximum(coherence, _TINY) * force * charge)
-    difference = noise.force * charge - noise.charge * force
-    root = np.sqrt(difference**2 + 4 * noise.force * noise.charge * cross**2)
-    above = (difference + root) / (2 * max(noise.force, _TINY) * cross)
-    beneath = 2 * noise.charge * cross / np.maximum(root - difference, _TINY)
-    return np.where(difference > 0, above, beneath)
+    difference = of_force * charge - of_charge * force
+    root = np.sqrt(difference**2 + 4 * of_force * of_charge * cross**2)
+    above = (difference + root) / (2 * max(of_force, _TINY) * cross)
+    beneath = 2 * of_charge * cross / np.maximum(root - difference, _TINY)
+    return np.where(difference > 0, above, beneath) * np.sqrt(unit_charge / unit_force)
 
 
 class _Noise:
@@ -96,7 +101,7 @@ class _Noise:
 
 def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, groups: Sequence[Indices]) -> _Noise:
     """That of the noise of both channels, from powers, γ² as estimated and the number of blocks of lines (lines,), on a
-    grid up to the least power that any group of lines has.
+    grid up to the least power that any group of lines has and the least share of it that its loss of coherence allows.
 
     Over the lines of a group γ² is Σ |S_fq|²/Σ S_ff S_qq. Of n blocks the expected sums are those of the spectra times
     γ² + 1/n and 1 + γ²/n.
@@ -108,15 +113,20 @@ def _posterior(force: Floats, charge: Floats, coherence: Floats, count: Floats, 
     seen = sums[:, 1] / sums[:, 0]
     true = np.clip((seen - 1 / blocks) / (1 - seen / blocks), 0.0, 1.0)
     inverse_force, inverse_charge = sums[:, 3] / sums[:, 0], sums[:, 2] / sums[:, 0]  # 1/S_ff and 1/S_qq of a group
-    most_force, most_charge = (_MARGIN / float(inverse.max()) for inverse in (inverse_force, inverse_charge))
+    independent = np.maximum(lines / _CORRELATED, 1.0)
+    variance = (2 * true + 1 / blocks) * (1 - true) ** 2 / (blocks * independent) + _MODEL**2
+    loss = 1 - true + 3 * np.sqrt(variance)  # of coherence: no noise takes a larger share of a group's power
+    most_force, most_charge = (
+        min(_MARGIN / float(inverse.max()), float((loss / inverse).min()))
+        for inverse in (inverse_force, inverse_charge)
+    )
     shares = np.linspace(0.0, 1.0, _NODES)
     of_force = 1 - np.minimum(np.outer(shares, most_force * inverse_force), 1.0)
     of_charge = 1 - np.minimum(np.outer(shares, most_charge * inverse_charge), 1.0)
-    independent = np.maximum(lines / _CORRELATED, 1.0)
-    variance = (2 * true + 1 / blocks) * (1 - true) ** 2 / (blocks * independent) + _MODEL**2
     gap = np.abs(true - of_force[:, None] * of_charge[None]) / np.sqrt(variance)
     misfit = np.where(gap < 3.0, gap**2, 6.0 * gap - 9.0).sum(axis=2)
-    excess = max(float(misfit.min()) / len(groups), 1.0)
+    common = float((_MODEL**2 / variance).sum())  # groups for one, where all share the defect of the estimate
+    excess = max(float(misfit.min()) / len(groups), common, 1.0)
     weight = np.exp(-0.5 * (misfit - misfit.min()) / excess)
     return _Noise(shares * most_force, shares * most_charge, weight / weight.sum())
 

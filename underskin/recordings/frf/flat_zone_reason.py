@@ -8,7 +8,7 @@ import numpy as np
 from underskin.units import Floats
 
 _PEAK = 1.3  # over the level: a resonance to be named
-_NOT_EXCITED = "it was not excited: the charge hardly follows the force (low coherence)"
+_NOT_EXCITED = "it was not excited: the charge hardly follows the force (low coherence), or the FRF is 0 there"
 
 
 @dataclass(frozen=True)

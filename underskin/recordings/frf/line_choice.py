@@ -16,7 +16,8 @@ Of the FRF of a time series:
   have none of this.
 What is left is without the bias that noise of the force or the charge gives its estimator (`channel_noise`).
 
-Of FRFs that were imported, with γ², the lines that the force did not excite in most recordings are idle (`excitation`).
+Of FRFs that were imported, with γ², the lines that the force did not excite in most recordings are idle (`excitation`),
+and so are those that are exactly 0.
 """
 
 from collections.abc import Sequence
@@ -101,7 +102,8 @@ def _excited(imported: Sequence[Frf]) -> dict[bytes, Mask]:
 
 
 def _of_lines(frf: Frf, excited: Mask) -> Usable:
-    used = excited if excited.any() else np.ones_like(excited)
+    measured = excited & (frf.values != 0)  # an analyzer writes 0 outside its band
+    used = measured if measured.any() else np.ones_like(excited)
     return Usable(replace(frf, used=used), Choice(np.flatnonzero(used), np.flatnonzero(~used)))
 
 

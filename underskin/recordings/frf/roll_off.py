@@ -70,9 +70,8 @@ def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff 
         best = both
     misfit, plateau = _fitted(x, y, weight, *best)
     share = 1 - float(np.exp(-plateau))
-    if plain[0] - misfit < _SPEAKS or misfit > _EXPLAINED**2 * plain[0] + len(x) or share < _LEAST_SHARE:
-        return None
-    return RollOff(best[0], best[1], share)
+    is_explained = plain[0] - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain[0] + len(x)
+    return RollOff(best[0], best[1], share) if is_explained and share >= _LEAST_SHARE else None
 
 
 def _falls_after(magnitude: Floats, place: int) -> bool:
@@ -96,8 +95,8 @@ def _fitted(
 
 
 def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of bins of equal width in ln f that hold lines: the middle [Hz], the median over recordings of the magnitude over
-    their level, and its relative noise."""
+    """Of bins of equal width in ln f that hold lines with a magnitude: the middle [Hz], the median over recordings of
+    the magnitude over their level, and its relative noise."""
     lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
     edges = edges_over(np.unique(np.concatenate(lines)))
     ratios: list[list[float]] = [[] for _ in edges[1:]]
@@ -112,7 +111,7 @@ def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floa
                 of_bin = size[stack.used[row] & (bins == place)]
                 ratios[place].append(float(np.median(of_bin)))
                 spreads[place].append((float(np.std(of_bin)), len(of_bin)))
-    known = [place for place, of_bin in enumerate(ratios) if of_bin]
+    known = [place for place, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
     middle = np.sqrt(edges[1:] * edges[:-1])[known]
     magnitude = np.array([float(np.median(ratios[place])) for place in known])
     several = [deviation for of_bin in spreads for deviation, count in of_bin if count >= _SEVERAL]

@@ -10,7 +10,7 @@ from underskin.recordings.channels import Block, Channel, Contents
 from underskin.recordings.readers import channel_arithmetic, text
 from underskin.recordings.readers.channel_arithmetic import Formula, Quantity, in_unit
 from underskin.recordings.readers.dimensions import described, exponents, label_of
-from underskin.recordings.readers.unit_labels import labelled_unit, meanings, unit
+from underskin.recordings.readers.unit_labels import contradicts, labelled_unit, unit
 from underskin.recordings.shown_values import LONGEST_NAME
 
 Stated = Mapping[str, str | float]
@@ -103,7 +103,7 @@ class _Derivation:
                 what = f"its unit {label!r} is not known here" if label else "has no unit in the file"
                 raise self._error(f"{name}: {what}: say it in brackets, such as [mm] behind it")
             return label
-        if (labelled := meanings(label)) and unit(stated) not in labelled:
+        if contradicts(label, stated, name, ""):
             remedy = f"if the label is wrong, leave {stated!r} out and convert by a factor in the formula"
             raise self._error(f"{name} [{stated}]: is labelled {label!r}, but the formula says {stated!r}; {remedy}")
         return stated

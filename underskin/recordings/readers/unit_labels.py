@@ -4,6 +4,7 @@ A symbol counts as it is written (mN is not MN). A label that is no symbol may b
 wrong letters, `MHZ`, has every meaning that its letters have.
 """
 
+import math
 import re
 import unicodedata
 from collections.abc import Iterator
@@ -26,6 +27,8 @@ _BASES = {
     "V": "voltage",
     "A": "current",
 }
+_GRAM_FORCE = ("force", 1e-3 * STANDARD_GRAVITY)  # what g of a load cell means
+_ROUNDING = 1e-9  # relative, of quotients of prefixes
 _LONGEST = 40
 _NO_UNITS = ("n/a",)  # although either side is one
 _WHOLE = {
@@ -191,6 +194,36 @@ def labelled_unit(heading: str) -> str:
     if word is not None and word["unit"].lower() not in _NO_LAST_WORD and unit(word["unit"]) is not None:
         return word["unit"]
     return ""
+
+
+def contradicts(label: str, stated: str, heading: str, dimension: str) -> bool:
+    """Whether a channel's label is none of the stated unit, for a quantity of this dimension.
+
+    The end of a heading that does not mark it as a unit may be the name of an axis, a channel or a statistic (F_m, Q_A,
+    Load cycles). It contradicts where it measures the quantity, or what was stated, or is a signal: decibels, or a
+    voltage with a prefix.
+    """
+    labelled, meant = meanings(label), unit(stated)
+    if label == "g":
+        labelled += (Unit(*_GRAM_FORCE),)
+    if not labelled or (meant is not None and any(_same(one, meant) for one in labelled)):
+        return False
+    if _is_marked(label, heading):
+        return True
+    told = {dimension, DECIBEL, *(["voltage"] if len(label) > 1 else []), *([meant.dimension] if meant else [])}
+    return any(one.dimension in told for one in labelled)
+
+
+def _same(one: Unit, other: Unit) -> bool:
+    return one.dimension == other.dimension and math.isclose(one.to_si, other.to_si, rel_tol=_ROUNDING)
+
+
+def _is_marked(label: str, heading: str) -> bool:
+    """Whether a label is more than the end of a heading: the file's own, a field's, in brackets or behind a stroke."""
+    if heading in LAB or label != labelled_unit(heading):
+        return True
+    in_brackets = [text.strip() for text in _BRACKETS.findall(heading[-LONGEST_NAME:])]
+    return label in in_brackets or re.search(rf"\s/\s*{re.escape(label)}\s*$", heading[-LONGEST_NAME:]) is not None
 
 
 def without_brackets(cell: str) -> str:
