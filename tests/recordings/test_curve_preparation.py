@@ -45,6 +45,18 @@ def test_a_rounded_lift_tells_no_sign() -> None:
     assert falling(-pressed(depth), -depth, sphere=True) == ("force_n", "displacement_mm")
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_relaxation_hold_turns_no_sign(sign: int) -> None:
+    """While the stage holds, the force relaxes by more than half; the way in tells the deep end all the same."""
+    depth = np.concatenate([np.linspace(-0.1, 0.3, 400), np.full(800, 0.3), np.linspace(0.3, -0.1, 400)])
+    relaxed = 1 - 0.55 * (1 - np.exp(-np.clip(np.arange(1600) - 400, 0, 800) / 150))
+    expected = ("force_n", "displacement_mm") if sign < 0 else ()
+    for seed in range(8):
+        noise = 1e-3 * hertz(np.array(0.3)) * np.random.default_rng(seed).normal(size=1600)
+        force = hertz(np.maximum(depth, 0.0)) * relaxed + noise
+        assert falling(sign * force, sign * depth, sphere=True) == expected
+
+
 def test_rows_from_the_deepest_to_the_air_are_read_backwards() -> None:
     """Without times, rows of one way may have been stored in either order; nothing is called negative."""
     depth = ways(0.3, -0.1, samples=400)
