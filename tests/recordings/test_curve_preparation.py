@@ -76,6 +76,26 @@ def test_samples_of_a_saturated_channel_are_left_out_and_named(corners: tuple[fl
     assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.parametrize("corners", [(-0.1, 0.3, -0.1), (-0.1, 0.3, 0.3), (-0.1, 0.3, 0.3, 0.3, -0.1)])
+def test_a_quiet_zero_and_a_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
+    """The air reads one value for long, and the stage may hold while the channel saturates."""
+    depth = ways(*corners)
+    force = np.minimum(np.round(pressed(depth) / 2e-3) * 2e-3, (0.75 * hertz(np.array(0.3))).round(3)).round(7)
+    finding = only(campaign(depth, force))
+    assert finding.code == "force_saturates"
+    assert finding.arguments["samples"] == int((force > force.max() - 1e-4).sum())
+
+
+@pytest.mark.parametrize("creep", [0.05, 0.1])
+def test_a_held_load_is_no_saturation(creep: float) -> None:
+    """The load rises to one value and stays there while the sample creeps, by a share of the depth."""
+    ramp = np.linspace(0.0, 1.0, 400)
+    load = np.concatenate([ramp, np.ones(800), ramp[::-1]])
+    crept = 1 + creep * (1 - np.exp(-np.clip(np.arange(1600) - 400, 0, 800) / 100))
+    depth, force = 0.3 * crept * load ** (2 / 3), hertz(np.array(0.3)) * load
+    assert "force_saturates" not in [one.code for one in implausible(campaign(depth, force))]
+
+
 def test_steps_of_a_converter_and_a_hold_are_no_saturation() -> None:
     depth = ways(-0.1, 0.3, 0.3, -0.1)
     steps = hertz(np.array(0.3)) / 60

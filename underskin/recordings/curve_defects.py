@@ -15,7 +15,9 @@ from underskin.units import Floats, Indices, Mask
 _EQUAL = 5  # samples in a row, at least, that read the same where a force saturates
 _MOVED = 0.02  # of the range of travel, at least, over which they do
 _LONGER = 4.0  # times as far as any other value is read on end: steps of a converter are as long everywhere
+_MOST_OF_WAY, _PACE = 0.75, 0.5  # of the way at the limit, and of the stage's pace, at least: creep is slower by then
 _DEEP = 0.8  # of the other samples lie less deep than those that saturate
+_SHALLOW = 0.05  # of the samples, the shallowest, whose median is what the air reads
 _AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there, up to which means lie in the air
 _FEWEST = 24  # samples there at least
 _PERIODS = 1.5  # in the air, at least: less is a drift
@@ -51,22 +53,44 @@ class PeriodicError:
 
 def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
     """Which samples (samples,) read the largest, or the least, force of all while a sphere or a platen moves on, and
-    lie deeper than the others: the air may read one value as well."""
+    lie deeper than the others: the air may read one value as well, and a load that is held as the sample creeps."""
     found = np.zeros(len(force), dtype=bool)
     if not np.ptp(force) or not np.ptp(travel):
         return found
     runs = _runs(travel, force)
-    for extreme in (float(force.max()), float(force.min())):
-        longest = max((moved for rows, moved in runs if force[rows[0]] == extreme), default=0.0)
-        usual = max((moved for rows, moved in runs if force[rows[0]] != extreme), default=0.0)
+    extremes = float(force.max()), float(force.min())
+    between = ~np.isin(force, extremes)
+    sign = -1.0 if TRAVEL in falling(force[between], travel[between], sphere=sphere) else 1.0
+    depth = sign * travel
+    air = float(np.quantile(force[depth <= np.quantile(depth, _SHALLOW)], 0.5, method="nearest"))
+    usual = max((moved for rows, moved in runs if force[rows[0]] not in (*extremes, air)), default=0.0)
+    for extreme in extremes:
         at_limit = force == extreme
-        if longest < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
+        there = [run for run in runs if force[run[0][0]] == extreme]
+        longest, moved = max(there, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
+        if moved < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
             continue
-        others = travel[~at_limit]
-        sign = -1.0 if TRAVEL in falling(force[~at_limit], others, sphere=sphere) else 1.0
-        if np.median(sign * travel[at_limit]) > np.quantile(sign * others, _DEEP):
+        is_deep = np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
+        if is_deep and _goes_on(travel, longest):
             found |= at_limit
     return found
+
+
+def _goes_on(travel: Floats, rows: Indices) -> bool:
+    """Whether the travel keeps its pace where these samples begin to read the limit, or up to where they end."""
+    first, last = int(rows[0]), int(rows[-1])
+    return _keeps_pace(travel[rows], travel[first::-1]) or _keeps_pace(travel[rows[::-1]], travel[last:])
+
+
+def _keeps_pace(inside: Floats, outside: Floats) -> bool:
+    """Whether the travel at the limit, from its edge on, goes as fast as beside it, away from the edge.
+
+    Over the samples that most of the way at the limit takes, so that a hold of the stage at its end does not count.
+    """
+    gone = np.abs(inside - inside[0])
+    count = int(np.argmax(gone >= _MOST_OF_WAY * gone.max()))
+    beside = min(count, len(outside) - 1)
+    return beside > 0 and bool(gone[count] / count > _PACE * abs(outside[beside] - outside[0]) / beside)
 
 
 def _runs(travel: Floats, force: Floats) -> list[tuple[Indices, float]]:
