@@ -8,6 +8,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.curve_defects import periodic_error
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.plausibility import implausible
 
@@ -114,6 +115,34 @@ def test_a_periodic_error_is_told_with_its_period_and_subtracted(period_mm: floa
     assert finding.arguments["period_mm"] == pytest.approx(period_mm, rel=0.01)
     assert finding.arguments["percent"] == pytest.approx(3.0, rel=0.1)
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize("frequency_hz", [253.0, 375.0, 502.0])
+def test_hum_of_a_long_recording_is_no_slow_error(frequency_hz: float) -> None:
+    """60,000 samples at 10 kHz: hum changes faster than the samples by which a period is told."""
+    depth = ways(-0.1, 0.2, samples=60_000)
+    hum = np.sin(2 * np.pi * frequency_hz * np.arange(60_000) / 1e4)
+    force = pressed(depth)
+    assert periodic_error(depth, force + 0.03 * force.max() * hum) is None
+
+
+def test_the_amplitude_of_an_error_of_short_period_is_its_own() -> None:
+    """Of a recording of many samples, too: thirty of the means by which it is told, in a period."""
+    depth = ways(-0.1, 0.2, samples=15_000)
+    force = pressed(depth)
+    error = periodic_error(depth, force + 0.03 * force.max() * np.sin(2 * np.pi * depth / 0.006))
+    assert error is not None
+    assert error.amplitude == pytest.approx(0.03 * force.max(), rel=0.001)
+
+
+def test_one_way_alone_tells_an_error_of_the_travel_from_hum_not() -> None:
+    """With times, the frequency that it would have is stated."""
+    depth = ways(-0.1, 0.3, samples=400)
+    force = pressed(depth)
+    error = 0.03 * force.max() * np.sin(2 * np.pi * depth / 0.02)
+    statement = only(campaign(depth, force + error)).statement
+    assert "or hum, or a vibration of 2.51 Hz" in statement
+    assert "hum" not in only(campaign(depth, force + error, timed=False)).statement
 
 
 def test_a_drift_in_the_air_is_no_periodic_error() -> None:

@@ -106,10 +106,12 @@ def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
     """A sine over the travel in the force that the air shows as well as the contact; None where there is none.
 
     Its period is told in the air, and then where it leaves least of the whole curve beside a spline on each way, which
-    stands for the contact whatever its law.
+    stands for the contact whatever its law. Of many samples means are taken: single ones would show hum of a frequency
+    above half of theirs as a slow change. Means over a part x of a period show sin(πx)/(πx) of the amplitude; and what
+    is left in them of hum, the samples do not show at that period.
     """
-    at = np.unique(np.linspace(0, len(travel) - 1, min(len(travel), _MOST_SAMPLES)).round().astype(np.intp))
-    travel, force = travel[at], force[at]
+    samples, is_mean = (travel, force), len(travel) > _MOST_SAMPLES
+    travel, force = _means(travel), _means(force)
     air = _in_air(travel, force)
     if air.sum() < _FEWEST:
         return None
@@ -123,8 +125,26 @@ def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
     error, left, without = _best_of(travel, force, np.linspace(near - step, near + step, _FINER))
     noise = float(np.sqrt(left / len(travel)))
     largest = float(np.abs(force - np.median(force[air])).max())
-    plain = left < _SINE * without and error.amplitude > max(_LARGE * noise, _LEAST * largest)
-    return error if plain else None
+    if left > _SINE * without or error.amplitude < max(_LARGE * noise, _LEAST * largest):
+        return None
+    shown = float(np.sinc(np.median(np.abs(np.diff(travel))) / error.period)) if is_mean else 1.0
+    error = PeriodicError(error.period, error.cosine / shown, error.sine / shown)
+    return error if _amplitude(*samples, error.period, travel[air].max()) > error.amplitude / 2 else None
+
+
+def _amplitude(travel: Floats, force: Floats, period: float, end: float) -> float:
+    """Of a sine of this period beside a line in the force of all samples of the air, up to the travel `end`."""
+    air = travel <= end
+    place, phase = travel[air] - travel[air].mean(), 2 * np.pi * travel[air] / period
+    design = np.column_stack([np.ones_like(place), place, np.cos(phase), np.sin(phase)])
+    fitted = np.linalg.lstsq(design, force[air], rcond=None)[0]
+    return float(np.hypot(fitted[2], fitted[3]))
+
+
+def _means(column: Floats) -> Floats:
+    """Over at most so many blocks of samples."""
+    starts = np.unique(np.linspace(0, len(column), min(len(column), _MOST_SAMPLES), endpoint=False).astype(np.intp))
+    return np.asarray(np.add.reduceat(column, starts) / np.diff(np.append(starts, len(column))))
 
 
 def _best_of(travel: Floats, force: Floats, periods: Floats) -> tuple[PeriodicError, float, float]:
