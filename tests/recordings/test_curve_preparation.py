@@ -8,6 +8,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.recordings import elastomer
 from underskin.recordings.campaign import Campaign
+from underskin.recordings.curve_defects import periodic_error
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.plausibility import implausible
 
@@ -45,6 +46,18 @@ def test_a_rounded_lift_tells_no_sign() -> None:
     assert falling(-pressed(depth), -depth, sphere=True) == ("force_n", "displacement_mm")
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_relaxation_hold_turns_no_sign(sign: int) -> None:
+    """While the stage holds, the force relaxes by more than half; the way in tells the deep end all the same."""
+    depth = np.concatenate([np.linspace(-0.1, 0.3, 400), np.full(800, 0.3), np.linspace(0.3, -0.1, 400)])
+    relaxed = 1 - 0.55 * (1 - np.exp(-np.clip(np.arange(1600) - 400, 0, 800) / 150))
+    expected = ("force_n", "displacement_mm") if sign < 0 else ()
+    for seed in range(8):
+        noise = 1e-3 * hertz(np.array(0.3)) * np.random.default_rng(seed).normal(size=1600)
+        force = hertz(np.maximum(depth, 0.0)) * relaxed + noise
+        assert falling(sign * force, sign * depth, sphere=True) == expected
+
+
 def test_rows_from_the_deepest_to_the_air_are_read_backwards() -> None:
     """Without times, rows of one way may have been stored in either order; nothing is called negative."""
     depth = ways(0.3, -0.1, samples=400)
@@ -62,6 +75,26 @@ def test_samples_of_a_saturated_channel_are_left_out_and_named(corners: tuple[fl
     assert finding.code == "force_saturates"
     assert finding.arguments["samples"] == int((force == force.max()).sum())
     assert modulus_mpa(campaign(depth, force)) == pytest.approx(1.0, rel=0.02)
+
+
+@pytest.mark.parametrize("corners", [(-0.1, 0.3, -0.1), (-0.1, 0.3, 0.3), (-0.1, 0.3, 0.3, 0.3, -0.1)])
+def test_a_quiet_zero_and_a_hold_hide_no_saturation(corners: tuple[float, ...]) -> None:
+    """The air reads one value for long, and the stage may hold while the channel saturates."""
+    depth = ways(*corners)
+    force = np.minimum(np.round(pressed(depth) / 2e-3) * 2e-3, (0.75 * hertz(np.array(0.3))).round(3)).round(7)
+    finding = only(campaign(depth, force))
+    assert finding.code == "force_saturates"
+    assert finding.arguments["samples"] == int((force > force.max() - 1e-4).sum())
+
+
+@pytest.mark.parametrize("creep", [0.05, 0.1])
+def test_a_held_load_is_no_saturation(creep: float) -> None:
+    """The load rises to one value and stays there while the sample creeps, by a share of the depth."""
+    ramp = np.linspace(0.0, 1.0, 400)
+    load = np.concatenate([ramp, np.ones(800), ramp[::-1]])
+    crept = 1 + creep * (1 - np.exp(-np.clip(np.arange(1600) - 400, 0, 800) / 100))
+    depth, force = 0.3 * crept * load ** (2 / 3), hertz(np.array(0.3)) * load
+    assert "force_saturates" not in [one.code for one in implausible(campaign(depth, force))]
 
 
 def test_steps_of_a_converter_and_a_hold_are_no_saturation() -> None:
@@ -82,6 +115,34 @@ def test_a_periodic_error_is_told_with_its_period_and_subtracted(period_mm: floa
     assert finding.arguments["period_mm"] == pytest.approx(period_mm, rel=0.01)
     assert finding.arguments["percent"] == pytest.approx(3.0, rel=0.1)
     assert modulus_mpa(read) == pytest.approx(1.0, rel=0.01)
+
+
+@pytest.mark.parametrize("frequency_hz", [253.0, 375.0, 502.0])
+def test_hum_of_a_long_recording_is_no_slow_error(frequency_hz: float) -> None:
+    """60,000 samples at 10 kHz: hum changes faster than the samples by which a period is told."""
+    depth = ways(-0.1, 0.2, samples=60_000)
+    hum = np.sin(2 * np.pi * frequency_hz * np.arange(60_000) / 1e4)
+    force = pressed(depth)
+    assert periodic_error(depth, force + 0.03 * force.max() * hum) is None
+
+
+def test_the_amplitude_of_an_error_of_short_period_is_its_own() -> None:
+    """Of a recording of many samples, too: thirty of the means by which it is told, in a period."""
+    depth = ways(-0.1, 0.2, samples=15_000)
+    force = pressed(depth)
+    error = periodic_error(depth, force + 0.03 * force.max() * np.sin(2 * np.pi * depth / 0.006))
+    assert error is not None
+    assert error.amplitude == pytest.approx(0.03 * force.max(), rel=0.001)
+
+
+def test_one_way_alone_tells_an_error_of_the_travel_from_hum_not() -> None:
+    """With times, the frequency that it would have is stated."""
+    depth = ways(-0.1, 0.3, samples=400)
+    force = pressed(depth)
+    error = 0.03 * force.max() * np.sin(2 * np.pi * depth / 0.02)
+    statement = only(campaign(depth, force + error)).statement
+    assert "or hum, or a vibration of 2.51 Hz" in statement
+    assert "hum" not in only(campaign(depth, force + error, timed=False)).statement
 
 
 def test_a_drift_in_the_air_is_no_periodic_error() -> None:

@@ -136,9 +136,7 @@ ENGLISH: Mapping[Reason, Words] = {
     Reason.CURVE_COUNTED_NEGATIVE: sentences.counted_negative,
     Reason.ROWS_REVERSED: sentences.rows_reversed,
     Reason.FORCE_SATURATES: sentences.force_saturates,
-    Reason.PERIODIC_ERROR: "the force carries an error that is periodic in the travel, in the air as well: period "
-    "{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical interference, a "
-    "screw or an encoder); it was subtracted",
+    Reason.PERIODIC_ERROR: sentences.periodic_error,
     Reason.TIP_SHAPE: "{refusal}",
     Reason.TWO_SIGNS: "the two recordings answer with opposite signs: one of them is reversed",
     Reason.ALL_REVERSED: "charge is negative in compression: all signs were reversed (a negative d33, or the amplifier "

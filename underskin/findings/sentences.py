@@ -160,6 +160,16 @@ def needed_modulus(against: str) -> Callable[..., str]:
     return words
 
 
+def periodic_error(period_mm: float, amplitude_n: float, percent: float, frequency_hz: float | None = None) -> str:
+    """A sine over the travel in the force; on one way, `frequency_hz` is that of a sine over the time."""
+    or_hum = "" if frequency_hz is None else f"; or hum, or a vibration of {frequency_hz:.3g} Hz"
+    return (
+        "the force carries an error that is periodic in the travel, in the air as well: period "
+        f"{period_mm:.3g} mm, amplitude {amplitude_n:.2g} N, {percent:.2g} % of the range of force (optical "
+        f"interference, a screw or an encoder{or_hum}); it was subtracted"
+    )
+
+
 def preload_and_radius_exchanged(beyond: int, recordings: int) -> str:
     """Loads beyond the tables that come within once preload and sphere are exchanged."""
     return (

@@ -15,7 +15,9 @@ from underskin.units import Floats, Indices, Mask
 _EQUAL = 5  # samples in a row, at least, that read the same where a force saturates
 _MOVED = 0.02  # of the range of travel, at least, over which they do
 _LONGER = 4.0  # times as far as any other value is read on end: steps of a converter are as long everywhere
+_MOST_OF_WAY, _PACE = 0.75, 0.5  # of the way at the limit, and of the stage's pace, at least: creep is slower by then
 _DEEP = 0.8  # of the other samples lie less deep than those that saturate
+_SHALLOW = 0.05  # of the samples, the shallowest, whose median is what the air reads
 _AIR, _ABOVE = 0.05, 2.5  # of the range of force, and standard deviations there, up to which means lie in the air
 _FEWEST = 24  # samples there at least
 _PERIODS = 1.5  # in the air, at least: less is a drift
@@ -51,22 +53,44 @@ class PeriodicError:
 
 def saturated(travel: Floats, force: Floats, *, sphere: bool) -> Mask:
     """Which samples (samples,) read the largest, or the least, force of all while a sphere or a platen moves on, and
-    lie deeper than the others: the air may read one value as well."""
+    lie deeper than the others: the air may read one value as well, and a load that is held as the sample creeps."""
     found = np.zeros(len(force), dtype=bool)
     if not np.ptp(force) or not np.ptp(travel):
         return found
     runs = _runs(travel, force)
-    for extreme in (float(force.max()), float(force.min())):
-        longest = max((moved for rows, moved in runs if force[rows[0]] == extreme), default=0.0)
-        usual = max((moved for rows, moved in runs if force[rows[0]] != extreme), default=0.0)
+    extremes = float(force.max()), float(force.min())
+    between = ~np.isin(force, extremes)
+    sign = -1.0 if TRAVEL in falling(force[between], travel[between], sphere=sphere) else 1.0
+    depth = sign * travel
+    air = float(np.quantile(force[depth <= np.quantile(depth, _SHALLOW)], 0.5, method="nearest"))
+    usual = max((moved for rows, moved in runs if force[rows[0]] not in (*extremes, air)), default=0.0)
+    for extreme in extremes:
         at_limit = force == extreme
-        if longest < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
+        there = [run for run in runs if force[run[0][0]] == extreme]
+        longest, moved = max(there, key=lambda run: run[1], default=(np.zeros(0, dtype=np.intp), 0.0))
+        if moved < max(_MOVED * np.ptp(travel), _LONGER * usual) or (~at_limit).sum() < _EQUAL:
             continue
-        others = travel[~at_limit]
-        sign = -1.0 if TRAVEL in falling(force[~at_limit], others, sphere=sphere) else 1.0
-        if np.median(sign * travel[at_limit]) > np.quantile(sign * others, _DEEP):
+        is_deep = np.median(depth[at_limit]) > np.quantile(depth[~at_limit], _DEEP)
+        if is_deep and _goes_on(travel, longest):
             found |= at_limit
     return found
+
+
+def _goes_on(travel: Floats, rows: Indices) -> bool:
+    """Whether the travel keeps its pace where these samples begin to read the limit, or up to where they end."""
+    first, last = int(rows[0]), int(rows[-1])
+    return _keeps_pace(travel[rows], travel[first::-1]) or _keeps_pace(travel[rows[::-1]], travel[last:])
+
+
+def _keeps_pace(inside: Floats, outside: Floats) -> bool:
+    """Whether the travel at the limit, from its edge on, goes as fast as beside it, away from the edge.
+
+    Over the samples that most of the way at the limit takes, so that a hold of the stage at its end does not count.
+    """
+    gone = np.abs(inside - inside[0])
+    count = int(np.argmax(gone >= _MOST_OF_WAY * gone.max()))
+    beside = min(count, len(outside) - 1)
+    return beside > 0 and bool(gone[count] / count > _PACE * abs(outside[beside] - outside[0]) / beside)
 
 
 def _runs(travel: Floats, force: Floats) -> list[tuple[Indices, float]]:
@@ -82,10 +106,12 @@ def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
     """A sine over the travel in the force that the air shows as well as the contact; None where there is none.
 
     Its period is told in the air, and then where it leaves least of the whole curve beside a spline on each way, which
-    stands for the contact whatever its law.
+    stands for the contact whatever its law. Of many samples means are taken: single ones would show hum of a frequency
+    above half of theirs as a slow change. Means over a part x of a period show sin(πx)/(πx) of the amplitude; and what
+    is left in them of hum, the samples do not show at that period.
     """
-    at = np.unique(np.linspace(0, len(travel) - 1, min(len(travel), _MOST_SAMPLES)).round().astype(np.intp))
-    travel, force = travel[at], force[at]
+    samples, is_mean = (travel, force), len(travel) > _MOST_SAMPLES
+    travel, force = _means(travel), _means(force)
     air = _in_air(travel, force)
     if air.sum() < _FEWEST:
         return None
@@ -99,8 +125,26 @@ def periodic_error(travel: Floats, force: Floats) -> PeriodicError | None:
     error, left, without = _best_of(travel, force, np.linspace(near - step, near + step, _FINER))
     noise = float(np.sqrt(left / len(travel)))
     largest = float(np.abs(force - np.median(force[air])).max())
-    plain = left < _SINE * without and error.amplitude > max(_LARGE * noise, _LEAST * largest)
-    return error if plain else None
+    if left > _SINE * without or error.amplitude < max(_LARGE * noise, _LEAST * largest):
+        return None
+    shown = float(np.sinc(np.median(np.abs(np.diff(travel))) / error.period)) if is_mean else 1.0
+    error = PeriodicError(error.period, error.cosine / shown, error.sine / shown)
+    return error if _amplitude(*samples, error.period, travel[air].max()) > error.amplitude / 2 else None
+
+
+def _amplitude(travel: Floats, force: Floats, period: float, end: float) -> float:
+    """Of a sine of this period beside a line in the force of all samples of the air, up to the travel `end`."""
+    air = travel <= end
+    place, phase = travel[air] - travel[air].mean(), 2 * np.pi * travel[air] / period
+    design = np.column_stack([np.ones_like(place), place, np.cos(phase), np.sin(phase)])
+    fitted = np.linalg.lstsq(design, force[air], rcond=None)[0]
+    return float(np.hypot(fitted[2], fitted[3]))
+
+
+def _means(column: Floats) -> Floats:
+    """Over at most so many blocks of samples."""
+    starts = np.unique(np.linspace(0, len(column), min(len(column), _MOST_SAMPLES), endpoint=False).astype(np.intp))
+    return np.asarray(np.add.reduceat(column, starts) / np.diff(np.append(starts, len(column))))
 
 
 def _best_of(travel: Floats, force: Floats, periods: Floats) -> tuple[PeriodicError, float, float]:

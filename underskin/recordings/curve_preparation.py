@@ -104,7 +104,7 @@ def _without_saturation(curve: CurveRecording) -> tuple[CurveRecording, list[Fin
     return samples_of(curve, kept), [Finding(Reason.FORCE_SATURATES, curve.id, "force_n", arguments)]
 
 
-def _without_periodic_error(curve: CurveRecording, _: Orientation) -> tuple[CurveRecording, list[Finding]]:
+def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tuple[CurveRecording, list[Finding]]:
     if not isinstance(curve, IndentationRecording):
         return curve, []
     finite = np.flatnonzero(np.isfinite(curve.displacement_mm) & np.isfinite(curve.force_n))
@@ -121,4 +121,7 @@ def _without_periodic_error(curve: CurveRecording, _: Orientation) -> tuple[Curv
         "amplitude_n": error.amplitude,
         "percent": 100 * error.amplitude / float(np.ptp(corrected[finite])),
     }
+    if curve.time_s is not None and len(oriented.turns) <= _ONE_WAY:
+        lasting = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))
+        arguments["frequency_hz"] = float(np.ptp(travel)) / error.period / max(lasting, 1e-300)
     return replace(curve, force_n=corrected), [Finding(Reason.PERIODIC_ERROR, curve.id, "force_n", arguments)]

@@ -26,6 +26,7 @@ _AGREE = 0.2  # of the changes, by which those of one sign must outnumber the ot
 _TURN = 0.05  # of the range of travel: smaller returns are noise
 _SAMPLED = 20_000  # samples among which turns are sought
 _NEAR = 0.15  # of the range of travel, over which the stiffness at a turn is read
+_HELD = 0.02  # of that way from the turn: of what is not farther away, a hold, one sample counts
 _STIFFER = 1.15  # times as stiff: less does not tell the deep end from the other
 _ONE_WAY = 0.1  # of the largest force, of the other sign: less is none
 _LONGEST = 0.9  # of a block's height: what moves farther is no compression
@@ -141,7 +142,7 @@ def turning_points(travel: Floats) -> Indices:
 
 def _deep_side(force: Floats, travel: Floats, turns: Indices, together: int) -> int:
     """1 where the travel is largest at the deep end, -1 where it is least there, 0 where neither turns out stiffer."""
-    stiffest = {1: 0.0, -1: 0.0}
+    stiffest = {1: (0.0, 0.0), -1: (0.0, 0.0)}
     legs = list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
     near = _NEAR * float(np.ptp(travel))
     for number, turn in enumerate(turns.tolist()):
@@ -149,22 +150,34 @@ def _deep_side(force: Floats, travel: Floats, turns: Indices, together: int) -> 
         first, last = next((leg for leg in beside if leg[0] != leg[1]), (turn, turn))
         other = last if turn == first else first
         side = 1 if travel[turn] > travel[other] else -1
-        stiffness = float(np.mean([_stiffness(force, travel, turn, leg, near) for leg in beside]))
-        stiffest[side] = max(stiffest[side], stiffness * together)
-    low, high = sorted(stiffest.values())
-    if high * near < _BEYOND_NOISE * roughness(force) / np.sqrt(_NEAR * len(force)) or high < _STIFFER * low:
+        slopes = np.array([_stiffness(force, travel, turn, leg, near) for leg in beside])
+        error = float(np.linalg.norm(slopes[:, 1])) / len(slopes)
+        stiffest[side] = max(stiffest[side], (float(slopes[:, 0].mean()) * together, error))
+    (low, _), (high, error) = sorted(stiffest.values())
+    error = max(error, roughness(force) / np.sqrt(_NEAR * len(force)) / near)
+    if high < _BEYOND_NOISE * error or high < _STIFFER * low:
         return 0
     return max(stiffest, key=lambda side: stiffest[side])
 
 
-def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], near: float) -> float:
-    """The slope of the force over the travel on one way, near the turn at one of its ends."""
+def _stiffness(force: Floats, travel: Floats, turn: int, leg: tuple[int, int], near: float) -> tuple[float, float]:
+    """The slope of the force over the travel on one way, near the turn at one of its ends, and its standard error.
+
+    Of a hold at the turn the sample nearest to the rest of the way counts alone: there the force relaxes.
+    """
     rows = np.arange(leg[0], leg[1] + 1)
     away = np.abs(travel[rows] - travel[turn])
+    held = np.flatnonzero(away <= _HELD * near)
+    dropped = held[1:] if turn == leg[1] else held[:-1]
+    rows, away = np.delete(rows, dropped), np.delete(away, dropped)
     chosen = rows[away <= max(near, float(np.sort(away)[: min(3, len(away))].max()))]
     moved = travel[chosen] - travel[chosen].mean()
     square = float(moved @ moved)
-    return float(moved @ force[chosen]) / square if square > 0 else 0.0
+    if not square > 0:
+        return 0.0, 0.0
+    slope = float(moved @ force[chosen]) / square
+    rest = force[chosen] - force[chosen].mean() - slope * moved
+    return slope, float(rest.std() / np.sqrt(square))
 
 
 def _first_movement(travel: Floats) -> int:
