@@ -13,7 +13,7 @@ _MOST_NAMED = 5  # sensors of each sort
 def array_change_in_words(
     value: float, low: float, high: float, d33: Sequence[float], between: str, days: int | None
 ) -> str:
-    """ "d33 of the array fell by 7.8 % (95 %: 7.1 to 8.5) in 182 days, between 2017-05-02 and … (14.29, …, 13.17 pC/N)".
+    """ "d33 of the array fell by 7.8 % (95 %: 7.1 to 8.5) in 182 days, between 2017-05-02 and … (14.29, … pC/N)".
 
     `value`, `low` and `high` are relative, with the 95 % interval; `d33` [pC/N] is that of each date.
     """
