@@ -11,6 +11,7 @@ from underskin.errors import InvalidInput
 from underskin.inversion.invert import NoD33, invert
 from underskin.recordings import elastomer, plausibility
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
+from underskin.recordings.exchanged_columns import look_exchanged
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 
@@ -145,6 +146,20 @@ def test_a_diagnosis_names_exchanged_preloads_and_spheres() -> None:
     report = diagnose(frfs((1.0, 2.0), (4.0, 10.0), 16.0, exchanged=True))
     assert report["verdict"] == "insufficient_data"
     assert "or preload_n and indenter_radius_mm are exchanged" in report["statement"]
+
+
+@pytest.mark.parametrize("strain", [0.02, 0.3])
+def test_a_displacement_that_begins_late_is_not_exchanged(strain: float) -> None:
+    """An extensometer with play reads zero at first; a force at zero before contact is told none the less."""
+    rng = np.random.default_rng(5)
+    steady = np.linspace(-0.2, 1.0, 500)
+    strains = strain * np.maximum(steady, 0.0)
+    load = ((1 - strains) ** -2 - (1 - strains)) / 3
+    load += 1e-3 * load.max() * rng.normal(size=500)
+    late = np.interp(np.maximum(steady, 0.0) * load.max(), np.sort(load), np.sort(strains))
+    assert not look_exchanged(late + 1e-3 * strain * rng.normal(size=500), steady, sphere=False)
+    assert not look_exchanged(strain * steady, load, sphere=False)
+    assert look_exchanged(load, strain * steady, sphere=False) == (strain > 0.05)
 
 
 def test_a_block_pressed_by_more_than_its_height_gives_no_modulus() -> None:
