@@ -210,7 +210,7 @@ def _work_out(
     if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
         groups = held_out(problem, result, showing, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
-    result = _beside_other_tip(begun, result)
+    result = _beside_other_tip(begun, problem, result)
     leader = result.answers[0]
     shown = result.shown_or_nothing(leader)
     floor = largest_floor_percent(problem, nothing, groups)
@@ -269,12 +269,16 @@ def _beside_unlisted(
     return begun, replace(result, imitating={leader.names: found.odds})
 
 
-def _beside_other_tip(begun: DiagnosisResult, result: Search) -> Search:
-    """Where a tip looks like a cone: as probable beside the leading set is that it is one, which no mechanism lists."""
+def _beside_other_tip(begun: DiagnosisResult, problem: FittingProblem, result: Search) -> Search:
+    """Where tips look like a cone: beside the leading set, by the share of such curves, that it is one is as probable,
+    which no mechanism lists."""
     leader = result.answers[0].explanation
-    if leader is None or all(finding.reason is not Reason.TIP_SHAPE for finding in begun.findings):
+    tips = {finding.recording for finding in begun.findings if finding.reason is Reason.TIP_SHAPE}
+    if leader is None or not tips:
         return result
-    return replace(result, imitating={**result.imitating, leader.names: 1.0})
+    share = min(len(tips) / problem.lines.recordings, 1.0)
+    odds = max(result.imitating.get(leader.names, 0.0), share)
+    return replace(result, imitating={**result.imitating, leader.names: odds})
 
 
 def refused(problems: Sequence[RecordingProblem]) -> list[Finding]:
