@@ -208,6 +208,7 @@ def test_a_law_of_curves_is_kept_and_recognised_by_name(
         later = whole_report(parse(campaign(changes, seed=8)), table, *FEW)
         fitted = whole_report(parse(campaign({}, seed=8)), table, *FEW) if SOAK else None
     finally:
+        monkeypatch.delenv("UNDERSKIN_MECHANISMS")
         CATALOGUE.reload()
     assert later["verdict"] == "explained"
     assert [entry["name"] for entry in later["mechanisms"]] == ["our_law"]

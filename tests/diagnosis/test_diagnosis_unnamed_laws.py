@@ -213,6 +213,7 @@ def test_what_the_lab_declared_is_recognised_by_name(
     try:
         report = whole_report(warming, table, *FEW)
     finally:
+        monkeypatch.delenv("UNDERSKIN_MECHANISMS")
         CATALOGUE.reload()
     assert report["verdict"] == "explained"
     (mechanism,) = report["mechanisms"]
