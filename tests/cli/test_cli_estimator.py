@@ -76,6 +76,7 @@ def test_a_diagnosis_takes_it_too(tmp_path: Path) -> None:
         assert of_the_file == given_fit != by_hv
 
 
+@pytest.mark.slow
 def test_columns_have_none(tmp_path: Path) -> None:
     columns = [part for name, value in PRESSED.items() for part in ("--" + name.replace("_", "-"), str(value))]
     line = refused("d33", *columns, "--preload-n", "1", "--frf-pc-per-n", "7", "--estimator", "Hv")

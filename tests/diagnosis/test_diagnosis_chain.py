@@ -12,6 +12,8 @@ from underskin.client.documents.report import Report
 from underskin.mechanisms import CATALOGUE
 from underskin.surrogate.sigma_table import SigmaTable
 
+pytestmark = pytest.mark.slow
+
 # Those that act along frequency, and one that does not.
 OF_LINES = beside(
     *("amplifier_high_pass", "amplifier_low_pass", "sensor_relaxation", "timing_delay", "contact_resonance"),

@@ -11,6 +11,8 @@ from tests.support.sphere_curves import campaign, pressed, ways
 from underskin.recordings.campaign import from_dict
 from underskin.units import Floats
 
+pytestmark = pytest.mark.slow
+
 
 def modulus_mpa(report: underskin.Report) -> float:
     fit: Any = report.fit

@@ -13,6 +13,8 @@ from underskin.diagnosis.selection.recording_gp import GainResidual
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 
+pytestmark = pytest.mark.slow
+
 FEW, MANY = 100, 400  # sensors, of two recordings each
 
 

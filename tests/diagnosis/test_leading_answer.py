@@ -8,6 +8,8 @@ import pytest
 from underskin.diagnosis.reporting.answer_statement import answer_statement
 from underskin.diagnosis.selection.answers import Answer, leading_first
 
+pytestmark = pytest.mark.slow
+
 
 def answers(unlisted: float, nothing: float, *sets: float) -> list[Answer]:
     """Sorted by probability; each set is one mechanism of the catalogue."""

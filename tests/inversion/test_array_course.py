@@ -41,6 +41,7 @@ def test_a_steady_fall_is_told_with_its_interval() -> None:
     assert not any(one.significant for one in found.departures)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gain", [0.0, 0.01])
 def test_intervals_cover_the_change_with_the_gain_that_a_date_has(gain: float) -> None:
     """The scatter common to a date is no change of d33: five dates tell it, and the interval holds it."""

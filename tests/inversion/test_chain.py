@@ -12,6 +12,8 @@ from underskin.recordings.frf.channel_noise import without_noise_bias
 from underskin.recordings.frf.estimation import broadband
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def table() -> SigmaTable:

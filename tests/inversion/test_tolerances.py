@@ -22,6 +22,7 @@ def table() -> SigmaTable:
     return load_table()
 
 
+@pytest.mark.slow
 def test_a_skin_within_its_tolerances_is_covered(table: SigmaTable) -> None:
     """Declared values drawn by their tolerances: the absolute interval holds the true d33 as often as it says, 95 %."""
     random = np.random.default_rng(5)

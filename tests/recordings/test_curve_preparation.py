@@ -12,6 +12,8 @@ from underskin.recordings.curve_defects import periodic_error
 from underskin.recordings.curve_signs import falling
 from underskin.recordings.plausibility import implausible
 
+pytestmark = pytest.mark.slow
+
 
 def modulus_mpa(read: Campaign) -> float:
     (found,) = elastomer.of_campaign(read)

@@ -14,6 +14,8 @@ from underskin.recordings.elastomer import of_campaign
 from underskin.recordings.sphere_modulus import IndentationModulus
 from underskin.units import Floats
 
+pytestmark = pytest.mark.slow
+
 
 def whole_sphere(radius_mm: float) -> Callable[[Floats], Floats]:
     """Sneddon's law of a sphere on a half space of 1 MPa [N of mm], by its own table."""
