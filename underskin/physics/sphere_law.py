@@ -46,16 +46,11 @@ class SphereLaw:
             depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
         steps = np.diff(depth) * (stiffness[1:] + stiffness[:-1]) / 2
         self._depth, self._root = depth, np.cbrt(np.append(0.0, np.cumsum(steps))) ** 2
-        self._contact_radius = a
         self.deepest = float(depth[-1])
 
     def __call__(self, depth: Floats) -> Floats:
         """F/E' at depths (samples,), 0 out of contact; beyond `deepest` that of the last depth."""
         return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._root) ** 1.5)
-
-    def contact_radius(self, depth: Floats) -> Floats:
-        """a [m] at depths (samples,)."""
-        return np.asarray(np.interp(np.maximum(depth, 0.0), self._depth, self._contact_radius))
 
 
 class _Ratios:

@@ -10,20 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.errors import too_few, unequal_lengths, unusable
 from underskin.recordings.campaign import CompressionRecording
+from underskin.recordings.loading_branch import FEWEST, loading_branch
 from underskin.units import Floats, to_lab, to_si
 
-_STRAIGHT, _LOCALLY, _LEAST = (
-    0.012,
-    0.05,
-    2e-3,
-)  # largest departure from a law: of the stress that it spans, of the stress
-# there, and of that of the whole curve
+# Largest departure from a law: of the stress that it spans, of the stress there, and of that of the whole curve
+_STRAIGHT, _LOCALLY, _LEAST = 0.012, 0.05, 2e-3
 _LEAVES = 0.02  # departure from it, of the stress, at which the curve no longer follows the law
 _EARLY = 0.1  # the first such part starts below this share of the stress at its end
 _POINTS = 400
-_FEWEST = 8
 _LEAST_STRETCH = 0.05  # of λ: a sample that is pressed to less is none
 _FOOT_ROUNDS = 2  # by which the foot of the curve is found, from which strain counts
 _FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
@@ -80,7 +75,7 @@ def compression_modulus(displacement: Floats, force: Floats, height: float, diam
 
     Raises InvalidInput where the loading branch has too few points, or does not load.
     """
-    along, load = _loading(displacement, force)
+    along, load = loading_branch(displacement, force)
     stress = load / (np.pi / 4 * diameter**2)
     sign = 1.0 if stress[-1] >= stress[0] else -1.0
     noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
@@ -135,22 +130,6 @@ def _neo_hookean(strain: Floats) -> Floats:
     return np.asarray((stretch**-2 - stretch) / 3)
 
 
-def _loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
-    """The branch up to the largest load, of finite samples."""
-    if len(along) != len(load):
-        raise unequal_lengths("force_n", len(load), len(along), "displacement_mm")
-    finite = np.isfinite(along) & np.isfinite(load)
-    along, load = along[finite], load[finite]
-    if len(load) < _FEWEST:
-        raise too_few("force_n", f"{len(load)} samples", f"must load over at least {_FEWEST} entries")
-    top = int(np.argmax(np.abs(load - load[0])))
-    if top + 1 < _FEWEST:
-        raise too_few("force_n", f"largest at entry {top}", f"must load over at least {_FEWEST} entries")
-    if along[top] == along[0]:
-        raise unusable("displacement_mm", float(along[top]), "must change while the force rises")
-    return along[: top + 1], load[: top + 1]
-
-
 def _thinned(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
     """Means over equal bins of strain, in order."""
     bins = np.clip(((strain - strain.min()) / np.ptp(strain) * _POINTS).astype(int), 0, _POINTS - 1)
@@ -177,10 +156,10 @@ def _first_straight(strain: Floats, stress: Floats, noise: float) -> tuple[int, 
 
     A toe is passed over, a start that is steeper is not: there the stress lies below the line.
     """
-    best = (0, min(len(strain), _FEWEST) - 1)
+    best = (0, min(len(strain), FEWEST) - 1)
     least = _LEAST * float(np.ptp(stress))
-    for first in range(0, len(strain) - _FEWEST, max(1, len(strain) // 100)):
-        for last in range(len(strain) - 1, first + _FEWEST - 2, -max(1, len(strain) // 200)):
+    for first in range(0, len(strain) - FEWEST, max(1, len(strain) // 100)):
+        for last in range(len(strain) - 1, first + FEWEST - 2, -max(1, len(strain) // 200)):
             if strain[last] - strain[first] <= strain[best[1]] - strain[best[0]]:
                 break
             if stress[first] > _EARLY * stress[last]:

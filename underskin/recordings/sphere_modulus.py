@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
+from underskin.errors import InvalidInput, unusable
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.physics.sphere_law import PARABOLOID, SphereLaw
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.curve_jumps import roughness
+from underskin.recordings.loading_branch import loading_branch
 from underskin.units import Floats, to_lab, to_si
 
-FEWEST = 8  # samples of a loading branch
 _AIR = 5  # points before contact that make a force offset known
 _CONTACTS = 200  # contact points tried
 _THINNED = 300  # samples by which powers are compared
@@ -115,7 +115,7 @@ def indentation_modulus(
     Raises InvalidInput where the loading branch has too few points, does not load, or leaves the modulus open, where it
     is pressed deeper than the law holds, and where it follows no sphere's law.
     """
-    depth, load = loading(displacement, force)
+    depth, load = loading_branch(displacement, force)
     fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     if fit.at_bound:
         allowed = "must show where contact begins: record from the air, or deeper, so that the force bends"
@@ -132,7 +132,7 @@ def estimate(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None = None
 ) -> IndentationModulus:
     """The same whatever it is worth: where a fit begins."""
-    depth, load = loading(displacement, force)
+    depth, load = loading_branch(displacement, force)
     fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     return _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
 
@@ -178,7 +178,7 @@ def tip_of(
     displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None
 ) -> Tip | None:
     """What the tip looks like, where that is plainly no sphere."""
-    depth, load = loading(displacement, force)
+    depth, load = loading_branch(displacement, force)
     fit, _ = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
     return _tip(depth, load, fit, thickness)
 
@@ -206,22 +206,6 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
     )
     is_plain = fits[power].left < max(_AS_NOISE * noise, _AS_IDEAL * span)
     return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
-
-
-def loading(along: Floats, load: Floats) -> tuple[Floats, Floats]:
-    """The branch up to the largest load, of finite samples."""
-    if len(along) != len(load):
-        raise unequal_lengths("force_n", len(load), len(along), "displacement_mm")
-    finite = np.isfinite(along) & np.isfinite(load)
-    along, load = along[finite], load[finite]
-    if len(load) < FEWEST:
-        raise too_few("force_n", f"{len(load)} samples", f"must load over at least {FEWEST} entries")
-    top = int(np.argmax(np.abs(load - load[0])))
-    if top + 1 < FEWEST:
-        raise too_few("force_n", f"largest at entry {top}", f"must load over at least {FEWEST} entries")
-    if along[top] == along[0]:
-        raise unusable("displacement_mm", float(along[top]), "must change while the force rises")
-    return along[: top + 1], load[: top + 1]
 
 
 def _sphere_fit(

@@ -14,6 +14,7 @@ from math import dist, log
 
 import numpy as np
 
+from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.diagnosis.screening.displaced_response import displaced_response
 from underskin.diagnosis.screening.exchange_evidence import ExchangeEvidence
 from underskin.diagnosis.screening.levels import flat_level
@@ -57,7 +58,7 @@ def without_exchanges(
     shape, pressed = (
         displaced_response(campaign.skin, entries, names, np.zeros((1, 2)), table).value[0] for names in (own, near)
     )
-    silent, _ = no_response(entries)
+    silent, _ = no_response(aligned_lines(entries))
     largest = float(max(shape.max(), pressed.max()))
     usual = _usual(level, np.where(silent, 0.0, np.maximum(shape, pressed)))
     if usual is None:

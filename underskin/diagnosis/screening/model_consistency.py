@@ -1,11 +1,10 @@
 """Single recordings against the base model before any fit: no response, off by 1000, reversed.
 
 Only the level of each recording over the prediction of the base model is compared, without a delay that the chain has:
-its apparent d33. Recordings without
-a response, or where little is predicted (near a zero crossing), have none.
+its apparent d33. Recordings without a response, or where little is predicted (near a zero crossing), have none.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +21,7 @@ from underskin.mechanisms.models.composed import Model, compose
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Complexes, Floats
 
 _UNIT_FACTORS = (1e3, 1e-3)
 _FACTOR_WIDTH = np.log(12.0)
@@ -52,18 +51,19 @@ def against_model(
     campaign: Campaign, entries: list[FrfRecording], table: SigmaTable, kept: Collection[str] | None
 ) -> Consistent:
     """The recordings held against the base model; `kept` as for `within_tables`."""
-    unresponsive, variance = no_response(entries)
+    aligned = aligned_lines(entries)
+    unresponsive, variance = no_response(aligned)
     if unresponsive.all():
         finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(entries)})
         return Consistent([], [finding], Lacking(Lack.NO_RESPONSE))
     model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
     inside, beyond, findings = within_tables(campaign, entries, model, table, kept)
     inside |= beyond
-    ratio, largest, expected = _apparent(entries, model, inside & ~unresponsive)
-    lost, dead_findings = dead(entries, unresponsive & inside, variance, np.where(inside, expected, 0.0))
+    ratio, largest, expected = _apparent(aligned, model, inside & ~unresponsive)
+    lost, dead_findings = dead(entries, aligned, unresponsive & inside, variance, np.where(inside, expected, 0.0))
     findings += dead_findings
     usable = inside & ~lost
-    turned = np.where(_one_sided(entries), ratio, np.nan)
+    turned = np.where(_one_sided(entries, aligned), ratio, np.nan)
     contradiction = _contradiction(ratio, turned) if len(entries) == 2 else None
     if contradiction is not None:
         return Consistent([], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
@@ -78,12 +78,11 @@ def against_model(
     return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings, beyond=far)
 
 
-def _apparent(entries: list[FrfRecording], model: Model, usable: Mask) -> tuple[Floats, Floats, Floats]:
+def _apparent(aligned: Sequence[Complexes], model: Model, usable: Mask) -> tuple[Floats, Floats, Floats]:
     """Each recording's level over the base model's, NaN where it says nothing; the same of what a quarter of its lines
     exceed, which no filter takes from all of them; and the level to be expected [C/N]."""
     predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
-    shape = predicted[np.searchsorted(model.recording, np.arange(len(entries)))].real
-    aligned = aligned_lines(entries)
+    shape = predicted[np.searchsorted(model.recording, np.arange(len(aligned)))].real
     level = np.array([float(np.nanmedian(values.real)) for values in aligned])
     upper = np.array([float(np.nanquantile(np.abs(values), _UPPER)) for values in aligned])
     telling = usable & (np.abs(shape) > _LEAST_RESPONSE * np.abs(shape[usable]).max(initial=0.0))
@@ -114,11 +113,11 @@ def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list
     return off, findings
 
 
-def _one_sided(entries: list[FrfRecording]) -> Mask:
+def _one_sided(entries: list[FrfRecording], aligned: Sequence[Complexes]) -> Mask:
     """Whether a recording's lowest lines are on the same side of zero as all of it: above a resonance charge is in
     antiphase, which reverses nothing."""
     sides = []
-    for entry, values in zip(entries, aligned_lines(entries), strict=True):
+    for entry, values in zip(entries, aligned, strict=True):
         real, frequency = values.real, lines_of(entry).frequency
         low = int((frequency <= np.cbrt(frequency[0] ** 2 * frequency[-1])).sum())
         lowest = real[: max(1, min(1 + (len(real) - 1) // _LOWEST, low))]

@@ -12,12 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
-from underskin.units import Floats, Mask
+from underskin.units import Complexes, Floats, Mask
 
 _LEAST_LINES = 4
 _MEAN, _LINES = 9.0, 3.0  # over their variance
@@ -27,10 +26,11 @@ _INCOHERENT = 0.5  # γ² below which a line's noise is larger than its response
 _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near a crossing of zero, and may be none
 
 
-def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
-    """Which recordings show none, and the variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
-    unresponsive, variance = np.zeros(len(entries), dtype=bool), np.zeros(len(entries))
-    for number, values in enumerate(aligned_lines(entries)):
+def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
+    """Which recordings show none, of the lines (lines,) [C/N] of each without a common delay (`aligned_lines`), and the
+    variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
+    unresponsive, variance = np.zeros(len(aligned), dtype=bool), np.zeros(len(aligned))
+    for number, values in enumerate(aligned):
         lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
@@ -42,14 +42,18 @@ def no_response(entries: Sequence[FrfRecording]) -> tuple[Mask, Floats]:
 
 
 def dead(
-    entries: Sequence[FrfRecording], unresponsive: Mask, variance: Floats, expected: Floats
+    entries: Sequence[FrfRecording],
+    aligned: Sequence[Complexes],
+    unresponsive: Mask,
+    variance: Floats,
+    expected: Floats,
 ) -> tuple[Mask, list[Finding]]:
     """Which recordings show no response though the others predict a response well above their noise.
 
     Each is a finding of its own, or its sensor is one, where that shows none in most of its recordings and a weak
     one in the others, which noise alone does.
     """
-    level = np.array([float(np.abs(np.nanmean(values))) for values in aligned_lines(entries)])
+    level = np.array([float(np.abs(np.nanmean(values))) for values in aligned])
     silent = unresponsive | (_incoherent(entries) & (level < _WEAK * expected))
     missing: Mask = silent & (expected**2 > _EXPECTED * variance)
     findings = []

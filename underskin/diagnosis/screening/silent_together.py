@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from underskin.diagnosis.screening.aligned_lines import aligned_lines
 from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -31,7 +32,7 @@ def without_silent_pair(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecord
 def _silent_since(entries: Sequence[FrfRecording]) -> list[int]:
     """The recordings, in time, of the two sensors that answer until some recording and never since, where others do;
     none where not two do so."""
-    silent, _ = no_response(entries)
+    silent, _ = no_response(aligned_lines(entries))
     order = np.argsort(recording_order(entries), kind="stable").tolist()
     falling = set[str]()
     for name in {entry.sensor for entry in entries}:
