@@ -43,7 +43,8 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Right:
-    """What is right: a value (or none, where `or_none`), verdicts, a set, words that stand in the text and that do not.
+    """What is right: a value (or none, where `or_none`; none at all, where `none`), verdicts, a set, words that stand
+    in the text and words that do not.
 
     `parameter`: name of one of the set's parameters with the bounds of its value.
     """
@@ -51,6 +52,7 @@ class Right:
     value: float | None = None
     within: float = 0.05
     or_none: bool = False
+    none: bool = False
     verdicts: tuple[str, ...] = ()
     names: tuple[str, ...] | None = None
     parameter: tuple[str, float, float] | None = None
@@ -62,7 +64,7 @@ class Right:
         wrong = ["a traceback"] if "Traceback" in outcome.text else []
         value = outcome.value
         if self.value is None:
-            if value is not None and not self.says and not self.verdicts:
+            if value is not None and (self.none or not (self.says or self.verdicts)):
                 wrong.append(f"gives {value:g} where no value is right")
         elif value is None:
             wrong += [] if self.or_none else [f"gives no value, {self.value:g} is right"]

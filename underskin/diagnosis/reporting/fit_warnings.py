@@ -12,11 +12,8 @@ from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.unnamed.curve_laws import CurveLaw
 from underskin.mechanisms.unnamed.laws import in_plain_words
 
-_STIFFENS = (
-    "strain_stiffening",
-    "compressible_layer",
-    "layered_contact",
-)  # with depth, as a layer on a stiff base does
+# With depth, as a layer on a stiff base does
+_STIFFENS = ("strain_stiffening", "compressible_layer", "layered_contact")
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:

@@ -15,12 +15,10 @@ from underskin.units import Complexes, Floats
 _LARGEST = 0.25  # of a record, that a lag may be
 _STANDS_OUT = 8.0  # times the rms of a correlation: noise alone reaches that once in 1e15
 _AS_HIGH = 0.9  # of the highest peak: of a force that repeats itself the nearest of several
-_UNHARMED = (
-    1e-3  # of a block: a lag takes (2π²/3)(lag/block)² from γ² by Hann's window, as noise of a sample in 1e5 does
-)
-_IN_PHASE = (
-    0.9  # of the lines' power that is in phase at the best delay: as much as this without one, and there is none
-)
+# Of a block: a lag takes (2π²/3)(lag/block)² from γ² by Hann's window, as noise of a sample in 1e5 does
+_UNHARMED = 1e-3
+# Of the lines' power that is in phase at the best delay: as much as this without one, and there is none
+_IN_PHASE = 0.9
 _EXPLAINED = 0.5  # of the lines' power, in phase at the best delay: a turn by half past a resonance leaves 0.4
 _STEPS = 6  # delays that are tried for each by which the highest line turns once
 _MOST_DELAYS = 8192
