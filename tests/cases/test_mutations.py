@@ -16,8 +16,8 @@ from tests.cases.rows import ROWS
 from underskin.cli.app import app
 
 CASES = os.environ.get("UNDERSKIN_CASES")
-FILES = 2000 if SOAK else 60
-DIAGNOSED = 20 if SOAK else 60  # one of so many is diagnosed as well, which takes seconds
+FILES = 2000 if SOAK else 24
+DIAGNOSED = 20 if SOAK else 24  # one of so many is diagnosed as well, which takes seconds
 EXTREME = (
     "0",
     "-1",

@@ -20,6 +20,7 @@ from underskin.mechanisms.registry import built_in
 from underskin.recordings.campaign import parse
 
 
+@pytest.mark.soak
 def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_without_it(
     visitor: Visit, server: Server
 ) -> None:

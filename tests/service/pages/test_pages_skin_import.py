@@ -66,6 +66,7 @@ def looked_at(client: httpx.Client, content: bytes) -> str:
     return answer.text
 
 
+@pytest.mark.soak
 def test_an_exported_skin_comes_in_where_somebody_says_so(visitor: Visit, server: Server, export: bytes) -> None:
     page = visitor.page
     look_at(visitor, [file("palm.h5", export)])
