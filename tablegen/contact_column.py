@@ -1,9 +1,9 @@
 """One column of the contact table: one material contact edge, pressed by ever smaller spheres up to the largest load.
 
-The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Its radius is chosen
-so that x = L^(1/3) falls near every other of the nodes; the nodes themselves are reached by interpolation along the
-column, where a/h is constant and the strain alone varies, in which all quantities are smooth. Quantities are stored as
-ratios to Hertz theory at the same force and sphere (`underskin.physics.hertz`).
+The mesh belongs to the edge, so each column has one, and every sphere starts from the one before. Along a column a/h
+of the linear contact changes little and the strain varies, in which all quantities are smooth: splines in x = L^(1/3)
+lead from the solved spheres to the table's nodes. They pass through x = 0, where the linear layer is exact. What is
+kept is the difference from the exact linear contact at the same force, sphere and layer, `tablegen.linear_contact`.
 """
 
 from collections.abc import Iterator
@@ -13,11 +13,12 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 from threadpoolctl import threadpool_limits
 
-from tablegen import linear_layer
-from tablegen.base_stress import BaseStress, disc_averages
+from tablegen.base_stress import PROFILE_END, BaseStress, disc_averages
 from tablegen.contact import ContactLayer, PressedState
 from tablegen.contact_mesh import contact_mesh
 from tablegen.discretisation import discretise
+from tablegen.linear_contact import LinearContact, LinearSphere
+from tablegen.linear_layer import transmission
 from tablegen.neo_hookean import SHEAR_MODULUS, YOUNGS_MODULUS
 from tablegen.newton import State
 from underskin.errors import SolverError
@@ -26,7 +27,8 @@ from underskin.physics.hankel_transform import normal_stress, punch_transform
 from underskin.units import Floats
 
 _SMALLEST_STEP = 1 / 32  # of the way from one sphere to the next
-_PLANE_STRAIN = YOUNGS_MODULUS / 0.75  # E' = E/(1 − ν²)
+_SPHERES = 8  # of a column, evenly in x
+RADII = np.concatenate([np.linspace(0, 4, 65), np.linspace(4, PROFILE_END, 33)[1:]])  # r/h of the profile
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,12 @@ class SphereSolution:
 
     Attributes
     ----------
+    linear : LinearSphere
+        The exact linear contact at the same force.
+    correction : ndarray, (RADII,)
+        Stress on the base less that of the linear contact, in σ's scale.
     sigma, sigma_increment : ndarray, (rho,)
-        σ of the force and of its increment, for each sensor radius.
+        σ of the force and of its increment d(Fσ)/dF at fixed R, for each sensor radius.
     force_error : float
         Force on the base over that on the sphere, minus 1.
     lowest_pressure : float
@@ -48,6 +54,8 @@ class SphereSolution:
     contact_radius: float
     indentation: float
     stiffness: float
+    linear: LinearSphere
+    correction: Floats
     sigma: Floats
     sigma_increment: Floats
     force_error: float
@@ -58,37 +66,39 @@ class SphereSolution:
         """L^(1/3)."""
         return float(np.cbrt(hertz.load_parameter(self.force, self.radius, YOUNGS_MODULUS)))
 
-    def over_hertz(self) -> Floats:
-        """Contact radius, indentation and stiffness over their Hertz values at this force, then σ and its increment."""
-        a = float(hertz.contact_radius(self.force, self.radius, YOUNGS_MODULUS))
+    def over_linear(self) -> Floats:
+        """Contact radius, indentation and stiffness over those of the linear contact, then the correction."""
+        linear = self.linear
         ratios = (
-            self.contact_radius / a,
-            self.indentation * self.radius / a**2,
-            self.stiffness / (2 * a * _PLANE_STRAIN),
+            self.contact_radius / linear.alpha,
+            self.indentation / linear.indentation,
+            self.stiffness / linear.stiffness,
         )
-        return np.concatenate([ratios, self.sigma, self.sigma_increment])
+        return np.concatenate([ratios, self.correction])
 
 
-def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
+def solve_contact_column(
+    a: float, cbrt_load: Floats, order: int, stiffening: float = 0.0
+) -> tuple[Floats, Floats, float]:
     """Solve one column of the contact table.
 
     Parameters
     ----------
     a : float
         Material contact edge a/h before pressing.
-    rho : ndarray, (rho,)
-        Sensor radii rT/h.
     cbrt_load : ndarray, (x,)
-        x = L^(1/3), ascending, above 0.
+        x = L^(1/3), ascending from 0.
     order : int
         Order of the displacement elements.
+    stiffening : float
+        Yeoh's c2/G; 0 is neo-Hookean.
 
     Returns
     -------
-    radius : ndarray, (x,)
-        R/h.
+    alpha : ndarray, (x,)
+        a/h of the linear contact under the force.
     values : ndarray, (x, quantities)
-        As `SphereSolution.over_hertz`.
+        As `SphereSolution.over_linear`.
     force_error : float
         The largest over the column.
 
@@ -98,25 +108,23 @@ def solve_contact_column(a: float, rho: Floats, cbrt_load: Floats, order: int) -
         Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        targets = np.concatenate([[cbrt_load[0] / 2], cbrt_load[:-1:2], [cbrt_load[-1]]])
-        spheres = list(_follow(a, rho, targets, order))
-    x = np.array([sphere.cbrt_load for sphere in spheres])
-    values = np.array(
-        [np.append(sphere.radius * x_, sphere.over_hertz()) for sphere, x_ in zip(spheres, x, strict=True)]
-    )
-    resampled = np.asarray(make_interp_spline(x, values, k=5)(cbrt_load))
-    return resampled[:, 0] / cbrt_load, resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
+        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, stiffening))
+    x = np.array([0.0, *(sphere.cbrt_load for sphere in spheres)])
+    rows = [np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres]
+    vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
+    resampled = np.asarray(make_interp_spline(x, np.array([vanishing, *rows]), k=5)(cbrt_load))
+    return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[SphereSolution]:
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int, stiffening: float = 0.0) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
-    column = _Column(a, rho, order)
+    column = _Column(a, rho, order, stiffening)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, rho: Floats, targets: Floats, order: int) -> Iterator[SphereSolution]:
+def _follow(a: float, targets: Floats, order: int, stiffening: float) -> Iterator[SphereSolution]:
     """Spheres whose x is near each target, and the last one's at or beyond it."""
-    column = _Column(a, rho, order)
+    column = _Column(a, np.zeros(0), order, stiffening)
     ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
     for target in targets:
         sphere = column.advance(a / _strain(target, ratio))
@@ -136,9 +144,10 @@ def _strain(cbrt_load: float, ratio: float) -> float:
 class _Column:
     """The layer pressed up to one contact edge; knows the last sphere."""
 
-    def __init__(self, a: float, rho: Floats, order: int) -> None:
-        self.layer = ContactLayer(discretise(contact_mesh(a), order), a)
+    def __init__(self, a: float, rho: Floats, order: int, stiffening: float) -> None:
+        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, stiffening)
         self.base = BaseStress(self.layer.discretisation)
+        self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho)
         self.a, self.rho = a, rho
         self.now, self.strain = self.layer.untouched(), 0.0
 
@@ -172,22 +181,34 @@ class _Column:
         force, stiffness = layer.force(now, radius), base.total_force(gained)
         contact_radius = float(layer.surface(now, np.array([self.a]))[0, 0])
         pressure = layer.pressure(now)
+        total = 2 * np.pi * force * SHEAR_MODULUS
+        linear = self.linear.sphere(total, radius)
         # F = 2π force and σ = (2π/3) · mean stress/F, for a mean over the disc; 2π cancels.
-        static = stress / (3 * force) - linear_layer.sigma(contact_radius, 0.0, base.points)
-        moving = gained / (3 * stiffness) - _punch(contact_radius, 0.0, base.points)
+        correction = base.smooth(stress / (3 * force) - self.linear.profile(linear.alpha))
+        sigma, increment = np.zeros(0), np.zeros(0)
+        if self.rho.size:
+            sigma = self.linear.sigma(linear.alpha) + disc_averages(correction, self.rho)
+            increment = self._increment(gained / (3 * stiffness), contact_radius)
         return SphereSolution(
             radius=radius,
-            force=2 * np.pi * force * SHEAR_MODULUS,
+            force=total,
             contact_radius=contact_radius,
             indentation=now.indentation,
             stiffness=2 * np.pi * stiffness * SHEAR_MODULUS,
-            sigma=linear_layer.sigma(contact_radius, self.rho) + disc_averages(base.smooth(static), self.rho),
-            sigma_increment=_punch(contact_radius, self.rho, 0.0) + disc_averages(base.smooth(moving), self.rho),
+            linear=linear,
+            correction=correction(RADII),
+            sigma=sigma,
+            sigma_increment=increment,
             force_error=base.total_force(stress) / force - 1,
             lowest_pressure=float(pressure.min() / pressure.max()),
         )
 
+    def _increment(self, gained: Floats, a: float) -> Floats:
+        """Means over the discs of an increment of the stress, which is near that of a flat punch of radius a."""
+        moving = self.base.smooth(gained - _punch(a, 0.0, self.base.points))
+        return _punch(a, self.rho, 0.0) + disc_averages(moving, self.rho)
+
 
 def _punch(a: float, rho: Floats | float, offset: Floats | float) -> Floats:
     """σ under the flat punch's pressure on the linear layer."""
-    return normal_stress(linear_layer.transmission, punch_transform, a, rho, offset)
+    return normal_stress(transmission, punch_transform, a, rho, offset)

@@ -99,7 +99,7 @@ def _save(path: Path, arrays: Arrays) -> None:
 def _load(path: Path) -> Arrays | None:
     """The arrays of a finished piece; None when it is not there or does not read back whole."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with path.open("rb") as opened, np.load(opened, allow_pickle=False) as file:
             return dict(file)
     except (FileNotFoundError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
         return None

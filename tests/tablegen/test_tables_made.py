@@ -10,7 +10,6 @@ import pytest
 
 from bench.soak import SOAK
 from tablegen import contact_table, influence_table, sigma_table
-from tablegen.contact_interpolation import ContactInterpolation
 from tablegen.sweep import sources_hash
 from tests.support.cases import first
 from underskin.surrogate.sigma_table import tables_folder
@@ -21,10 +20,10 @@ MADE_BY = {"sigma.h5": sigma_table, "influence.h5": influence_table, "contact.h5
 @pytest.mark.parametrize(("name", "maker"), MADE_BY.items())
 def test_the_sources_on_record_are_these(name: str, maker: ModuleType) -> None:
     """In the table itself, or in `sources.json` for a table that was made before the digest left names out."""
-    later = json.loads((tables_folder() / "sources.json").read_text(encoding="utf-8"))[name]
+    later = json.loads((tables_folder() / "sources.json").read_text(encoding="utf-8")).get(name, {})
     with h5py.File(tables_folder() / name) as file:
         on_record = [file.attrs["tablegen_sources_sha256"]]
-        if later["data_sha256"] == file.attrs["data_sha256"]:
+        if later.get("data_sha256") == file.attrs["data_sha256"]:
             on_record.append(later["sources_sha256"])
     assert sources_hash(maker.SOURCES) in on_record, "run `make tables`"
 
@@ -55,20 +54,3 @@ def test_influence_solved_anew() -> None:
         )
         assert np.abs(solved["normal"] - normal[i, j]).max() < 1e-9
         assert np.abs(solved["tangential"] - tangential[i, j]).max() < 1e-9
-
-
-@pytest.mark.soak
-def test_contact_solved_anew() -> None:
-    """The table holds a spline through the solved edges, at other spheres: within its own error.
-
-    In every run single spheres are solved anew (tests/surrogate/test_contact_table.py).
-    """
-    table = ContactInterpolation(tables_folder() / "contact.h5")
-    _, cbrt_load, rho = contact_table.DEFAULT_AXES
-    edge = float(contact_table.DEFAULT_EDGES[len(contact_table.DEFAULT_EDGES) // 2])
-    solved = contact_table.solve_piece(edge, rho, cbrt_load[1:], contact_table.ORDER)
-    answer = table.contact(solved["radius"], cbrt_load[1:] ** 3)
-    inside = answer.inside
-    assert inside.sum() > 3
-    hertz = np.cbrt(9 / 16 * solved["radius"] ** 3 * cbrt_load[1:] ** 3)
-    assert answer.a_over_h[inside] == pytest.approx(solved["values"][inside, 0] * hertz[inside], rel=1e-5)

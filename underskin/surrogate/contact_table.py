@@ -1,11 +1,15 @@
-"""The finite-strain contact of a sphere with the layer: reference data that ships beside the tables that answer.
+"""What finite strain adds to the exact linear layer's contact with a rigid frictionless sphere.
 
-A rigid frictionless sphere of radius R is pressed with the force F into an incompressible neo-Hookean layer bonded to a
-rigid base; L = F/(R² E). The library verifies and lists the file and computes nothing from it.
+A sphere of radius R is pressed with the force F into the bonded incompressible neo-Hookean layer. Each group of the
+file is a state of the material over α = a/h of the linear layer's frictionless contact at the same F, R, E, h, and
+x = L^(1/3), L = F/(R² E). The correction is the solved stress on the base less that of the linear contact.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
@@ -13,29 +17,53 @@ from underskin.surrogate.table_file import Table
 from underskin.units import Floats
 
 CONTACT_TABLE = "contact.h5"
+_STATE = "frictionless"
 
 
 class ContactTable(Table):
-    """A verified table of contacts: its axes, domain and origin."""
+    """A verified table of the corrections.
+
+    Attributes
+    ----------
+    axes : tuple of ndarray
+        a/h of the linear contact, L^(1/3) and r/h.
+    correction_error : ndarray, (a, L^(1/3), r)
+        Bound on the absolute error of the correction, in σ's scale.
+    contact_radius, indentation, stiffness : ndarray, (a, L^(1/3))
+        Over those of the linear layer at the same force.
+    """
 
     schema = CONTACT_SCHEMA
 
     def _take(self, data: Mapping[str, Floats]) -> None:
-        self.axes = (
-            data["contact/indenter_radius_over_h"],
-            data["contact/cbrt_load_parameter"],
-            data["stress/rt_over_h"],
-        )
+        state = {name.partition("/")[2]: values for name, values in data.items() if name.startswith(f"{_STATE}/")}
+        self.axes = state["a_over_h"], state["cbrt_load_parameter"], state["r_over_h"]
+        self.correction_error = state["correction_error"]
+        self.contact_radius, self.indentation = state["contact_radius"], state["indentation"]
+        self.stiffness = state["stiffness"]
+        self._over_radius = make_interp_spline(self.axes[2], state["correction"], k=3, axis=2)
 
     @property
     def domain(self) -> dict[str, tuple[float, float]]:
-        """Lowest and highest indenter_radius_over_h, load_parameter and rt_over_h, limits included."""
-        radius, x, rho = self.axes
+        """Lowest and highest a_over_h, load_parameter and r_over_h, limits included."""
+        a, x, r = self.axes
         return {
-            "indenter_radius_over_h": (float(radius[0]), float(radius[-1])),
+            "a_over_h": (float(a[0]), float(a[-1])),
             "load_parameter": (float(x[0]) ** 3, float(x[-1]) ** 3),
-            "rt_over_h": (float(rho[0]), float(rho[-1])),
+            "r_over_h": (float(r[0]), float(r[-1])),
         }
+
+    @property
+    def contact_axes(self) -> tuple[Floats, Floats]:
+        """a/h and L^(1/3) of the contacts that the table holds."""
+        return self.axes[0], self.axes[1]
+
+    def profile_over(self, r_over_h: Floats) -> Floats:
+        """The correction at distances inside the domain (radii,), for all of `contact_axes`: (a, L^(1/3), radii).
+
+        In σ's scale: T3 = −(3F/2πh²) · (linear contact + correction).
+        """
+        return np.asarray(self._over_radius(r_over_h))
 
 
 def load_contact(path: Path | None = None) -> ContactTable:

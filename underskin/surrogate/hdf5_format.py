@@ -20,7 +20,7 @@ from underskin.units import Floats
 
 SIGMA_SCHEMA = "underskin-sigma/1"
 INFLUENCE_SCHEMA = "underskin-influence/1"
-CONTACT_SCHEMA = "underskin-contact/1"
+CONTACT_SCHEMA = "underskin-contact/2"
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 

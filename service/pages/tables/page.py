@@ -35,7 +35,7 @@ _HELD = {
     "contact": (
         CONTACT_TABLE,
         "Contact of a sphere",
-        "Reference data, no answer uses it. A sphere that sinks deep: how wide it touches, how deep, and σ with it.",
+        "A sphere that sinks deep: what finite strain adds to σ, contact radius and depth. No answer uses it yet.",
     ),
 }
 # Words of an axis, and what it is in lab units on the paper's prototype: symbol, factor, unit.
@@ -45,7 +45,6 @@ _AXES = {
     "a_over_h": ("contact radius a over thickness, a/h", "a", _H, "mm"),
     "rt_over_h": ("sensor radius over thickness, rT/h", "rT", _H, "mm"),
     "load_parameter": ("load parameter, L = F/(R²E)", "F", _R**2 * _E, "N"),
-    "indenter_radius_over_h": ("radius of the sphere over thickness, R/h", "R", _H, "mm"),
     "r_over_h": ("distance of the load from the sensor's centre over thickness, r/h", "r", _H, "mm"),
     "poisson_ratio": ("Poisson's ratio ν", "", 0.0, ""),
     "slip": ("slip of the glue line: 0 bonded, 1 frictionless", "", 0.0, ""),

@@ -1,0 +1,64 @@
+"""The exact linear contact of a frictionless sphere with the bonded incompressible layer: radius, depth, base stress.
+
+Lengths in thicknesses, forces in G h², E' = E/(1 − ν²) = 4 G. The pressure is that of
+`underskin.physics.contact_curves` under the same force, and the stress on the base its transform times the layer's
+transmission:
+s(r) = (1/3) ∫₀^∞ p̂(k; α) M(k) J0(kr) k dk.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import j0
+
+from tablegen import linear_layer
+from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import disc_average
+from underskin.units import Floats
+
+_PLANE_STRAIN = 4.0  # E'/G at ν = ½
+_END = 44.0  # of k, for double precision
+_POINTS = 16  # of Gauss' rule on a panel
+_PHASE = 12.0  # of the fastest oscillation over a panel
+
+
+@dataclass(frozen=True)
+class LinearSphere:
+    """Contact radius α = a/h, indentation δ/h and dF/dδ over G h."""
+
+    alpha: float
+    indentation: float
+    stiffness: float
+
+
+class LinearContact:
+    """Contacts with one layer, and their stress at fixed distances `r` from the axis and on centred discs `rho`."""
+
+    def __init__(self, r: Floats, rho: Floats) -> None:
+        farthest = LARGEST_A_OVER_H + max(float(r.max(initial=0.0)), float(rho.max(initial=0.0)))
+        edges = np.linspace(0.0, _END, 24 + int(np.ceil(_END * farthest / _PHASE)) + 1)
+        x, w = np.polynomial.legendre.leggauss(_POINTS)
+        half = np.diff(edges)[:, None] / 2
+        k, weight = (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+        self._curves = CurveGrid(k).curves(Layer())
+        passed = self._curves.sphere_transform.value * (weight * k / 3 * linear_layer.transmission(k))
+        interval = self._curves.interval
+        self._profile = interval.coefficients(passed @ j0(np.multiply.outer(k, r)))
+        self._sigma = interval.coefficients(passed @ disc_average(np.multiply.outer(k, rho)))
+
+    def sphere(self, force: float, radius: float) -> LinearSphere:
+        """The contact of a sphere of `radius` under `force`; NaN beyond a/h = 4."""
+        load = np.array([force * radius / _PLANE_STRAIN])
+        rows = self._curves.at_load(load, np.zeros(1))
+        alpha = float(rows.alpha.value[0])
+        stiffness = 2 * _PLANE_STRAIN * alpha * float(rows.stiffness.value[0])
+        return LinearSphere(alpha, float(rows.depth.value[0]) / radius, stiffness)
+
+    def profile(self, alpha: float) -> Floats:
+        """The stress on the base at `r`, in σ's scale."""
+        return np.asarray(self._curves.interval.basis(np.array([alpha])) @ self._profile)[0]
+
+    def sigma(self, alpha: float) -> Floats:
+        """Its means over the discs `rho`."""
+        return np.asarray(self._curves.interval.basis(np.array([alpha])) @ self._sigma)[0]
