@@ -1,7 +1,4 @@
-"""A rigid frictionless sphere pressed into the incompressible layer: equilibrium at a given contact edge.
-
-The layer is neo-Hookean, or Yeoh's with two terms, W = (G/2)(I₁ − 3) + c₂ (I₁ − 3)² (Yeoh, Rubber Chem. Technol. 63
-(1990) 792).
+"""A rigid frictionless sphere pressed into the incompressible neo-Hookean layer: equilibrium at a given contact edge.
 
 The material point of the surface that is the contact's edge is prescribed, as a line of the mesh, and the sphere's
 indentation δ is an unknown; its equation is that the pressure vanishes at the edge, as it must where nothing adheres.
@@ -61,10 +58,8 @@ class _Tangent:
 class ContactLayer(NonlinearLayer):
     """A discretised layer with a contact on |r| < a of its surface; the mesh must have a line at r = a."""
 
-    def __init__(self, discretisation: Discretisation, a: float, stiffening: float = 0.0) -> None:
-        """`stiffening` is Yeoh's c₂/G."""
+    def __init__(self, discretisation: Discretisation, a: float) -> None:
         super().__init__(discretisation)
-        self.stiffening = stiffening
         d = discretisation
         columns = np.unique(d.basis.mesh.p[0])
         edges = columns[columns <= a * (1 + 1e-12)]
@@ -81,16 +76,6 @@ class ContactLayer(NonlinearLayer):
         self._scale = _PENALTY / np.diff(edges)[:, None, None] * np.linalg.inv(mass)
         self.a = a
         self._edge_pressure = self._singularity_at_edge(edges)
-
-    def internal_force(self, state: State) -> Floats:
-        """As the base class's, with Yeoh's second term 4 c₂ (I₁ − 3) F."""
-        force = super().internal_force(state)
-        if self.stiffening == 0:
-            return force
-        f, _ = self._fields(state)
-        strain = (f**2).sum(axis=-1) - 3
-        second = (4 * self.stiffening * strain * self.discretisation.weight)[..., None] * f
-        return force + self.discretisation.assemble_vector(self._times_gradient(second))
 
     def untouched(self) -> PressedState:
         """The sphere just not yet in touch."""
@@ -135,17 +120,6 @@ class ContactLayer(NonlinearLayer):
         stiffness, d = self.element_matrices(now.state)[0], self.discretisation
         local = stiffness @ du[d.numbers][..., None] - np.swapaxes(tangent.constraint, 1, 2) @ dp[..., None]
         return d.assemble_vector(local[..., 0])
-
-    def _stiffness(self, f: Floats, p: Floats) -> Floats:
-        """As the base class's, with 4 c₂ (I₁ − 3) 1 + 8 c₂ F ⊗ F."""
-        matrices = super()._stiffness(f, p)
-        if self.stiffening == 0:
-            return matrices
-        d, shape = self.discretisation, self._flat_gradient.shape
-        strain = (f**2).sum(axis=-1) - 3
-        moduli = 4 * strain[..., None, None] * np.eye(5) + 8 * f[..., :, None] * f[..., None, :]
-        product = ((self.stiffening * d.weight)[..., None, None] * moduli @ d.gradient).reshape(shape)
-        return matrices + np.swapaxes(self._flat_gradient, 1, 2) @ product
 
     def _step(self, now: PressedState, radius: float, residual: Floats, gap: Floats) -> PressedState:
         """One Newton increment: that at fixed δ, and as much of the one per unit of δ as frees the edge of pressure."""

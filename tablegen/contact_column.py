@@ -77,9 +77,7 @@ class SphereSolution:
         return np.concatenate([ratios, self.correction])
 
 
-def solve_contact_column(
-    a: float, cbrt_load: Floats, order: int, stiffening: float = 0.0
-) -> tuple[Floats, Floats, float]:
+def solve_contact_column(a: float, cbrt_load: Floats, order: int) -> tuple[Floats, Floats, float]:
     """Solve one column of the contact table.
 
     Parameters
@@ -90,8 +88,6 @@ def solve_contact_column(
         x = L^(1/3), ascending from 0.
     order : int
         Order of the displacement elements.
-    stiffening : float
-        Yeoh's c2/G; 0 is neo-Hookean.
 
     Returns
     -------
@@ -108,7 +104,7 @@ def solve_contact_column(
         Names the point where Newton's method did not converge.
     """
     with threadpool_limits(1):  # the same bits whatever the number of cores
-        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order, stiffening))
+        spheres = list(_follow(a, cbrt_load[-1] * np.arange(1, _SPHERES + 1) / _SPHERES, order))
     x = np.array([0.0, *(sphere.cbrt_load for sphere in spheres)])
     rows = [np.append(sphere.linear.alpha, sphere.over_linear()) for sphere in spheres]
     vanishing = np.concatenate([[a, 1.0, 1.0, 1.0], np.zeros(RADII.size)])
@@ -116,15 +112,15 @@ def solve_contact_column(
     return resampled[:, 0], resampled[:, 1:], max(abs(sphere.force_error) for sphere in spheres)
 
 
-def press_spheres(a: float, radii: Floats, rho: Floats, order: int, stiffening: float = 0.0) -> list[SphereSolution]:
+def press_spheres(a: float, radii: Floats, rho: Floats, order: int) -> list[SphereSolution]:
     """Spheres of these radii (descending, in thicknesses), each touching up to the material radius `a` (a/h)."""
-    column = _Column(a, rho, order, stiffening)
+    column = _Column(a, rho, order)
     return [column.advance(float(radius)) for radius in radii]
 
 
-def _follow(a: float, targets: Floats, order: int, stiffening: float) -> Iterator[SphereSolution]:
+def _follow(a: float, targets: Floats, order: int) -> Iterator[SphereSolution]:
     """Spheres whose x is near each target, and the last one's at or beyond it."""
-    column = _Column(a, np.zeros(0), order, stiffening)
+    column = _Column(a, np.zeros(0), order)
     ratio = 1.0 + a  # of the force over Hertz's for a: a first guess
     for target in targets:
         sphere = column.advance(a / _strain(target, ratio))
@@ -144,8 +140,8 @@ def _strain(cbrt_load: float, ratio: float) -> float:
 class _Column:
     """The layer pressed up to one contact edge; knows the last sphere."""
 
-    def __init__(self, a: float, rho: Floats, order: int, stiffening: float) -> None:
-        self.layer = ContactLayer(discretise(contact_mesh(a), order), a, stiffening)
+    def __init__(self, a: float, rho: Floats, order: int) -> None:
+        self.layer = ContactLayer(discretise(contact_mesh(a), order), a)
         self.base = BaseStress(self.layer.discretisation)
         self.linear = LinearContact(np.minimum(self.base.points, PROFILE_END), rho)
         self.a, self.rho = a, rho

@@ -14,13 +14,10 @@ from scipy.special import j0
 from tablegen import linear_layer
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.elastic_layer import Layer
-from underskin.physics.hankel_transform import disc_average
+from underskin.physics.hankel_transform import disc_average, wave_numbers
 from underskin.units import Floats
 
 _PLANE_STRAIN = 4.0  # E'/G at ν = ½
-_END = 44.0  # of k, for double precision
-_POINTS = 16  # of Gauss' rule on a panel
-_PHASE = 12.0  # of the fastest oscillation over a panel
 
 
 @dataclass(frozen=True)
@@ -37,10 +34,7 @@ class LinearContact:
 
     def __init__(self, r: Floats, rho: Floats) -> None:
         farthest = LARGEST_A_OVER_H + max(float(r.max(initial=0.0)), float(rho.max(initial=0.0)))
-        edges = np.linspace(0.0, _END, 24 + int(np.ceil(_END * farthest / _PHASE)) + 1)
-        x, w = np.polynomial.legendre.leggauss(_POINTS)
-        half = np.diff(edges)[:, None] / 2
-        k, weight = (edges[:-1, None] + half * (1 + x)).ravel(), (half * w).ravel()
+        k, weight = wave_numbers(farthest)
         self._curves = CurveGrid(k).curves(Layer())
         passed = self._curves.sphere_transform.value * (weight * k / 3 * linear_layer.transmission(k))
         interval = self._curves.interval

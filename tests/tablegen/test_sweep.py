@@ -61,9 +61,6 @@ def _order(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings(  # NumPy leaves an archive open that it cannot read
-    "ignore:unclosed file:ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
-)
 def test_killed_at_any_moment_it_resumes_to_the_table_that_a_cluster_makes(tmp_path: Path) -> None:
     """Killed as a piece is begun or finished on the disk; a piece that was cut there is solved again."""
     with local_cluster() as cluster:

@@ -83,7 +83,7 @@ def _transform(
     a_all, rho_all, offset_all = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (a, rho, offset)))
     shape = a_all.shape
     columns = np.stack([a_all.ravel(), rho_all.ravel(), offset_all.ravel()])
-    k, weight = _nodes(float(columns.sum(axis=0).max(initial=0.0)))
+    k, weight = wave_numbers(float(columns.sum(axis=0).max(initial=0.0)))
     weight = weight * transmission(k) * k / 3
     result = np.empty(columns.shape[1])
     for start in range(0, result.size, _ROWS_AT_ONCE):
@@ -93,9 +93,9 @@ def _transform(
     return result.reshape(shape)
 
 
-def _nodes(highest_frequency: float) -> tuple[Floats, Floats]:
-    """Gauss–Legendre nodes and weights on panels of [0, 44], short enough for the fastest oscillation."""
-    panels = 24 + int(np.ceil(_END * highest_frequency / 12.0))
+def wave_numbers(distance: float) -> tuple[Floats, Floats]:
+    """Gauss–Legendre nodes and weights of k on panels of [0, 44], short enough for oscillations over a distance."""
+    panels = 24 + int(np.ceil(_END * distance / 12.0))
     x, w = np.polynomial.legendre.leggauss(16)
     edges = np.linspace(0.0, _END, panels + 1)
     half = np.diff(edges)[:, None] / 2
