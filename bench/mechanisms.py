@@ -17,7 +17,7 @@ from underskin.units import Floats
 SETS = (
     ("layered_contact", "moving_contact_edge", "contact_resonance"),
     ("interface_slip", "compressible_layer", "layered_contact"),
-    ("adhesion", "amplitude_nonlinearity", "contact_resonance"),
+    ("adhesion", "moving_contact_edge", "contact_resonance"),
     ("contact_creep", "misalignment", "sensor_relaxation"),
     ("crosstalk", "preload_dependent_d33", "ageing"),
 )

@@ -12,6 +12,7 @@ from typing import Any
 
 from proof.cases import FileCase
 from proof.judge import Judged, judge
+from proof.names import one_name_each
 from proof.stored import Work, reports
 from underskin.cli.reports import write_report
 
@@ -21,7 +22,7 @@ def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]
     truths = json.loads((campaigns / "open-truth.json").read_text(encoding="utf-8"))
     cases = _cases(campaigns / "open", work)
     judged = [
-        judge(case.name, report, truths[case.name])
+        judge(case.name, report, {**(truth := truths[case.name]), "effects": one_name_each(truth["effects"])})
         for case, report in zip(cases, reports(work, cases, progress), strict=True)
     ]
     return {"judged": [asdict(entry) for entry in judged]}

@@ -23,6 +23,7 @@ from scipy.stats import qmc
 from proof.cases import DrawnCase
 from proof.ideal_laws import Supposition, suppositions
 from proof.judge import UNKNOWN as UNKNOWN_ANSWER
+from proof.names import one_name_each
 from rig.draw import CATALOGUED, SHARES, UNKNOWN, drawn, record
 from rig.effects import Values, of
 from rig.errors import RigError
@@ -174,7 +175,7 @@ def _starts_at(supposed: Supposition, truth: Mapping[str, Values]) -> bool:
 
 
 def _answer(names: tuple[str, ...]) -> tuple[str, ...]:
-    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else names
+    return (UNKNOWN_ANSWER,) if set(names) & set(UNKNOWN) else one_name_each(names)
 
 
 def _over_rivals(tried: list[Tried], truth: tuple[str, ...]) -> float:

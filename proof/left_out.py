@@ -11,6 +11,7 @@ from typing import Any
 
 from proof.cases import DrawnCase
 from proof.judge import unnamed_over_noise
+from proof.names import one_name_each
 from proof.own_rig import truth
 from proof.stored import Work, diagnosed, diagnosing, digest_of, of_each, reports, sources, stored
 from underskin.mechanisms.base import Stage
@@ -40,9 +41,10 @@ def judge_left_out(work: Work, progress: Callable[[int, int], None]) -> dict[str
     cases = [DrawnCase(SEED, number, "single") for number in range(min(work.count or COUNT, COUNT))]
     truths = of_each(work, cases, partial(truth, work, sources("rig")), _silent)
     shown = [
-        (case, next(iter(known["effects"])))
+        (case, effect)
         for case, known in zip(cases, truths, strict=True)
-        if known["identifiable"] and next(iter(known["effects"])) in CATALOGUE
+        for effect in one_name_each(known["effects"])
+        if known["identifiable"] and effect in CATALOGUE
     ]
     whole = reports(work, [case for case, _ in shown], _silent)
     without = of_each(work, shown, partial(_without, work, diagnosing()), progress)

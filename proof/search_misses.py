@@ -13,6 +13,7 @@ from typing import Any
 
 from proof import seeds
 from proof.cases import DrawnCase
+from proof.names import one_name_each
 from proof.stored import Work, diagnosing, digest_of, of_each, sources, stored
 from proof.text_wide import is_miss
 from proof.true_starts import with_true_values
@@ -53,18 +54,19 @@ def compared(case: DrawnCase) -> Result:
     is not; None where nothing can be concluded from the campaign, or it does not support what is hidden."""
     description = case.description
     effects = description["effects"]
-    head: Result = {"name": case.name, "truth": sorted(effects)}
+    hidden = one_name_each(effects)
+    head: Result = {"name": case.name, "truth": list(hidden)}
     begun = searched(case.document())
     if begun is None:
         return {**head, "lost": None}
     problem, found = begun
     try:
-        truth = refitted(problem, sorted(effects), effects)
+        truth = refitted(problem, hidden, effects)
     except Unsupported:
         return {**head, "lost": None}
     showing = [entry for entry in found.explanations if found.shows(entry)]
     best = max(showing, key=found.log_weight)
-    own = next((entry for entry in found.explanations if set(entry.names) == set(effects)), None)
+    own = next((entry for entry in found.explanations if set(entry.names) == set(hidden)), None)
     return {
         **head,
         "found": sorted(best.names),

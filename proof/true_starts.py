@@ -47,7 +47,7 @@ _RENAMED: Mapping[str, Mapping[str, str]] = {  # effect: the rig's parameter, an
     "amplifier_high_pass": {"corner_hz": "corner"},
     "contact_creep": {"fraction": "relaxed_fraction", "time_s": "relaxation_time"},
     "mains_pickup": {"charge_pc": "pickup_charge"},
-    "amplitude_nonlinearity": {"mobility": "edge_mobility"},
+    "amplitude_nonlinearity": {"mobility": "mobile_fraction"},
     "crosstalk": {"fraction": "fraction"},
     "timing_delay": {"delay_us": "delay"},
     "modulus_error": {"factor": "modulus_factor"},

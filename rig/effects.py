@@ -199,6 +199,7 @@ UNCATALOGUED: dict[str, Effect] = {
     ),
 }  # fmt: skip
 
+IN_CATALOGUE = {"amplitude_nonlinearity": "moving_contact_edge"}  # one law, at any amplitude and in its limit
 KNOWN = {**EFFECTS, **UNCATALOGUED}
 
 

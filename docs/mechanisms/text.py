@@ -9,7 +9,7 @@ from docs.mechanisms.signatures import shown
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
 from underskin.mechanisms import HeavyTailed, Mechanism, Normal, Parameter
-from underskin.mechanisms.models.nuisances import FRF_NUISANCES
+from underskin.mechanisms.models.nuisances import D33, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.registry import built_in
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Sensor, SkinDescription
@@ -65,7 +65,7 @@ _CAMPAIGN = Campaign(
 
 def document() -> str:
     """The whole page."""
-    parts = [_INTRODUCTION, _parameters(FRF_NUISANCES, with_shown=False), _overview()]
+    parts = [_INTRODUCTION, _parameters((D33, YOUNGS_MODULUS, THICKNESS), with_shown=False), _overview()]
     parts += [_section(mechanism) for mechanism in built_in()]
     return "\n".join([*parts, _SILICONES + _silicones()])
 

@@ -4,14 +4,13 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from proof.judge import UNKNOWN
+from proof.names import one_name_each
 from rig.identifiable import THRESHOLD
 
 Report = Mapping[str, Any]
 RIGHT, OPEN, WRONG = "right", "open", "wrong"
 GRADES = (WRONG, OPEN, RIGHT)  # from bad to good
 
-# Names of one law (PHYSICS: the finite amplitude of a moving edge)
-_ONE_LAW = {"amplitude_nonlinearity": "moving_contact_edge"}
 _DIGITS = 4
 
 
@@ -79,7 +78,7 @@ def _of_rival(names: Collection[str]) -> list[str]:
 
 
 def _merged(names: Collection[str]) -> set[str]:
-    return {_ONE_LAW.get(name, name) for name in names}
+    return set(one_name_each(names))
 
 
 def _rounded(value: float | None) -> float | None:

@@ -103,14 +103,25 @@ class Power(BaseModel):
     )
 
 
+class RelativeInterval(BaseModel):
+    """A 95 % interval for comparisons."""
+
+    low: float = Field(description="Its lower end.")
+    high: float = Field(description="Its upper end.")
+
+
 class ReportD33(BaseModel):
     """d33, averaged over the answers that remain, with their probabilities."""
 
     name: Literal["d33"] | None = Field(default=None, description="What it is.")
     unit: str | None = Field(default=None, description="Of the three numbers.", examples=["pC/N"])
     value: float | None = Field(default=None, description="Its median.")
-    low: float | None = Field(default=None, description="Lower end of its 95 % interval.")
-    high: float | None = Field(default=None, description="Upper end of its 95 % interval.")
+    low: float | None = Field(default=None, description="Lower end of its 95 % interval, tolerances included.")
+    high: float | None = Field(default=None, description="Upper end of its 95 % interval, tolerances included.")
+    relative: RelativeInterval | None = Field(
+        default=None,
+        description="The same without what the declared values may be off by: to compare sensors or dates.",
+    )
     quotable: bool = Field(description="Whether one answer stands, fits to the noise, and nothing hidden moves d33.")
     per_sensor: list[SensorLevel] | None = Field(
         default=None, description="Of several campaigns: one entry a campaign and sensor."

@@ -1,8 +1,10 @@
 """The stated d33 counts what does not show, and is to be quoted only where nothing that does not show moves it."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from proof.cases import DrawnCase
@@ -14,6 +16,7 @@ from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
 from underskin.recordings.campaign import parse
+from underskin.recordings.conditions import Tolerances
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow
@@ -35,8 +38,31 @@ def test_the_stated_d33_holds_the_true_one_beside_an_effect_that_does_not_show(
     report = whole_report(hidden, table, *DECLARED)
     assert report["mechanisms"] == []
     assert report["d33"]["low"] < NARROW.d33_pc_per_n < report["d33"]["high"]
-    certain = whole_report(hidden, table, *beside())["d33"]
+    certain = whole_report(hidden, table, *beside())["d33"]["relative"]
     assert not certain["low"] < NARROW.d33_pc_per_n < certain["high"]
+
+
+def test_tolerances_widen_the_absolute_interval_alone(table: SigmaTable) -> None:
+    """The sensor's radius enters as rT² at most; E and h, which the recordings do not tell, by their slopes at the
+    contact: √((s_r r)² + (s_h h)² + (s_E E)²) of each tolerance beyond the fit's own prior."""
+    made = campaign(NARROW, table)
+
+    def log_width(interval: Mapping[str, float]) -> float:
+        return float(np.log(interval["high"] / interval["low"])) / 3.92
+
+    def found(**percents: float) -> tuple[float, float]:
+        tolerances = None if not percents else Tolerances(**percents)
+        d33 = whole_report(replace(made, skin=replace(made.skin, tolerances=tolerances)), table, *beside())["d33"]
+        return log_width(d33), log_width(d33["relative"])
+
+    usual, stated = found(), found(thickness_percent=1.0, youngs_modulus_percent=2.0, sensor_radius_percent=0.0)
+    radius = found(thickness_percent=1.0, youngs_modulus_percent=2.0, sensor_radius_percent=4.0)
+    assert stated[0] == pytest.approx(stated[1], rel=1e-3)
+    assert usual[1] == pytest.approx(stated[1], rel=1e-3)
+    assert usual[0] > 1.2 * usual[1]
+    assert radius[1] == pytest.approx(stated[1], rel=1e-3)
+    grown = np.sqrt(radius[0] ** 2 - radius[1] ** 2) / 0.04  # ∂ ln FRF/∂ ln rT: 2 of a sensor within the contact
+    assert 0.5 < grown < 2.0
 
 
 @pytest.mark.parametrize(("times", "said"), [(2.0, "2 times the declared 14 pC/N"), (1.0, "")])

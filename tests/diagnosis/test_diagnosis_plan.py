@@ -21,7 +21,6 @@ from underskin.surrogate.sigma_table import SigmaTable
 pytestmark = pytest.mark.slow
 
 DRAWS = 40
-TWINS = Made(("moving_contact_edge",), (0.9,), sensors=3, repeats=2, thickness_mm=1.2)
 NARROW = Made(("modulus_error",), (1.25,), preloads_n=(1.0, 2.0), spheres_mm=(4.0,), sensors=3, repeats=2, gain=0.01)
 RIVALS = beside("modulus_error", "thickness_error", "preload_dependent_d33")
 
@@ -29,11 +28,6 @@ RIVALS = beside("modulus_error", "thickness_error", "preload_dependent_d33")
 @pytest.fixture(scope="module")
 def narrow(table: SigmaTable) -> Campaign:
     return campaign(NARROW, table)
-
-
-@pytest.fixture(scope="module")
-def twins(table: SigmaTable) -> Campaign:
-    return campaign(TWINS, table)
 
 
 def planned(made: Campaign, folder: Path, *limits: str) -> dict[str, Any]:
@@ -65,32 +59,11 @@ def test_a_plan_keeps_within_the_limits_and_names_all_that_it_separates(narrow: 
 
 
 @pytest.mark.soak
-def test_where_the_campaign_s_own_settings_tell_nothing_others_are_tried(twins: Campaign, table: SigmaTable) -> None:
-    """At one dynamic force a moving edge and a finite amplitude are the same; another one tells them apart."""
-    report = whole_report(twins, table)
-    assert report["verdict"] == "ambiguous"
-    pairs = [{entry["mechanism"], entry["confounded_with"]} for entry in report["not_identifiable"]]
-    assert {"moving_contact_edge", "amplitude_nonlinearity"} in pairs
-    plan = report["next_experiment"]
-    assert plan["probability_of_deciding"] > plan["without_it"]
-    assert "beyond what this campaign did" in plan["statement"]
-
-
-@pytest.mark.soak
 def test_limits_beyond_the_tables_are_said_to_be_that(narrow: Campaign, tmp_path: Path) -> None:
     plan = planned(narrow, tmp_path, "--indenter-radius-mm", "2000", "--preload-n", "50", "60")
     assert plan["recordings"] == []
     assert "the tables hold none of their contacts" in plan["statement"]
     assert "more widely" not in plan["statement"]
-
-
-@pytest.mark.soak
-def test_where_nothing_can_be_planned_it_is_said_why(twins: Campaign, tmp_path: Path) -> None:
-    plan = planned(twins, tmp_path, "--preload-n", "0.3", "2.4")
-    assert plan["recordings"] == []
-    assert {tuple(names) for names in plan["separates"]} >= {("moving_contact_edge",), ("amplitude_nonlinearity",)}
-    assert "likely to tell whether it is" in plan["statement"]
-    assert "dynamic force" in plan["statement"]
 
 
 def with_planned(whole: Campaign, plan: Mapping[str, Any]) -> Campaign:

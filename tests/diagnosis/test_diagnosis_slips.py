@@ -259,7 +259,7 @@ def test_a_warm_up_is_told_beside_steps_of_its_first_recordings(table: SigmaTabl
 @pytest.mark.soak
 def test_a_warm_up_is_told_from_mechanisms_that_move_the_levels(table: SigmaTable) -> None:
     """Of campaigns that hide a mechanism of contact."""
-    moving = ("contact_creep", "misalignment", "layered_contact", "amplitude_nonlinearity", "moving_contact_edge")
+    moving = ("contact_creep", "misalignment", "layered_contact", "moving_contact_edge")
     every = quiet_of_rig(938002, 70, "single", 12)
     assert not any("warm_up" in named(made, table, *moving) for made in every)
     told = ["warm_up" in named(warming(made, -0.25, 4.0), table, *moving) for made in every]

@@ -37,7 +37,7 @@ class Hidden:
 
 
 HIDDEN: dict[tuple[str, str], Hidden] = {
-    ("frf", "moving_contact_edge"): Hidden({"mobile_fraction": 0.8}, {"edge_mobility": "mobile_fraction"}),
+    ("frf", "moving_contact_edge"): Hidden({"mobile_fraction": 0.8}, {"mobile_fraction": "mobile_fraction"}),
     ("frf", "layered_contact"): Hidden({}),
     ("frf", "misalignment"): Hidden({"x_mm": 0.5, "y_mm": -0.3}, {"offset_x": "x_mm", "offset_y": "y_mm"}),
     ("frf", "adhesion"): Hidden({"work_j_per_m2": 1.5}, {"work_of_adhesion": "work_j_per_m2"}),
@@ -57,7 +57,6 @@ HIDDEN: dict[tuple[str, str], Hidden] = {
         {"fraction": 0.5, "time_s": 20.0}, {"relaxed_fraction": "fraction", "relaxation_time": "time_s"}
     ),
     ("frf", "mains_pickup"): Hidden({"charge_pc": 0.2, "mains_hz": 50.0}, {"charge": "charge_pc"}),
-    ("frf", "amplitude_nonlinearity"): Hidden({"mobility": 0.8}, {"edge_mobility": "mobility"}),
     ("frf", "crosstalk"): Hidden({"fraction": 0.2}, {"fraction": "fraction"}),
     ("frf", "timing_delay"): Hidden({"delay_us": 80.0}, {"delay": "delay_us"}),
     ("frf", "modulus_error"): Hidden({"factor": 1.4}, {"modulus_factor": "factor"}),

@@ -38,7 +38,7 @@ TRIPLES: list[tuple[tuple[str, ...], Kind]] = [
     (("layered_contact", "adhesion", "moving_contact_edge"), "frf"),
     (("compressible_layer", "interface_slip", "layered_contact"), "frf"),
     (("thickness_error", "misalignment", "contact_resonance"), "frf"),
-    (("contact_creep", "strain_stiffening", "amplitude_nonlinearity"), "frf"),
+    (("contact_creep", "strain_stiffening", "moving_contact_edge"), "frf"),
     (("crosstalk", "preload_dependent_d33", "ageing"), "frf"),
     (("sensor_relaxation", "amplifier_high_pass", "timing_delay"), "frf"),
     (("layered_contact", "adhesion", "strain_stiffening"), "indentation"),

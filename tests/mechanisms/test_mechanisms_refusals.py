@@ -26,7 +26,6 @@ REFUSALS: list[tuple[str, Campaign, str]] = [
     ("sensor_spread", campaign([frf_recording()]), "one sensor"),
     ("crosstalk", campaign([frf_recording()], replace(SKIN, sensors=SKIN.sensors[:1])), "no neighbours"),
     ("crosstalk", campaign([frf_recording()], replace(SKIN, thickness_mm=1.0)), "position_mm"),
-    ("amplitude_nonlinearity", campaign([frf_recording(dynamic_force_n=1.0)]), "dynamic_force_n reaches preload_n"),
     ("compressible_layer", campaign([frf_recording()], replace(SKIN, poisson_ratio=0.45)), "poisson_ratio 0.45"),
     (
         "mains_pickup",

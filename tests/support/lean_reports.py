@@ -20,7 +20,7 @@ COSTLY = ("adhesion", "contact_creep", "compressible_layer")
 BESIDE_SKINS = (
     *COSTLY,
     *("interface_slip", "layered_contact", "moving_contact_edge", "instrument_compliance", "sensor_relaxation"),
-    *("amplifier_high_pass", "amplitude_nonlinearity", "crosstalk", "timing_delay"),
+    *("amplifier_high_pass", "crosstalk", "timing_delay"),
 )
 
 EVERY = tuple(CATALOGUE)  # what is wrong with recordings themselves is found without a mechanism

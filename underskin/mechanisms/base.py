@@ -91,6 +91,7 @@ class Mechanism:
     parameters_stated: tuple[Parameter, ...] = ()  # those that are the same for all campaigns and kinds
     # Fields of a recording without which it cannot be predicted, of NEEDED_FIELDS; they tell contacts apart.
     needs_fields: ClassVar[tuple[str, ...]] = ()
+    reads_fields: ClassVar[tuple[str, ...]] = ()  # the same, but it can be predicted without them
     # What a model prepares for it: the contacts' stiffness, the neighbours' charge, room for an offset [m] and for a
     # layer that much thicker or thinner.
     needs_stiffness: ClassVar[bool] = False

@@ -27,6 +27,12 @@ if TYPE_CHECKING:
     from underskin.surrogate.sigma_table import SigmaTable
 
 GROUP = "underskin.mechanisms"
+_FORMER = {"amplitude_nonlinearity": "moving_contact_edge", "edge_mobility": "mobile_fraction"}
+
+
+def current_name(name: str) -> str:
+    """The name of a mechanism or parameter today, as stored reports and truths may hold an older one."""
+    return _FORMER.get(name, name)
 
 
 class Catalogue(Mapping[str, Mechanism]):
@@ -87,6 +93,7 @@ class Known(Mapping[str, Mechanism]):
         """Raises InvalidInput where `without` names something that is not in the catalogue, and FileError where a file
         of the lab's folder cannot be used."""
         CATALOGUE.require_whole()
+        without = [current_name(name) for name in without]
         for name in without:
             if name not in CATALOGUE:
                 raise not_one_of("without", name, CATALOGUE)

@@ -18,7 +18,7 @@ from underskin.mechanisms.base import NEEDED_FIELDS, Mechanism, Stage
 from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.registry import CATALOGUE, current_name
 from underskin.mechanisms.unnamed.binding import OF_ONE_CAMPAIGN, bound_to
 from underskin.mechanisms.unnamed.grammar import Grammar
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
@@ -162,7 +162,9 @@ def adopted(report: Mapping[str, Any], campaign: Campaign, table: SigmaTable | N
     if not any(isinstance(entry, FrfRecording) for entry in campaign.recordings):
         raise InvalidInput("diagnosis_id", "a diagnosis of curves", "must be of a campaign with recordings of kind frf")
     parameters = {
-        entry["name"]: {parameter["name"]: float(parameter["value"]) for parameter in entry["parameters"]}
+        current_name(entry["name"]): {
+            current_name(parameter["name"]): float(parameter["value"]) for parameter in entry["parameters"]
+        }
         for entry in report["mechanisms"]
         if not _of_curves_alone(entry["name"])
     }

@@ -6,6 +6,7 @@ x = L^(1/3), L = F/(R² E). The correction is the solved stress on the base less
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -67,5 +68,10 @@ class ContactTable(Table):
 
 
 def load_contact(path: Path | None = None) -> ContactTable:
-    """The contact table at `path`, or the default one; raises TableError with the reason."""
-    return ContactTable(path or tables_folder() / CONTACT_TABLE)
+    """The contact table at `path`, or the default one, read once; raises TableError with the reason."""
+    return _read(path or tables_folder() / CONTACT_TABLE)
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path) -> ContactTable:
+    return ContactTable(path)

@@ -168,8 +168,8 @@ class SigmaTable(Table):
         return np.where(inside, self._profile(points), np.nan).reshape(shape)
 
     def profile_over(self, r_over_h: Floats) -> Floats:
-        """The same at distances inside the domain (r,), for all contacts of `contact_axes`: (r, a, L^(1/3))."""
-        return np.asarray(self._over_radius(r_over_h))
+        """The same at distances inside the domain (r,), for all contacts of `contact_axes`: (a, L^(1/3), r)."""
+        return np.moveaxis(np.asarray(self._over_radius(r_over_h)), 0, -1)
 
     @property
     def contact_axes(self) -> tuple[Floats, Floats]:

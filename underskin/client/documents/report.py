@@ -157,6 +157,17 @@ class PresentGroup(Document):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class RelativeInterval(Document):
+    """A 95 % interval for comparisons."""
+
+    low: float
+    """Its lower end."""
+
+    high: float
+    """Its upper end."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ReportMechanism(Document):
     """A mechanism that the recordings ask for."""
 
@@ -210,10 +221,13 @@ class ReportD33(Document):
     """Its median."""
 
     low: float | None
-    """Lower end of its 95 % interval."""
+    """Lower end of its 95 % interval, tolerances included."""
 
     high: float | None
-    """Upper end of its 95 % interval."""
+    """Upper end of its 95 % interval, tolerances included."""
+
+    relative: RelativeInterval | None
+    """The same without what the declared values may be off by: to compare sensors or dates."""
 
     quotable: bool
     """Whether one answer stands, fits to the noise, and nothing hidden moves d33."""

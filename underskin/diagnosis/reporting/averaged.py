@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED
+from underskin.diagnosis.inference.declared_values import declared_d33
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.over_spread import Normals, over_spread, together
 from underskin.diagnosis.inference.residuals import whole_prediction
@@ -14,6 +15,7 @@ from underskin.diagnosis.reporting.law_level import law_levels
 from underskin.diagnosis.reporting.numbers import mixture_quantile, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS
+from underskin.units import Floats
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
 _WORTH_MORE = 0.03  # of the probability, below which what may be there besides an answer is left out
@@ -90,8 +92,11 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
 
 def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[str, Any] | None:
     """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
-    may be there besides without showing; None where what no answer explains is more probable than all of them. `unsure`
-    is a further relative standard uncertainty."""
+    may be there besides without showing; None where what no answer explains is more probable than all of them.
+
+    What the declared values of the skin may be off by widens the interval, and not `relative`, which is for comparing
+    sensors, dates and spheres. `unsure` is a further relative standard uncertainty.
+    """
     by_explanation: dict[int, tuple[float, Explanation]] = {}  # curves' own mechanisms do not change d33
     for probability, entry in (pair for answer in search.answers for pair in _stand_on(search, answer)):
         by_explanation[id(entry)] = (probability + by_explanation.get(id(entry), (0.0, entry))[0], entry)
@@ -99,15 +104,27 @@ def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[st
     total = sum(probability for probability, _ in each)
     if total < 0.5:
         return None
-    mixture = together(
-        [_d33_under(search, problem, explanation, probability).times(probability) for probability, explanation in each]
+    parts = [_d33_under(search, problem, entry, probability).times(probability) for probability, entry in each]
+    mixture = together(parts)
+    declared = np.concatenate(
+        [np.full(len(part.share), declared_d33(problem, entry)) for part, (_, entry) in zip(parts, each, strict=True)]
     )
     shares = mixture.share / mixture.share.sum()
-    deviation = np.hypot(mixture.deviation, unsure)
-    levels = {"value": 0.5, "low": 0.025, "high": 0.975}
-    ends = {key: mixture_quantile(level, shares, mixture.mean, deviation) for key, level in levels.items()}
+
+    def ends(deviation: Floats) -> dict[str, float | None]:
+        levels = {"value": 0.5, "low": 0.025, "high": 0.975}
+        at = {key: mixture_quantile(level, shares, mixture.mean, deviation) for key, level in levels.items()}
+        return {key: rounded(float(np.exp(place))) for key, place in at.items()}
+
+    relative = np.hypot(mixture.deviation, unsure)
     unit = each[0][1].model.parameters[place_of(each[0][1], "d33")].unit
-    return {"name": "d33", "unit": unit, **{key: rounded(float(np.exp(at))) for key, at in ends.items()}}
+    alone = ends(relative)
+    return {
+        "name": "d33",
+        "unit": unit,
+        **ends(np.hypot(relative, declared)),
+        "relative": {key: alone[key] for key in ("low", "high")},
+    }
 
 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:

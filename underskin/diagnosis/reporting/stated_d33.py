@@ -61,7 +61,13 @@ class StatedD33:
         largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
         named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
         hides = f", provided that no {named} hides" if named else ""
-        return f"{value} {self.document['unit']} (95 %: {low} to {high}){self._beside_declared()}{hides}"
+        return f"{value} {self.document['unit']} (95 %: {low} to {high}{self._apart()}){self._beside_declared()}{hides}"
+
+    def _apart(self) -> str:
+        """The interval without what the declared values may be off by."""
+        assert self.document is not None
+        low, high = (f"{self.document['relative'][key]:.3g}" for key in ("low", "high"))
+        return f" with what declared values may be off, {low} to {high} to compare sensors or dates"
 
     def _beside_declared(self) -> str:
         """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
@@ -123,10 +129,10 @@ def stated_d33(
     """The d33 averaged over all answers.
 
     `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
-    search (`at_bounds`, in words), no unlisted `law` over frequency acts within the band, d33 is plausible, the answer
-    fits the recordings to their noise, which is a fifth of the response at most, and no wrong declared number
-    that would not show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that
-    noise in their channels leaves. `skin_pc_per_n`: the skin's declared one.
+    search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
+    recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
+    show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that noise in their
+    channels leaves. `skin_pc_per_n`: the skin's declared one.
     """
     d33 = None if problem.lines.curves else averaged.d33(search, problem, unsure)
     if d33 is None:
@@ -139,7 +145,7 @@ def stated_d33(
         _ANSWERS: not stands,
         "kinds of recordings contradict each other": contradictory,
         " and ".join(at_bounds): bool(at_bounds),
-        "a law over frequency that is in no list acts within the band that d33 is read from": _acts_in_band(law),
+        "a law that is in no list acts on it": law is not None and not _acts_outside_band(law),
         "no PVDF has such a value": implausible is not None,
         f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
             error <= REACHES_NOISE * floor
@@ -155,14 +161,10 @@ def stated_d33(
     return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
 
 
-def _acts_in_band(law: LeadingLaw | None) -> bool:
-    """Whether an unlisted law changes the size of the response over all of the band: any over frequency but a peak, a
-    notch, and a turn of the phase."""
-    return (
-        law is not None
-        and law.law.spoken.axis == "frequency_hz"
-        and not (law.is_phase or law.law.spoken.form == "peak")
-    )
+def _acts_outside_band(law: LeadingLaw) -> bool:
+    """Whether an unlisted law leaves the size of the response as it is over most of the band: a peak, a notch, and a
+    turn of the phase over frequency."""
+    return law.law.spoken.axis == "frequency_hz" and (law.is_phase or law.law.spoken.form == "peak")
 
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:

@@ -23,6 +23,7 @@ _PARENTS, _LARGEST = 3, 3
 _BEST = 3  # nothing and two more: processes are tried on top of the best two
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _OF_CONTACTS = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT)  # that change contacts' stiffness
+_PAIRED = (*_OF_CONTACTS, Stage.LOAD_INCREMENT)  # of which two may cancel, so that neither shows alone
 _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
@@ -159,6 +160,9 @@ class _Sets:
                     and (shape or parent is parents[0] or (rings and known[name].stage in _OF_CONTACTS))
                 ):
                     over_both.append(Request(names))
+        if size == 2:
+            paired = [name for name in self.names if known[name].stage in _PAIRED]
+            over_both += curve_sets.all_pairs(paired, self.explanations)
         return [*requests, *over_both]
 
     def refit_smaller(self) -> bool:

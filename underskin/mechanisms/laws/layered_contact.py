@@ -27,11 +27,11 @@ class LayeredContact(Mechanism):
     φ(t) N(x,t) dt = (E'/2)(δ − x²/R), N = ∫₀^∞ (1 − K(ξh)) cos ξx cos ξt dξ, F = 2π ∫₀^a φ dt, φ(a) = 0; K is the
     surface deflection of the layer over the half space's, with its own ν and glue line; with adhesion where that
     mechanism is present too."""
-    assumptions = """linear, frictionless contact; what finite strain adds is the table's at this a and L, that of a
-    dead load. By the sphere's own finite-strain contact (tables/contact.h5) it adds less: σ on a sensor beneath is up
-    to 1.7 % too high at L 0.001, up to 4 % at 0.01, and off by up to 9 % at 0.1. Under indentations a declared
-    thickness makes it no guess: it stands beside the half space with equal odds. Where none is declared, the layer's
-    thickness is a parameter."""
+    assumptions = """linear, frictionless contact; to the stress under it the correction of the sphere's own
+    finite-strain contact with a neo-Hookean layer is added (tables/contact.h5, within 0.1 % of σ up to L 0.15); under
+    another ν, a glue line that yields or adhesion that correction stays the bonded incompressible layer's. A declared
+    thickness makes it no guess: it stands beside the half space with equal odds. Under indentations on a skin without
+    a declared one, the layer's thickness is a parameter."""
     source = "Lebedev & Ufliand, J. Appl. Math. Mech. 22 (1958) 442; Dimitriadis et al., Biophys. J. 82 (2002) 2798."
     stage = Stage.CONTACT
     order = 10
@@ -58,8 +58,8 @@ class LayeredContact(Mechanism):
         return {name: value for name, value in values.items() if not (declared and name == _THICKNESS)}
 
     def follows_from_declared(self, conditions: Conditions, kind: Kind) -> bool:
-        """Of indentations on a skin whose thickness is declared."""
-        return kind == "indentation" and conditions.skin.thickness_mm is not None
+        """Where the skin's thickness is declared."""
+        return conditions.skin.thickness_mm is not None
 
     def unsupported(self, conditions: Conditions, kind: Kind) -> str | None:
         """A thickness is needed, or curves that tell it."""

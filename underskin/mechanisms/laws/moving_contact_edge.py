@@ -7,25 +7,32 @@ from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.parameter import Parameter, Uniform
 from underskin.units import Array, Floats
 
-_STEP = 1e-3  # of the central difference over F, relative; its error is of the order of the step's square
+_NODES, _MORE_NODES = 3, 6  # of the quadrature; the three are exact for charges of the fourth degree in the force
+_LARGE = 0.4  # of the preload: a dynamic force beyond which three nodes err by more than 1e-4 of σ
+_SMALL = 1e-3  # the same that stands for the limit of a small one: it errs by the order of its square
+_LEAST_FORCE = 1e-6  # of the preload, for a sphere that has left the skin
 _REASON = "from an edge pinned by adhesion to one that moves freely: nothing is known beforehand"
 
 
 class MovingContactEdge(Mechanism):
-    """A contact edge that moves with a small dynamic force."""
+    """A contact edge that moves with the dynamic force."""
 
     name = "moving_contact_edge"
     plain = """The edge of the contact moves with the dynamic force, so the oscillating part of the pressure sits
     towards the rim, and a wide contact gives less charge than the steady pressure's shape says."""
-    law = """σ → (1 − m) σ + m d(Fσ)/dF at fixed R, with every other mechanism of contact and stress inside the
-    derivative (d33 multiplies it: preload_dependent_d33's is the tangent coefficient already); for the linear Hertz
-    case d(Fσ)/dF = σ + (a/3) ∂σ/∂a, the flat punch's σ. FRF = charge over oscillating force."""
-    assumptions = "m, the mobile fraction, is the same for all recordings; oscillations small against the preload."
+    law = """σ → (1 − m) σ + m · (first harmonic of (F + Fd sin ωt) σ(F + Fd sin ωt))/Fd at fixed R, with every other
+    mechanism of contact and stress inside; without a dynamic force its limit (1 − m) σ + m d(Fσ)/dF, for the linear
+    Hertz case σ + (a/3) ∂σ/∂a, the flat punch's σ. d33 multiplies it: where it changes with stress
+    (preload_dependent_d33) it is that at the preload and does not vary within the cycle."""
+    assumptions = """m, the mobile fraction, is the same for all recordings; quasi-static over the cycle; where the
+    dynamic force exceeds the preload, the sphere has left the skin for the rest of the cycle."""
     source = """Johnson, Contact Mechanics (1985), section 3.4 (an increment of Hertz' pressure is the flat punch's);
-    Seminara 2018, equations 12 to 16, holds the edge still."""
+    Gelb & Vander Velde, Multiple-Input Describing Functions (1968), for the first harmonic, (2/π) ∫₋₁¹ Q(F + Fd s)
+    s/√(1 − s²) ds, by Gauss–Chebyshev quadrature. Seminara 2018, equations 12 to 16, holds the edge still."""
     stage = Stage.LOAD_INCREMENT
     order = 10
-    axes = ("preload_n", "indenter_radius_mm", "position_mm")
+    axes = ("preload_n", "indenter_radius_mm", "position_mm", "dynamic_force_n")
+    reads_fields = ("dynamic_force_n",)
     parameters_stated = (
         Parameter(
             "mobile_fraction", "-", 0.0, 1.0, Uniform(), "linear", limit=0.0, shown=1.0, reason=_REASON, closed=(1.0,)
@@ -33,10 +40,13 @@ class MovingContactEdge(Mechanism):
     )
 
     def force_nodes(self, force: Floats, dynamic_force: Floats) -> tuple[Array, Array]:
-        """d(Fσ)/dF by a central difference."""
-        up, down = 1 + _STEP, 1 - _STEP
-        weight = np.array([up, -down]) / (2 * _STEP)
-        return np.multiply.outer(np.array([up, down]), force), np.multiply.outer(weight, np.ones_like(force))
+        """The first harmonic's quadrature; a weight is of σ, so it holds the force at its node."""
+        amplitude = np.maximum(dynamic_force, _SMALL * force)
+        nodes = _NODES if (amplitude < _LARGE * force).all() else _MORE_NODES
+        s = np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes)[:, None]
+        s = s[np.abs(s[:, 0]) > 1e-9]  # the middle one of three has no weight
+        forces = np.maximum(force + amplitude * s, _LEAST_FORCE * force)
+        return forces, 2 / nodes * s * forces / amplitude
 
     def mobility(self, values: Values) -> Differentiated:
         """The mobile fraction."""

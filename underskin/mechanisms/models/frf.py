@@ -20,7 +20,7 @@ from underskin.mechanisms.models.composition import Composition, Prediction
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign, frf_design, largest_offset
 from underskin.mechanisms.models.frf_models import FrfModels
-from underskin.mechanisms.models.nuisances import FRF_NUISANCES
+from underskin.mechanisms.models.nuisances import frf_nuisances
 from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
 from underskin.mechanisms.models.pickup import Pickup, together
 from underskin.mechanisms.models.response import Response, joined
@@ -28,7 +28,7 @@ from underskin.recordings.conditions import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices, Mask, to_si
 
-_NUISANCE_STRETCH = 1.06  # the thickness' bounds
+_ROOM = 1.01  # beyond the thickness' bounds
 FAINT = 1e-12  # of the largest response, below which a recording has no direction
 _QUANTITIES = 6  # of a linear layer's contact
 
@@ -47,11 +47,11 @@ class FrfModel:
         beside: Sequence[Mechanism] = (),
     ) -> None:
         """Work out everything that no parameter changes; σ with room for the mechanisms `beside` as well."""
-        self._composition = Composition(mechanisms, conditions, "frf", FRF_NUISANCES)
+        self._composition = Composition(mechanisms, conditions, "frf", frf_nuisances(conditions.skin))
         self.names = tuple(mechanism.name for mechanism in mechanisms)
         self.parameters = self._composition.parameters
         self.mechanisms = self._composition.mechanisms
-        fields = {field for mechanism in mechanisms for field in mechanism.needs_fields}
+        fields = {field for mechanism in mechanisms for field in (*mechanism.needs_fields, *mechanism.reads_fields)}
         fields |= {"id" for mechanism in mechanisms if mechanism.tells_recordings_apart}
         neighbours = any(mechanism.needs_neighbours for mechanism in mechanisms)
         self.design = design = frf_design(conditions, fields, neighbours=neighbours)
@@ -64,7 +64,8 @@ class FrfModel:
         self.poisson_ratio = skin.poisson_ratio
         room = (*mechanisms, *beside)
         further = max((mechanism.largest_offset for mechanism in room), default=0.0)
-        stretch = _NUISANCE_STRETCH * max((mechanism.largest_stretch for mechanism in room), default=1.0)
+        bounds = max(max(1 / entry.low, entry.high) for entry in self.parameters if entry.name == "thickness")
+        stretch = _ROOM * bounds * max((mechanism.largest_stretch for mechanism in room), default=1.0)
         reached = min(PROFILE_END, stretch * largest_offset(design, further) / self.thickness)
         self.sigma = offset_sigma(table, self.sensor_radius / self.thickness, stretch, reached)
         self.needs_stiffness = any(mechanism.needs_stiffness for mechanism in mechanisms)

@@ -3,6 +3,7 @@ thickness; of a curve its modulus and where its contact begins.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,8 +25,24 @@ YOUNGS_MODULUS = Parameter(
     "youngs_modulus", "-", 0.9, 1.1, Normal(0.0, 0.02), "log", limit=1.0, reason=_DECLARED_MODULUS
 )
 THICKNESS = Parameter("thickness", "-", 0.95, 1.05, Normal(0.0, 0.01), "log", limit=1.0, reason=_DECLARED_THICKNESS)
-FRF_NUISANCES = (D33, YOUNGS_MODULUS, THICKNESS)
+_LEAST_SD = 1e-4  # of a factor on a value that is declared to be exact
+_BOUNDS = 5.0  # standard deviations
 _WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared
+
+
+def frf_nuisances(skin: SkinDescription) -> tuple[Parameter, ...]:
+    """d33, and the factors on the declared modulus and thickness, within the skin's tolerances where it states them."""
+    off = skin.tolerances
+    if off is None:
+        return D33, YOUNGS_MODULUS, THICKNESS
+    return D33, _within(YOUNGS_MODULUS, off.youngs_modulus_percent), _within(THICKNESS, off.thickness_percent)
+
+
+def _within(factor: Parameter, percent: float) -> Parameter:
+    sd = max(percent / 100, _LEAST_SD)
+    reach = float(np.exp(_BOUNDS * sd))
+    reason = f"the skin's tolerances: declared within {percent:g} %"
+    return replace(factor, low=1 / reach, high=reach, prior=Normal(0.0, sd), reason=reason)
 
 
 def modulus_parameter(skin: SkinDescription, estimates: Sequence[float]) -> Parameter:

@@ -4,13 +4,19 @@ The table's bottom profile, averaged over the sensor's disc at its offset, is ta
 L^(1/3), log(rT/h) and e/h. To it may be added what a linear layer of another transmission or a pressure of another
 shape puts there, by its Hankel integral (underskin/physics/hankel_transform.py):
 
-    σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)].
+    σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)],
+
+where the bracket is what finite strain adds under Hertz' pressure. In contact with the layer itself, the correction of
+the contact table (tables/contact.h5) stands in its place.
 
 A contact beyond the table is reported in `inside`. Beyond the table's L it is continued along the tangent, beyond its
 a/h along the tangent over 1/a², as which the pressure under a wide contact falls (on the axis within 3 % up to a/h =
 4.2); beyond the profile's end, r/h = 8, the stress is 0 (below 1e-6 of its peak).
 """
 
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -19,6 +25,7 @@ from scipy.special import j0
 from underskin.autodiff import Differentiated, as_columns, chain, contiguous, unfilled
 from underskin.mechanisms.models.cubic_basis import CubicBasis
 from underskin.physics.contact_curves import CurveGrid
+from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask
 
@@ -31,33 +38,103 @@ _WAVENUMBER_END, _NODES_PER_TURN = 24.0, 4  # M decays as e^(−k)
 PANEL = 16  # wave numbers in each of several equal panels
 
 
+@dataclass(frozen=True)
+class _Splines:
+    """A tensor product of cubic splines in a/h, L^(1/3), ln(rT/h) and e/h; 0 beyond `end` of the last.
+
+    Attributes: `coefficients` (a/h, L^(1/3), ln(rT/h), e/h); `bases` of these axes.
+    """
+
+    coefficients: Floats
+    bases: tuple[CubicBasis, CubicBasis, CubicBasis, CubicBasis]
+    end: float
+
+    @cached_property
+    def ends(self) -> Floats:
+        """The lowest and highest value along each axis (4, 2)."""
+        ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
+        ends[3, 1] = self.end
+        return ends
+
+    @cached_property
+    def axes(self) -> list[Floats]:
+        """Knots and cubics of each axis in turn."""
+        return [part for basis in self.bases for part in (basis.knots, basis.cubics)]
+
+    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
+        """Which contacts lie inside; the others are continued."""
+        return np.asarray((a_over_h <= self.ends[0, 1]) & (cbrt_load <= self.ends[1, 1]))
+
+    def at(
+        self,
+        contact: Indices,
+        a_over_h: Differentiated,
+        cbrt_load: Differentiated,
+        rt_over_h: Differentiated,
+        offset: Differentiated,
+    ) -> Differentiated:
+        """Values at rows (…, rows) of these contacts (rows,) and offsets e/h (…, rows)."""
+        from underskin.mechanisms.models.sigma_kernel import table_sigma
+
+        variables = self._within(a_over_h), cbrt_load, rt_over_h, offset
+        points = np.broadcast_shapes(*(variable.value.shape[:-1] for variable in variables))
+        result = unfilled(len(offset.slopes), (*points, len(contact)))
+        columns = [array for variable in (*variables, result) for array in as_columns(variable)]
+        table_sigma(self.coefficients, self.ends, *self.axes, contact, *columns)
+        return result
+
+    def _within(self, a_over_h: Differentiated) -> Differentiated:
+        """a/h, beyond the end e replaced by e (3 − (e/a)²)/2: the tangent there is then one over 1/a²."""
+        end = self.ends[0, 1]
+        beyond = np.maximum(a_over_h.value / end, 1.0)
+        if (beyond == 1.0).all():
+            return a_over_h
+        value = np.where(beyond > 1.0, end * (1.5 - 0.5 * beyond**-2), a_over_h.value)
+        return chain(value, (beyond**-3, a_over_h))
+
+
 class OffsetSigma:
-    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h)."""
+    """σ(a/h, L^(1/3), rT/h, e/h) around one rT/h, for offsets up to `largest_offset` (in h).
+
+    Attributes: `hertz`, σ of the table; `end`, the largest offset e/h that has a place, beyond which σ is 0.
+    """
 
     def __init__(self, table: SigmaTable, rt_over_h: float, stretch: float, largest_offset: float) -> None:
         """Tabulate for rT/h up to `stretch` times larger or smaller; takes hundredths to tenths of a second."""
-        offsets = _SPACING * np.arange(-_MIRRORED, int(np.ceil(largest_offset / _SPACING)) + _MIRRORED + 1)
+        count = int(np.ceil(largest_offset / _SPACING)) + 2 * _MIRRORED + 1
+        offsets = np.asarray(_SPACING * (np.arange(count) - _MIRRORED), dtype=np.float64)
         rho_nodes = max(5, 1 + int(np.ceil(2 * np.log(stretch) / np.log(_RHO_RATIO))))
-        rho = rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes)
+        rho = np.asarray(rt_over_h * np.geomspace(1 / stretch, stretch, rho_nodes), dtype=np.float64)
         radii = np.arange(0.0, min(PROFILE_END, offsets[-1] + rho[-1]) + _SPACING / 2, _SPACING)
         radii = np.append(radii, radii[-1] + _SPACING * np.arange(1, 4)) if len(radii) < 4 else radii
-        a, x = table.contact_axes
         along = CubicBasis(radii)
-        self.bases = of_a, of_x, of_rho, of_offset = [CubicBasis(np.asarray(at)) for at in (a, x, np.log(rho), offsets)]
+        self._of_rho, self._of_offset = of_rho, of_offset = CubicBasis(np.log(rho)), CubicBasis(offsets)
+        self.end = min(float(offsets[-1]), PROFILE_END)
         # Splines and averages are all linear: the smaller arrays are turned into coefficients before their product
-        profile = of_x.coefficients(of_a.coefficients(table.profile_over(radii), 1), 2)
         average = np.stack([_disc_averages(along, np.abs(offsets), ratio) for ratio in rho])
-        average = of_offset.coefficients(of_rho.coefficients(average, 0), 1)
-        self._table: Floats = np.ascontiguousarray(np.tensordot(profile, average, (0, 2)))
-        self._ends = np.array([[basis.nodes[0], basis.nodes[-1]] for basis in self.bases])
-        self._ends[3, 1] = self.end
-        self._axes = [part for basis in self.bases for part in (basis.knots, basis.cubics)]
-        self._turns = float(offsets[-1] + rho[-1] + a[-1])
+        self._radii, self._average = radii, of_offset.coefficients(of_rho.coefficients(average, 0), 1)
+        self.hertz = self._splines(*table.contact_axes, table.profile_over(radii))
+        self._turns = float(offsets[-1] + rho[-1] + table.contact_axes[0][-1])
+
+    def _splines(self, a_over_h: Floats, cbrt_load: Floats, profile: Floats) -> _Splines:
+        """The disc averages of a profile (a, L^(1/3), radii)."""
+        of_a, of_x = CubicBasis(a_over_h), CubicBasis(cbrt_load)
+        coefficients = of_x.coefficients(of_a.coefficients(profile, 0), 1)
+        coefficients = np.ascontiguousarray(np.tensordot(coefficients, self._average, (2, 2)))
+        return _Splines(coefficients, (of_a, of_x, self._of_rho, self._of_offset), self.end)
 
     @cached_property
-    def _strained(self) -> Floats:
-        """What finite strain adds: the first coefficient over L^(1/3) is the value at L = 0, and splines sum to 1."""
-        return np.ascontiguousarray(self._table - self._table[:, :1])
+    def hertz_strain(self) -> _Splines:
+        """What finite strain adds under Hertz' pressure: the first coefficient over L^(1/3) is the value at L = 0, and
+        splines sum to 1."""
+        table = self.hertz.coefficients
+        return replace(self.hertz, coefficients=np.ascontiguousarray(table - table[:, :1]))
+
+    @cached_property
+    def contact_strain(self) -> _Splines:
+        """What finite strain adds in contact with the linear layer."""
+        table = load_contact()
+        return self._splines(*table.contact_axes, table.profile_over(self._radii))
 
     @cached_property
     def _wavenumbers(self) -> tuple[Floats, Floats]:
@@ -77,54 +154,13 @@ class OffsetSigma:
     def _bessel(self) -> Floats:
         """J0(k e) k/3 with the weights of the integral, as functions of the offset (functions, k)."""
         k, weight = self._wavenumbers
-        bessel = j0(np.multiply.outer(k, self.bases[3].nodes)) * (weight * k / 3)[:, None]
-        return np.ascontiguousarray(self.bases[3].coefficients(bessel, 1).T)
+        bessel = j0(np.multiply.outer(k, self._of_offset.nodes)) * (weight * k / 3)[:, None]
+        return np.ascontiguousarray(self._of_offset.coefficients(bessel, 1).T)
 
     @cached_property
     def contact_grid(self) -> CurveGrid:
         """The grid of contacts with a layer whose pressures' transforms are at this object's wavenumbers."""
         return CurveGrid(self.wavenumber)
-
-    def contains(self, a_over_h: Floats, cbrt_load: Floats) -> Mask:
-        """Which contacts the table holds; the others are continued."""
-        return np.asarray((a_over_h <= self.bases[0].nodes[-1]) & (cbrt_load <= self.bases[1].nodes[-1]))
-
-    @property
-    def end(self) -> float:
-        """The largest offset e/h that has a place; beyond it σ is 0."""
-        return min(float(self.bases[3].nodes[-1]), PROFILE_END)
-
-    def at(
-        self,
-        contact: Indices,
-        a_over_h: Differentiated,
-        cbrt_load: Differentiated,
-        rt_over_h: Differentiated,
-        offset: Differentiated,
-        *,
-        strained: bool,
-    ) -> Differentiated:
-        """σ of the table at rows (…, rows) of these contacts (rows,) and offsets e/h (…, rows).
-
-        `strained`: less its own value at L = 0, which is what finite strain adds.
-        """
-        from underskin.mechanisms.models.sigma_kernel import table_sigma
-
-        variables = self._within(a_over_h), cbrt_load, rt_over_h, offset
-        points = np.broadcast_shapes(*(variable.value.shape[:-1] for variable in variables))
-        result = unfilled(len(offset.slopes), (*points, len(contact)))
-        columns = [array for variable in (*variables, result) for array in as_columns(variable)]
-        table_sigma(self._strained if strained else self._table, self._ends, *self._axes, contact, *columns)
-        return result
-
-    def _within(self, a_over_h: Differentiated) -> Differentiated:
-        """a/h, beyond the table's end e replaced by e (3 − (e/a)²)/2: the tangent there is then one over 1/a²."""
-        end = self.bases[0].nodes[-1]
-        beyond = np.maximum(a_over_h.value / end, 1.0)
-        if (beyond == 1.0).all():
-            return a_over_h
-        value = np.where(beyond > 1.0, end * (1.5 - 0.5 * beyond**-2), a_over_h.value)
-        return chain(value, (beyond**-3, a_over_h))
 
     def linear_at(self, transforms: Floats, contact: Indices, offset: Floats, points: tuple[int, ...]) -> Floats:
         """Hankel integrals of transforms p̂ · M · 2 J1(kρ)/(kρ) (quantities, …, contacts, k) of these contacts (rows,)
@@ -134,8 +170,8 @@ class OffsetSigma:
         whole = np.empty((len(transforms) + 1, *points, len(contact)))
         linear_sigma(
             self._bessel,
-            self._ends[3],
-            *self._axes[6:],
+            self.hertz.ends[3],
+            *self.hertz.axes[6:],
             contact,
             contiguous(transforms.reshape(len(transforms), -1, *transforms.shape[-2:])),
             contiguous(offset.reshape(-1, offset.shape[-1])),

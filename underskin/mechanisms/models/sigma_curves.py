@@ -1,7 +1,8 @@
 """σ at points beside the contacts, from the table alone or from the linear layer at hand plus finite strain.
 
 The table serves Hertz' pressure on a bonded incompressible layer. Where a mechanism changes the pressure's shape or the
-layer, σ = linear(p̂, M; a, e) + [table(a, L, e) − table(a, 0, e)], with the transform of the pressure
+layer, σ = linear(p̂, M; a, e) + what finite strain adds, in contact with a half space [table(a, L, e) − table(a, 0, e)],
+in contact with the layer itself the correction of the contact table; with the transform of the pressure
 
     p̂ = s p̂_sphere + (1 − s) p̂_punch,
 
@@ -18,7 +19,7 @@ from underskin.autodiff import Differentiated, as_columns, chain, contiguous, un
 from underskin.mechanisms.models.contact_stage import PressedContacts
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.off_centre_response import PANEL, OffsetSigma
-from underskin.physics.contact_curves import LARGEST_A_OVER_H, ContactCurves
+from underskin.physics.contact_curves import ContactCurves
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.hankel_transform import disc_average
 from underskin.physics.skin import INCOMPRESSIBLE
@@ -46,17 +47,18 @@ class SigmaOfContacts:
         self.rho = sensor_radius / contacts.thickness
         a, x = _spheres(contacts) if pressed is None else (pressed.a_over_h, pressed.cbrt_load)
         self._variables = [a, x, self.rho]
-        self.inside = sigma.contains(a.value, x.value)
+        self._splines = sigma.hertz
         self._linear: Floats | None = None
         if pressed is not None and (layer is not None or not as_in_the_table(contacts)):
             self._linear, further = _transforms(sigma.wavenumber, contacts, pressed, self.rho.value, layer)
             self._variables += further
-            self.inside = self.inside & (a.value < LARGEST_A_OVER_H)
+            self._splines = sigma.hertz_strain if layer is None else sigma.contact_strain
+        self.inside = self._splines.contains(a.value, x.value)
 
     def at(self, contact: Indices, offset: Differentiated) -> Differentiated:
         """σ (…, points) at these offsets e/h from these contacts (points,)."""
         a, x, rho, *further = self._variables
-        sigma = self._sigma.at(contact, a, x, rho, offset, strained=self._linear is not None)
+        sigma = self._splines.at(contact, a, x, rho, offset)
         if self._linear is None:
             return sigma
         points = sigma.value.shape[:-1]
