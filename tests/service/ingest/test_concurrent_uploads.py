@@ -77,7 +77,7 @@ class Watch:
             self.memory_mb.append(family_mb(self._server.process.pid))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 @pytest.mark.alone
 def test_many_large_uploads_at_once(tmp_path: Path) -> None:
     content = table(1)

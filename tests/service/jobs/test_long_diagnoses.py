@@ -80,6 +80,7 @@ def state(store: Database, diagnosis_id: str) -> str:
     return str(store.read(diagnoses.find, diagnosis_id).state)
 
 
+@pytest.mark.soak
 def test_short_diagnoses_do_not_wait_for_long_ones(store: Database, monkeypatch: pytest.MonkeyPatch) -> None:
     """With one worker that is at a long one, and another long one before them in the queue."""
     for name, seconds in (("_LONG_S", 0.3), ("_SHORT_S", 1.0), ("_POLL_S", 0.05), ("_BEAT_S", 0.05)):

@@ -52,6 +52,7 @@ def test_bodies_at_once_take_bounded_memory(server: Server) -> None:
     assert all(headers["retry-after"] for status, headers, _ in answers if status == 503)
 
 
+@pytest.mark.soak
 def test_room_is_free_again_once_they_are_answered(server: Server) -> None:
     for _ in range(11):
         with begun(server, 7) as connection:

@@ -39,6 +39,7 @@ def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
     return float(x), float(y)
 
 
+@pytest.mark.soak
 def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visit) -> None:
     page = lab.page
     page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))

@@ -51,6 +51,7 @@ def compared(visitor: Visit, skin: str, width: int, figures: int) -> Page:
     return page
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
 def test_a_skin_before_and_after_and_the_sensor_that_changed(visitor: Visit, server: Server, width: int) -> None:
     skin = f"aged{width}"

@@ -23,6 +23,7 @@ def fits_and_is_accessible(visitor: Visit) -> None:
         visitor.require_accessible()
 
 
+@pytest.mark.soak
 def test_a_design_is_pinned_and_the_other_one_moves_beside_it(visitor: Visit) -> None:
     page = visitor.page
     visitor.go("/design")

@@ -15,6 +15,7 @@ from tests.support.store_server import Server
 _OF_PLOT = "document.querySelector('#figure-frf-of-sensor .plot').data"
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, WIDTHS))
 def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(visitor: Visit, server: Server, width: int) -> None:
     page = visitor.page

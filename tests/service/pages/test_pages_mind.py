@@ -10,6 +10,7 @@ from tests.support.diagnosed import asked, diagnosed, report, resonant
 from tests.support.store_server import Server, campaign
 
 
+@pytest.mark.soak
 def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(visitor: Visit, server: Server) -> None:
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()

@@ -63,6 +63,7 @@ def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dic
     visitor.require_accessible()
 
 
+@pytest.mark.soak
 def test_the_next_experiment_is_planned_within_the_reader_s_rig(
     patient: Visit, diagnosing: Server, diagnosis_id: str
 ) -> None:

@@ -15,6 +15,7 @@ def sent_to(server: Server, skin: str, *names: str) -> list[str]:
     return [sent(server, campaign(name, sensors=1), skin) for name in names]
 
 
+@pytest.mark.soak
 def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(visitor: Visit, server: Server) -> None:
     page = visitor.page
     sent_to(server, "alone", "the only one")

@@ -29,6 +29,7 @@ def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Ser
     assert len(campaigns_of(server, "one-bad")) == 1
 
 
+@pytest.mark.soak
 def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(visitor: Visit, server: Server) -> None:
     page = visitor.page
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG, skin="shaker")

@@ -47,6 +47,7 @@ def counted(server: int) -> Iterator[list[int]]:
         counting.join()
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     "paths", first(1, [["/0/frf.csv", "/0/traces.csv"], ["?file={}"], ["?first=1"], ["/0/frf.xlsx"]])
 )

@@ -168,6 +168,7 @@ def test_a_withdrawal_says_who(tmp_path: Path) -> None:
         assert told["entries"][0]["excluded_from"] == "Maria"
 
 
+@pytest.mark.soak
 def test_an_import_into_a_skin_put_away_brings_it_back(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
     def listed() -> list[str]:
         return [entry["id"] for entry in elsewhere.http.get("/v1/skins").json()["skins"]]

@@ -217,6 +217,7 @@ def whole(servers: Callable[[str], Server]) -> bytes:
     return server.http.get("/v1/skins/palm/export").content
 
 
+@pytest.mark.soak
 def test_of_a_file_that_was_tampered_with_nothing_is_kept(whole: bytes, elsewhere: Server, tmp_path: Path) -> None:
     """Nor of what is no export."""
     file = tmp_path / "palm.h5"
