@@ -19,7 +19,12 @@ from underskin.mechanisms.base import Mechanism, Values
 from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxing, relaxing_on_stage
 from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
-from underskin.mechanisms.models.nuisances import THICKNESS, contact_point, modulus_parameter, required_modulus
+from underskin.mechanisms.models.nuisances import (
+    contact_point,
+    modulus_parameter,
+    required_modulus,
+    thickness_parameter,
+)
 from underskin.mechanisms.models.sphere_contact import (
     Layers,
     Sphere,
@@ -189,7 +194,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
         contact_points.append(contact_point(entry.id, begins, _CONTACT_SD * span, _CONTACT_BOUND * span))
     if refused is not None and not estimates:
         raise refused
-    thickness = [] if skin.thickness_mm is None else [THICKNESS]
+    thickness = [] if skin.thickness_mm is None else [thickness_parameter(skin)]
     if not estimates:
         required_modulus(skin)
     return [modulus_parameter(skin, estimates), *thickness, *contact_points]

@@ -35,7 +35,13 @@ def frf_nuisances(skin: SkinDescription) -> tuple[Parameter, ...]:
     off = skin.tolerances
     if off is None:
         return D33, YOUNGS_MODULUS, THICKNESS
-    return D33, _within(YOUNGS_MODULUS, off.youngs_modulus_percent), _within(THICKNESS, off.thickness_percent)
+    return D33, _within(YOUNGS_MODULUS, off.youngs_modulus_percent), thickness_parameter(skin)
+
+
+def thickness_parameter(skin: SkinDescription) -> Parameter:
+    """The factor on the declared thickness."""
+    off = skin.tolerances
+    return THICKNESS if off is None else _within(THICKNESS, off.thickness_percent)
 
 
 def _within(factor: Parameter, percent: float) -> Parameter:
