@@ -1,6 +1,8 @@
-"""Effect of finite strain on the stress on the base: interpolates the coefficients that `finite_strain_solve` stores.
+"""Effect of finite strain on the stress on the base: interpolates the coefficients that two solvers store.
 
 Δ(k; a/h, x) = c1 x + c2 x² + c3 x³ + c4 x⁴ with x = L^(1/3), L = F/(R² E): a cubic spline over a/h, 0 at a/h = 0.
+`finite_strain_solve` prescribes the Hertz pressure as a dead load; `contact_strain_solve` presses a sphere, which
+takes most of that back, and a is that of the linear layer's contact under the same force.
 """
 
 from functools import lru_cache
@@ -13,19 +15,19 @@ from rig.errors import RigError
 from rig.layer import RIM, WAVENUMBERS, Floats
 
 LARGEST_LOAD = 0.1  # L
-WIDEST = 3.2  # a/h
-_DATA = Path(__file__).with_name("finite_strain.npz")
+DEAD_PRESSURE, SPHERE = "finite_strain", "contact_strain"
+WIDEST = {DEAD_PRESSURE: 3.2, SPHERE: 2.6}  # a/h
 
 
-@lru_cache(maxsize=1)
-def _curve() -> CubicSpline:
-    with np.load(_DATA) as data:
+@lru_cache
+def _curve(law: str) -> CubicSpline:
+    with np.load(Path(__file__).with_name(f"{law}.npz")) as data:
         assert data["rim"] == RIM
         radii, coefficients = data["a_over_h"], data["coefficients"].astype(np.float64)
     return CubicSpline(np.append(0.0, radii), np.concatenate([0 * coefficients[:1], coefficients]))
 
 
-def added_spectrum(a_over_h: Floats, load: Floats) -> Floats:
+def added_spectrum(a_over_h: Floats, load: Floats, law: str = DEAD_PRESSURE) -> Floats:
     """Addition Δ of finite strain to the spectrum p̂ M.
 
     Parameters
@@ -34,6 +36,8 @@ def added_spectrum(a_over_h: Floats, load: Floats) -> Floats:
         Contact radius over thickness.
     load : ndarray, (rows,)
         Load parameter L.
+    law : str
+        `DEAD_PRESSURE` or `SPHERE`.
 
     Returns
     -------
@@ -44,13 +48,14 @@ def added_spectrum(a_over_h: Floats, load: Floats) -> Floats:
     RigError
         Where a contact or a load is beyond what was solved.
     """
-    if np.any(a_over_h > WIDEST):
-        raise RigError("contact radius", f"{np.max(a_over_h):.3g} h", f"must be at most {WIDEST} h: lower preload_n")
+    widest = WIDEST[law]
+    if np.any(a_over_h > widest):
+        raise RigError("contact radius", f"{np.max(a_over_h):.3g} h", f"must be at most {widest} h: lower preload_n")
     if np.any(load > LARGEST_LOAD):
         allowed = f"must be at most {LARGEST_LOAD}: lower preload_n, or a larger indenter_radius_mm"
         raise RigError("load parameter F/(R²E)", float(np.max(load)), allowed)
     powers = np.cbrt(load)[:, None] ** np.arange(1, 5)
-    known = np.einsum("rp,rpk->rk", powers, _curve()(a_over_h))
+    known = np.einsum("rp,rpk->rk", powers, _curve(law)(a_over_h))
     added = np.zeros((len(known), len(WAVENUMBERS)))
     added[:, : known.shape[1]] = known
     return added

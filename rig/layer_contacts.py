@@ -2,7 +2,9 @@
 
 Base model: half-space Hertz radius a³ = 3FR(1 − ν²)/(4E), Hertz pressure of that radius, the bonded layer with finite
 strain. Effects change the modulus first (error, creep, stiffening with the contact strain), then contact and pressure
-(layer, adhesion), then the layer's own transmission (ν, glue line).
+(layer, adhesion), then the layer's own transmission (ν, glue line). What finite strain adds is that of the Hertz
+pressure as a dead load, with the layer's contact that of a sphere in true contact; both of the bonded incompressible
+layer.
 """
 
 import math
@@ -85,7 +87,8 @@ class LayerContacts:
         nu = self.layer.poisson_ratio
         load = self.force / (self.radius**2 * self.effective_modulus) * (0.75 / (1 - nu**2)) ** 2
         linear = self._pressure(alpha, scaled) * self.layer.transmission(WAVENUMBERS)
-        return linear + finite_strain.added_spectrum(alpha, load)
+        law = finite_strain.SPHERE if "layered_contact" in self.on else finite_strain.DEAD_PRESSURE
+        return linear + finite_strain.added_spectrum(alpha, load, law)
 
     @cached_property
     def stiffness(self) -> Floats:
