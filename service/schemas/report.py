@@ -94,6 +94,14 @@ class ReportFinding(BaseModel):
     statement: str = Field(description="The finding in words.")
 
 
+class Idealised(BaseModel):
+    """A law without a free parameter, with even odds beside its absence."""
+
+    name: str = Field(description="Its name.")
+    probability: float = Field(description="Posterior that it is there, summed over the answers.")
+    effect_percent: float | None = Field(description="What it changes of the response, root mean square [%].")
+
+
 class Power(BaseModel):
     """What the campaign could have seen of a mechanism."""
 
@@ -172,6 +180,9 @@ class Report(BaseModel):
     presence: list[PresentGroup] = Field(description="Groups of mechanisms, the most probable first.")
     unnamed: UnnamedLaw | None = Field(description="Of `unexplained`: the law that describes the misfit best.")
     alternatives: list[Alternative] = Field(description="Other answers, the most probable first.")
+    idealised: list[Idealised] | None = Field(
+        default=None, description="Laws without a free parameter that declared facts say and the base model leaves out."
+    )
     not_identifiable: list[NotIdentifiable] = Field(description="What these recordings cannot tell.")
     findings: list[ReportFinding] = Field(description="What looks wrong in the data, or limits the answer.")
     fit: Fit | None = Field(description="How much better the recordings are described; null of several campaigns.")

@@ -135,3 +135,20 @@ def test_physics_that_would_not_show_stands_beside_the_value_to_quote(table: Sig
     percent = entry["reason"].partition("d33 would then be ")[2].partition(" too large")[0]
     assert float(percent.removesuffix(" %")) > 100 * (found["d33"]["high"] / found["d33"]["value"] - 1)
     assert f"provided that no interface slip ({percent}) hides" in found["statement"]
+
+
+def test_a_law_that_declared_facts_say_stands_among_the_idealised(table: SigmaTable) -> None:
+    """Whether the base shows under the contact is told where it is wide, and left at even odds where it is narrow."""
+    narrow, wide = (
+        whole_report(
+            campaign(Made(spheres_mm=(4.0,), preloads_n=preloads, thickness_mm=h), table),
+            table,
+            *beside("layered_contact"),
+        )
+        for preloads, h in (((0.05, 0.1, 0.2), 6.0), ((1.0, 1.5, 2.0), 2.0))
+    )
+    (little,), (much,) = (report["idealised"] for report in (narrow, wide))
+    assert little["name"] == much["name"] == "layered_contact"
+    assert little["effect_percent"] < 1 < much["effect_percent"]
+    assert 0.3 < little["probability"] < 0.7
+    assert much["probability"] < 0.05  # the campaign is made by the base model, whose contact is a half space's

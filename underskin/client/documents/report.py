@@ -32,6 +32,20 @@ class Alternative(Document):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class Idealised(Document):
+    """A law without a free parameter, with even odds beside its absence."""
+
+    name: str
+    """Its name."""
+
+    probability: float
+    """Posterior that it is there, summed over the answers."""
+
+    effect_percent: float | None
+    """What it changes of the response, root mean square [%]."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LocatedAxis(Document):
     """Whether the misfit depends on one axis, such as the preload."""
 
@@ -278,6 +292,9 @@ class Report(Document):
 
     alternatives: tuple[Alternative, ...]
     """Other answers, the most probable first."""
+
+    idealised: tuple[Idealised, ...] | None
+    """Laws without a free parameter that declared facts say and the base model leaves out."""
 
     not_identifiable: tuple[NotIdentifiable, ...]
     """What these recordings cannot tell."""

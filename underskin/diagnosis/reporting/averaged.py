@@ -14,7 +14,7 @@ from underskin.diagnosis.inference.unseen import beside
 from underskin.diagnosis.reporting.law_level import law_levels
 from underskin.diagnosis.reporting.numbers import mixture_quantile, place_of, rounded
 from underskin.diagnosis.selection.answers import Answer, Search
-from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS
+from underskin.diagnosis.selection.priors import SHOWS, UNSEEN_ODDS, declared_laws
 from underskin.units import Floats
 
 _COUNTS = 0.003  # of the probability, below which an answer is left out of averages
@@ -142,8 +142,10 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         known = {frozenset(one.explanation.names) for one in search.answers if one.explanation is not None}
         others = [name for name in problem.lines.mechanisms.named if {name, *explanation.names} not in known]
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
-        more = [beside(problem, explanation, name, "d33") for name in others if name not in explanation.names]
-        several += [found.times(odds * _as_unseen(found)) for found in more if found is not None]
+        for name in others:
+            found = None if name in explanation.names else beside(problem, explanation, name, "d33")
+            if found is not None:  # what declared facts say is as probable as its absence, and counts as it fits
+                several.append(found if name in declared_laws(problem.lines) else found.times(odds * _as_unseen(found)))
     mixture = together(several)
     mixture = mixture.times(1 / float(mixture.share.sum()))
     levels = law_levels(problem, explanation)

@@ -30,6 +30,7 @@ from underskin.diagnosis.reporting.caveats import not_tried, reserves, slips
 from underskin.diagnosis.reporting.confirming import confirming
 from underskin.diagnosis.reporting.fit_warnings import fit_warnings
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
+from underskin.diagnosis.reporting.idealised import idealised
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
 from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
 from underskin.diagnosis.reporting.sensors_apart import sensors_apart
@@ -167,6 +168,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "presence": [],
             "unnamed": None,
             "alternatives": [],
+            "idealised": [],
             "not_identifiable": [],
             "findings": findings,
             "fit": None,
@@ -248,6 +250,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         "presence": present,
         "unnamed": law,
         "alternatives": _alternatives(search),
+        "idealised": idealised(search, problem, shown),
         "not_identifiable": d33.not_identifiable(diagnosis.confounded),
         "findings": findings,
         "fit": fit,
