@@ -141,11 +141,11 @@ def test_a_law_that_declared_facts_say_stands_among_the_idealised(table: SigmaTa
     """Whether the base shows under the contact is told where it is wide, and left at even odds where it is narrow."""
     narrow, wide = (
         whole_report(
-            campaign(Made(spheres_mm=(4.0,), preloads_n=preloads, thickness_mm=h), table),
+            campaign(Made(spheres_mm=spheres, preloads_n=preloads, thickness_mm=h), table),
             table,
             *beside("layered_contact"),
         )
-        for preloads, h in (((0.05, 0.1, 0.2), 6.0), ((1.0, 1.5, 2.0), 2.0))
+        for spheres, preloads, h in (((4.0,), (0.05, 0.1, 0.2), 6.0), ((3.0, 8.0), (0.3, 1.0, 2.0), 2.0))
     )
     (little,), (much,) = (report["idealised"] for report in (narrow, wide))
     assert little["name"] == much["name"] == "layered_contact"

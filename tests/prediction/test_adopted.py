@@ -167,6 +167,16 @@ def test_a_pick_up_with_the_parameters_of_an_older_report_serves() -> None:
     assert model.of_lines == [mechanism.name for mechanism in model.mechanisms] == ["timing_delay"]
 
 
+def test_the_edge_under_its_older_name_serves() -> None:
+    """A finite amplitude was a mechanism of its own: the same law, with the mobile fraction as `edge_mobility`."""
+    campaign = recorded({"moving_contact_edge": (0.6,)})
+    older = report({"moving_contact_edge": (0.6,)})
+    older["mechanisms"] = [{"name": "amplitude_nonlinearity", "parameters": [{"name": "edge_mobility", "value": 0.6}]}]
+    found = adopted(older, campaign).response(campaign, table())
+    np.testing.assert_allclose(D33 * found.value, lines(campaign), rtol=1e-12)
+    assert Known(["amplitude_nonlinearity"]).without == ("moving_contact_edge",)
+
+
 def test_curves_make_no_model_of_charge() -> None:
     with pytest.raises(InvalidInput, match="kind frf"):
         adopted(report({}), indentation_campaign())
