@@ -9,6 +9,7 @@ import pytest
 from tests.support.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
 from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE, compose
+from underskin.mechanisms.registry import Known
 from underskin.prediction.adopted_model import AdoptedModel, adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
