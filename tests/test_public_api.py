@@ -41,6 +41,7 @@ PUBLIC = {
     "load_table",
     "predict",
     "read_file",
+    "solved_contact",
     "transmission",
 }
 

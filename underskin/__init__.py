@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from underskin.recordings.conditions import Conditions, SkinDescription, frf_conditions
     from underskin.recordings.reading import Reading, read_file
     from underskin.surrogate.sigma_table import SigmaTable, load_table
+    from underskin.surrogate.solved_contact import solved_contact
 
 __version__ = "0.1.0"
 
@@ -62,6 +63,7 @@ __all__ = [
     "load_table",
     "predict",
     "read_file",
+    "solved_contact",
     "transmission",
 ]
 
@@ -89,6 +91,7 @@ _MODULES = {
     "load_table": "surrogate.sigma_table",
     "predict": "prediction.forward_model",
     "read_file": "recordings.reading",
+    "solved_contact": "surrogate.solved_contact",
     "transmission": "prediction.pressed_skin",
 }
 

@@ -81,7 +81,8 @@ def add_columns_route(
         if is_workbook(content_type):
             async with READING_SLOTS:
                 return await asyncio.to_thread(work)
-        if len(body) <= _INLINE_BYTES and b"adopted" not in body:  # that model is in the store
+        # An adopted model is in the store, and the solved contact is tabulated once.
+        if len(body) <= _INLINE_BYTES and b"adopted" not in body and b"solved" not in body:
             return work()
         return await heavy_answers.in_turn(work)
 
@@ -146,11 +147,12 @@ def preferred(accept: str) -> str:
 
 
 def respond(answer: Columns, accept: str, *, one: bool = False) -> Response:
-    """The answer in the form that the client asked for; beside CSV, model and table travel as headers."""
+    """The answer in the form that the client asked for; beside CSV, model, contact and table travel as headers."""
     form = preferred(accept)
     if form == NPZ:
         return Response(answer.npz(), media_type=NPZ)
     if form != CSV:
         return Response(answer.json_of_one() if one else answer.json(), media_type="application/json")
     table = {} if answer.table_sha256 is None else {"Underskin-Table-SHA256": answer.table_sha256}
-    return Response(answer.csv(), media_type=CSV, headers={"Underskin-Model": answer.model, **table})
+    contact = {"Underskin-Contact": answer.shared["contact"]} if "contact" in answer.shared else {}
+    return Response(answer.csv(), media_type=CSV, headers={"Underskin-Model": answer.model, **contact, **table})

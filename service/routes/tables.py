@@ -11,5 +11,5 @@ router = APIRouter(prefix="/v1", tags=["tables"])
 
 @router.get("/tables", operation_id="tables", summary="The tables in use")
 async def tables(request: Request, table: Table) -> Tables:
-    """The tables of σ and influence that answers are computed from, and the contact table, which is reference data."""
+    """The tables that answers are computed from: of σ, of influence, and of the solved contact."""
     return usecase.tables(table, request.app.state.settings.tables)

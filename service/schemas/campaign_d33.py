@@ -6,7 +6,7 @@ from pydantic import BaseModel, Field
 
 # Raised whenever the fields below, or the figures that underskin.inversion and underskin.recordings put into them,
 # change: what an earlier version kept is then computed anew.
-ANSWER_VERSION = 4
+ANSWER_VERSION = 5
 
 
 class D33Value(BaseModel):
@@ -98,6 +98,11 @@ class D33(BaseModel):
     )
     array_relative: D33Value | None = Field(
         description="The same without `declared_percent`: to compare it with its sensors and with other dates."
+    )
+    array_solved: D33Value | None = Field(
+        default=None,
+        description="`array` in contact with the layer itself, where it differs from the paper's by more than 1 %; "
+        "null elsewhere, and under an adopted model, whose diagnosis decided.",
     )
     sensor_spread_percent: Scatter | None = Field(description="Standard deviation of d33 over the sensors.")
     gain_scatter_percent: Scatter | None = Field(description="Standard deviation of a recording's gain.")

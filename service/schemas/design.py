@@ -5,6 +5,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.magnitudes import Representable
+from underskin.surrogate.contact_model import ContactName
 
 Axis = Literal["a_over_h", "rt_over_h", "load_parameter"]
 
@@ -33,6 +34,11 @@ class DesignRequest(BaseModel):
         le=100,
         description="How much less a sensor between two loads must read than those on both sides, over the reading of "
         "a load above a sensor, so that they are told apart [%].",
+    )
+    contact: ContactName = Field(
+        default="solved",
+        description="`solved`: spheres in frictionless contact with the layer itself. `paper`: Hertz' pressure of a "
+        "half space, as a dead load.",
     )
     units_checked: bool = Field(default=False, description="Accept magnitudes that look like a slip of units.")
 
@@ -73,12 +79,13 @@ class ResponseAnswer(BaseModel):
 class DesignAnswer(BaseModel):
     """What the skin tells of a load, and of two."""
 
-    table_sha256: str = Field(description="SHA-256 of the σ table.")
+    contact: ContactName = Field(description="As asked.")
+    table_sha256: str = Field(description="SHA-256 of the table of this contact.")
     status: Literal["ok", "out_of_domain"] = Field(
         description="`out_of_domain`: outside the table, and null what depends on it; never extrapolated."
     )
     limit: str | None = Field(description="Which limit it exceeds, with the highest force; null where it is `ok`.")
-    contact_radius_mm: float = Field(description="Radius a of the contact, Hertz [mm].")
+    contact_radius_mm: float = Field(description="Radius a of the contact [mm].")
     a_over_h: float = Field(description="a/h.")
     rt_over_h: float = Field(description="rT/h.")
     load_parameter: float = Field(description="L = F/(R²E).")

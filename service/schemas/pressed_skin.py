@@ -14,6 +14,7 @@ from service.schemas.columns import (
     Positive,
     Signed,
 )
+from underskin.surrogate.contact_model import ContactName
 
 FIELDS = ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio", "indenter_radius_mm", "preload_n")
 ADOPTED_COLUMNS = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "load_cycles")
@@ -22,7 +23,7 @@ ADOPTED_COLUMNS = ("offset_x_mm", "offset_y_mm", "dynamic_force_n", "dwell_s", "
 class PressedSkinColumns(ColumnsRequest):
     """A skin pressed by a sphere."""
 
-    constants: ClassVar[frozenset[str]] = frozenset({"model", "skin_id", "sensor", "units_checked"})
+    constants: ClassVar[frozenset[str]] = frozenset({"model", "contact", "skin_id", "sensor", "units_checked"})
 
     thickness_mm: Positive = Field(description="Thickness h of the layer over the sensors [mm].")
     youngs_modulus_mpa: Positive = Field(description="Young's modulus E of the layer [MPa].")
@@ -34,8 +35,14 @@ class PressedSkinColumns(ColumnsRequest):
     preload_n: Positive = Field(description="Static force F [N].")
     model: Literal["paper", "adopted"] = Field(
         default="paper",
-        description="`paper`: Hertz radius on a half space, σ of the bonded finite-strain layer, flat FRF. "
-        "`adopted`: the model adopted for `skin_id`.",
+        description="`paper`: the base model, its contact by `contact`, flat FRF. `adopted`: the model adopted for "
+        "`skin_id`.",
+    )
+    contact: ContactName = Field(
+        default="paper",
+        description="`paper`: Hertz radius on a half space, whose pressure the bonded layer bears as a dead load, with "
+        "finite strain. `solved`: a sphere in frictionless contact with that layer itself, with finite strain. "
+        "Left out with model adopted: the diagnosis decided.",
     )
     skin_id: str | None = Field(default=None, description="The skin whose adopted model is meant.")
     sensor: str | None = Field(
@@ -65,8 +72,12 @@ class PressedSkinAnswer(AnswerInColumns):
     """What reaches the sensor, row by row."""
 
     model_id: str | None = Field(default=None, description="The adopted model that answered; only with that model.")
+    contact: ContactName | None = Field(
+        default=None, description="As asked; left out with an adopted model, whose diagnosis decided."
+    )
     contact_radius_mm: list[float | None] = Field(
-        description="Hertz contact radius a; null with an adopted model, whose contact may be another [mm]."
+        description="Contact radius a: Hertz' radius, or that of the solved contact; null with an adopted model, whose "
+        "contact may be another [mm]."
     )
     a_over_h: list[float | None] = Field(description="a/h; null with an adopted model [-].")
     rt_over_h: list[float | None] = Field(description="rT/h [-].")

@@ -4,6 +4,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from service.schemas.columns import AnswerInColumns, FindingModel
 from underskin.array_stress.request import MOST_CONTACTS
+from underskin.surrogate.contact_model import ContactName
 
 
 class _StressModel(BaseModel):
@@ -66,12 +67,18 @@ class StressRequest(_StressModel):
         default=None, min_length=1, max_length=MOST_CONTACTS, description="Spheres, none over another."
     )
     pressure_map: StressMap | None = Field(default=None, description="Instead of contacts: a map of pressure.")
+    contact: ContactName = Field(
+        default="paper",
+        description="`paper`: small strain. `solved`: with what finite strain adds beneath each contact, on a bonded "
+        "layer of ν 0.5. In both the contacts are the layer's own.",
+    )
     units_checked: bool = Field(default=False, description="Accept magnitudes that look like a slip of units.")
 
 
 class StressAnswer(AnswerInColumns):
     """One entry a sensor, in the order of the request."""
 
+    contact: ContactName = Field(description="As asked.")
     sensor: list[str] = Field(description="The sensor's id.")
     x_mm: list[float] = Field(description="Its centre [mm].")
     y_mm: list[float] = Field(description="Its centre [mm].")

@@ -113,6 +113,8 @@ def model_asked_for(store: Database, request: PressedSkinColumns) -> ModelInForc
     """The model that a request asks for."""
     if request.skin_id is None:
         raise required("skin_id", "is required with model adopted")
+    if "contact" in request.model_fields_set:
+        raise conflicting("contact", request.contact, "must be left out with model adopted: the diagnosis decided")
     return model_in_force(store, request.skin_id)
 
 

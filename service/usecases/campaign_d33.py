@@ -31,8 +31,9 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
             "chosen_by_user": zone.chosen_by_user,
             "left_out_hz": [float(line) for line in zone.left_out_hz],
         },
-        "array": None if array is None else _d33(array)[0],
-        "array_relative": None if relative is None else _d33(relative)[0],
+        "array": of_array(array),
+        "array_relative": of_array(relative),
+        "array_solved": None,
         "sensor_spread_percent": _scatter(inversion.spread, 100.0),
         "gain_scatter_percent": _scatter(inversion.gain, 100.0),
         "position_scatter_mm": _scatter(inversion.position, 1e3),
@@ -56,6 +57,11 @@ def of_inversion(inversion: "Inversion") -> dict[str, Any]:
         ],
         "findings": [finding.sentence for finding in inversion.findings],
     }  # fmt: skip
+
+
+def of_array(estimate: "Estimate | None") -> dict[str, float | None] | None:
+    """The fields of `D33Value` of one d33."""
+    return None if estimate is None else _d33(estimate)[0]
 
 
 def of_moduli(recordings: Sequence["RecordingModulus"]) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:

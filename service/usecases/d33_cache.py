@@ -14,8 +14,8 @@ from service.schemas.campaign_d33 import D33
 from service.store import AnyRow, Conflict, Database, StorageFailed, StoreMoved, campaigns, inversions
 from service.usecases import figure_data
 from service.usecases.adopted_models import ModelInForce, model_in_force
-from service.usecases.campaign_d33 import of_inversion, of_moduli
-from underskin import InvalidInput
+from service.usecases.campaign_d33 import of_array, of_inversion, of_moduli
+from underskin import InvalidInput, TableError
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -32,6 +32,7 @@ _NONE: dict[str, Any] = {
     **dict.fromkeys(
         ("band", "array", "array_relative", "sensor_spread_percent", "gain_scatter_percent", "position_scatter_mm")
     ),
+    "array_solved": None,
     "declared_percent": None,
     "status": "none",
     "sensors": [],
@@ -164,6 +165,8 @@ def _derived(
     campaign, left_out = store.read(_used, row)
     document = {"campaign_id": row.id, "table_sha256": table.sha256, **_PAPER}
     document, inversion, failed = _computed(document, campaign, table, band_hz, left_out)
+    if inversion is not None:
+        document["array_solved"] = _array_solved(campaign, table, band_hz, inversion)
     numbers = figure_data.numbers(campaign, inversion, spreads)
     if band_hz is None and not failed:
         _keep(store, row, soon, inversions.keep, table.sha256, document, numbers, of_sensors(document))
@@ -228,6 +231,19 @@ def _inverted(
         return {**_NONE, **told}, None
     left_out = [{"recording": None, "reason": left.sentence} for left in inversion.left_out]
     return {**of_inversion(inversion), "moduli": moduli, "left_out": left_out + without_modulus}, inversion
+
+
+def _array_solved(
+    campaign: Campaign, table: SigmaTable, band_hz: BandHz | None, inversion: "Inversion"
+) -> dict[str, float | None] | None:
+    """The field of `D33`; null too where the contact table cannot be read, which the log says."""
+    from underskin.inversion.other_contact import array_d33_by_other
+
+    try:
+        return of_array(array_d33_by_other(campaign, table, band_hz, inversion))
+    except TableError as error:
+        logger.error("no d33 by the solved contact: %s", error)
+        return None
 
 
 def _keep(store: Database, row: AnyRow, soon: bool, change: Callable[..., None], *derived: Any) -> None:

@@ -5,10 +5,13 @@ from typing import Any
 import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignRequest, ResponseAnswer, SweepAnswer
+from service.usecases.tables import contact_asked_for
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.answers import limits_of_pressed
+from underskin.prediction.other_contact import OTHER, STATED
+from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import checked, to_lab
@@ -16,12 +19,25 @@ from underskin.units import checked, to_lab
 
 def design_of(table: SigmaTable, asked: DesignRequest) -> Design:
     """The design that is asked for; raises InvalidInput."""
+    skin, indenter, preload = _pressed(asked)
+    require_apart(asked.pitch_mm, asked.sensor_radius_mm)
+    contact = contact_asked_for(table, asked.contact)
+    return design(contact, skin, indenter, preload, asked.pitch_mm * 1e-3, asked.dip_percent / 100)
+
+
+def _pressed(asked: DesignRequest) -> tuple[Skin, Indenter, float]:
     given = {name: getattr(asked, name) for name in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm")}
     skin = Skin.from_lab(**given, units_checked=asked.units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=asked.indenter_radius_mm, units_checked=asked.units_checked)
-    preload = float(checked("preload_n", asked.preload_n, units_checked=asked.units_checked))
-    require_apart(asked.pitch_mm, asked.sensor_radius_mm)
-    return design(table, skin, indenter, preload, asked.pitch_mm * 1e-3, asked.dip_percent / 100)
+    return skin, indenter, float(checked("preload_n", asked.preload_n, units_checked=asked.units_checked))
+
+
+def other_sigma(table: SigmaTable, asked: DesignRequest, answer: DesignAnswer) -> float | None:
+    """σ by the other contact model, where it differs by more than 1 %; None elsewhere."""
+    if answer.sigma is None:
+        return None
+    sigma = float(transmission(contact_asked_for(table, OTHER[asked.contact]), *_pressed(asked)).sigma)
+    return sigma if abs(sigma / answer.sigma - 1) > STATED else None
 
 
 def require_apart(pitch_mm: float, sensor_radius_mm: float) -> None:
@@ -35,13 +51,15 @@ def design_answer(table: SigmaTable, asked: DesignRequest, designed: Design) -> 
     """A design in lab units."""
     contact, resolution = designed.contact, designed.resolution
     given = {"preload_n": np.array(asked.preload_n), "poisson_ratio": np.array(INCOMPRESSIBLE)}
-    limits = limits_of_pressed(table, contact, given, contact.inside, 1)
+    contact_model = contact_asked_for(table, asked.contact)
+    limits = limits_of_pressed(contact_model, contact, given, contact.inside, 1)
     frf = None
     if asked.d33_pc_per_n is not None:
         d33 = checked("d33_pc_per_n", asked.d33_pc_per_n, units_checked=asked.units_checked)
         frf = _number(to_lab("frf_pc_per_n", contact.frf(d33)))
     return DesignAnswer(
-        table_sha256=table.sha256,
+        contact=contact_model.name,
+        table_sha256=contact_model.sha256,
         limit=None if limits is None else limits[0],
         status="ok" if bool(contact.inside) else "out_of_domain",
         contact_radius_mm=float(to_lab("contact_radius_mm", contact.contact_radius)),

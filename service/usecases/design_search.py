@@ -1,8 +1,9 @@
 """Which skins resolve what is asked: thickness, sensor radius and pitch, searched over the domain of the table.
 
 What is asked for is the two-point separation of `POST /v1/design`: from which distance on two equal contacts show as
-two wherever the row of sensors lies. A thin layer spreads the stress less, and a fine pitch samples it more densely; a
-sensor cannot be wider than the pitch, and two contacts cannot be nearer than where they touch.
+two wherever the row of sensors lies. The contacts are with the layer itself (`solved`). A thin layer spreads the stress
+less, and a fine pitch samples it more densely; a sensor cannot be wider than the pitch, and two contacts cannot be
+nearer than where they touch.
 """
 
 from collections.abc import Sequence
@@ -13,16 +14,19 @@ import numpy as np
 
 from service.schemas.design import DesignAnswer, DesignDemand, DesignRequest
 from service.usecases.design import design_answer, design_of
+from service.usecases.tables import contact_asked_for
 from service.usecases.two_point import largest_pitch
 from underskin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import resolution
+from underskin.surrogate.contact_model import ContactModel, ContactName
 from underskin.surrogate.off_centre_sigma import sigma_beside
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 THICKNESS_MM, RADIUS_MM = (0.2, 20.0), (0.1, 10.0)  # what is searched, within the table
 _THICKNESSES, _RADII = 8, 6
+_CONTACT: ContactName = "solved"
 NEARLY = 0.95  # of the largest pitch: nearly as few sensors
 _INSIDE = 1.0001  # times the thinnest layer of the table
 # Beyond what it misses by, by how much at most in a step, and how often, a pitch is reduced until it meets the demand.
@@ -31,11 +35,11 @@ _FINER, _STEP, _TIMES = 0.995, 0.95, 8
 
 @dataclass(frozen=True)
 class Region:
-    """Contact radius [mm], thicknesses (n,) and sensor radii (m,) [mm]; of each pair (m, n) the largest pitch [mm], to
-    about 5 %, that resolves what is asked by the calculation of `POST /v1/design`, NaN where none does, and charge over
-    force [pC/N], NaN outside the table."""
+    """Contact radii (n,) on thicknesses (n,), and sensor radii (m,) [mm]; of each pair (m, n) the largest pitch [mm],
+    to about 5 %, that resolves what is asked by the calculation of `POST /v1/design`, NaN where none does, and charge
+    over force [pC/N], NaN outside the table."""
 
-    contact_radius_mm: float
+    contact_radius_mm: Floats
     thickness_mm: Floats
     sensor_radius_mm: Floats
     largest_pitch_mm: Floats
@@ -80,22 +84,31 @@ def _region(table: SigmaTable, demand: DesignDemand) -> Region:
     force = float(checked("preload_n", demand.preload_n))
     d33 = float(checked("d33_pc_per_n", demand.d33_pc_per_n))
     any_skin = Skin.from_lab(thickness_mm=1.0, youngs_modulus_mpa=demand.youngs_modulus_mpa, sensor_radius_mm=1.0)
-    contact = float(to_lab("contact_radius_mm", transmission(table, any_skin, indenter, force).contact_radius))
-    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * contact / table.domain["a_over_h"][1]))
+    contact_model = contact_asked_for(table, _CONTACT)
+    thinnest = max(THICKNESS_MM[0], _rounded_up(_INSIDE * _thinnest_mm(contact_model, any_skin, indenter, force)))
     thickness = _steps(thinnest, max(demand.resolution_mm, 2 * thinnest), THICKNESS_MM[1], _THICKNESSES)
     radii = _steps(RADIUS_MM[0], max(0.28 * demand.resolution_mm, 2 * RADIUS_MM[0]), RADIUS_MM[1], _RADII)
     h, radius = np.meshgrid(to_si("thickness_mm", thickness), to_si("sensor_radius_mm", radii))
     skin = Skin(h, any_skin.youngs_modulus, radius, any_skin.poisson_ratio)
-    reached = transmission(table, skin, indenter, force)
+    reached = transmission(contact_model, skin, indenter, force)
+    contact = to_lab("contact_radius_mm", reached.contact_radius[0])
+    numbers = reached.small_strain_a_over_h, reached.rt_over_h, reached.load_parameter
+    apart = (2 * contact <= demand.resolution_mm) & (4 * radii[:, None] <= demand.resolution_mm)
     pitch = np.full(h.shape, np.nan)
-    if demand.resolution_mm >= 2 * contact:
-        for place in zip(*np.nonzero(reached.inside & (4 * radii[:, None] <= demand.resolution_mm)), strict=True):
-            point = [float(part[place]) for part in (reached.a_over_h, reached.rt_over_h, reached.load_parameter)]
-            offset, response = sigma_beside(table, *point)
-            if np.isfinite(response).all():
-                finest = 2 * float(radii[place[0]])
-                pitch[place] = _largest_pitch_mm(offset * float(h[place]), response, finest, contact, demand)
+    for place in zip(*np.nonzero(reached.inside & apart), strict=True):
+        offset, response = sigma_beside(contact_model, *(float(part[place]) for part in numbers))
+        if np.isfinite(response).all():
+            finest, touching = 2 * float(radii[place[0]]), float(contact[place[1]])
+            pitch[place] = _largest_pitch_mm(offset * float(h[place]), response, finest, touching, demand)
     return Region(contact, thickness, radii, pitch, np.asarray(to_lab("frf_pc_per_n", reached.frf(d33))))
+
+
+def _thinnest_mm(contact_model: ContactModel, skin: Skin, indenter: Indenter, force: float) -> float:
+    """The thickness at which a/h is the largest of the table."""
+    most = np.array(contact_model.domain["a_over_h"][1])
+    over_cube, _ = contact_model.load_over_cube(most)
+    plane_modulus = skin.youngs_modulus / (1 - skin.poisson_ratio**2)
+    return float(to_lab("thickness_mm", np.cbrt(force * indenter.radius / (plane_modulus * over_cube * most**3))))
 
 
 def _largest_pitch_mm(
@@ -170,8 +183,9 @@ def _binding(
     finest = float(region.thickness_mm[0]), RADIUS_MM[0], 2 * RADIUS_MM[0]
     if not np.isfinite(region.frf_pc_per_n).any():
         return [f"The table of σ: {_forward(table, demand, *finest)[1].limit}"]
-    if demand.resolution_mm < 2 * region.contact_radius_mm:
-        touching = f"at this force two of them touch at {2 * region.contact_radius_mm:.3g} mm, whatever the skin"
+    touch = 2 * float(region.contact_radius_mm.min())
+    if demand.resolution_mm < touch:
+        touching = f"at this force two of them touch at {touch:.3g} mm on the thinnest skin, and farther off on others"
         return [
             f"The contacts themselves: {touching}. A smaller sphere, less force or a stiffer layer has smaller ones"
         ]

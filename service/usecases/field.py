@@ -5,23 +5,26 @@ from typing import Any
 import numpy as np
 
 from service.schemas.field import FieldAnswer, FieldQuery
+from service.usecases.tables import contact_asked_for
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.answers import lab_columns
 from underskin.prediction.stress_field import field_from_lab
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_lab
 
-_OPTIONS = {"r_points", "depth_points", "units_checked"}
+_OPTIONS = {"contact", "r_points", "depth_points", "units_checked"}
 
 
 def field_answer(table: SigmaTable, asked: FieldQuery) -> FieldAnswer:
     """The stress that is asked for; raises InvalidInput."""
     given = asked.model_dump(exclude=_OPTIONS)
-    field = field_from_lab(table, given, asked.r_points, asked.depth_points, units_checked=asked.units_checked)
+    contact = contact_asked_for(table, asked.contact)
+    field = field_from_lab(contact, given, asked.r_points, asked.depth_points, units_checked=asked.units_checked)
     inside, tabulated = bool(field.contact.inside[0]), asked.poisson_ratio == INCOMPRESSIBLE
     return FieldAnswer(
         model="layer" if tabulated else "linear_layer",
-        table_sha256=table.sha256,
+        contact=contact.name,
+        table_sha256=contact.sha256,
         status="ok" if inside else "out_of_domain",
         limit=field.limits[0],
         **{name: _number(np.ravel(column)[0]) for name, column in lab_columns(field.contact).items()},

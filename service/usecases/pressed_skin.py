@@ -10,6 +10,7 @@ from service.schemas.columns import Columns
 from service.schemas.pressed_skin import ADOPTED_COLUMNS, FIELDS, D33Columns, FrfColumns, PressedSkinColumns
 from service.store import Database
 from service.usecases.adopted_models import model_asked_for, press, require_paper
+from service.usecases.tables import contact_asked_for
 from underskin.errors import ErrorCode, InvalidInput, conflicting, out_of_range, required
 from underskin.physics import charge_response
 from underskin.prediction import answers, plausibility
@@ -28,16 +29,20 @@ def frf(table: SigmaTable, store: Database, request: FrfColumns) -> Columns:
     if request.model == "adopted":
         return _adopted_frf(table, store, request)
     require_paper(request)
+    contact = contact_asked_for(table, request.contact)
     columns = _sent(request, *FIELDS, "d33_pc_per_n")
     count = rows(columns)
     with _all_refused(columns, request.units_checked):
-        answer = answers.frf(table, columns, request.units_checked)
+        answer = answers.frf(contact, columns, request.units_checked)
     frequency = _asked_lines(request)
-    results, shared = dict(answer.columns), {}
+    results = dict(answer.columns)
+    shared: dict[str, Any] = {"contact": contact.name}
     if frequency is not None:
         results |= _flat_spectra(frequency, results["frf_pc_per_n"], count)
         shared["frequency_hz"] = frequency
-    return Columns(count, request.model, table.sha256, answer.inside, results, shared, frequency, limits=answer.limits)
+    return Columns(
+        count, request.model, contact.sha256, answer.inside, results, shared, frequency, limits=answer.limits
+    )
 
 
 @contextmanager
@@ -93,17 +98,18 @@ def d33(table: SigmaTable, store: Database, request: D33Columns) -> Columns:
     if request.model == "adopted":
         return _adopted_d33(table, store, request)
     require_paper(request)
+    contact = contact_asked_for(table, request.contact)
     measured = _plateau(request) if request.frf_pc_per_n is None else _given(request)
     columns = _sent(request, *FIELDS) | measured
     count = _rows(request, columns)
     with _all_refused(columns, request.units_checked):
-        answer = answers.d33(table, columns, request.units_checked)
+        answer = answers.d33(contact, columns, request.units_checked)
     plateau = {name: answer.columns[name] for name in ("frf_pc_per_n", "frf_uncertainty_pc_per_n")}
     results = {name: answer.columns[name] for name in _RESULTS}
     leading = {name: values for name, values in answer.columns.items() if name not in plateau | results}
-    shared = {"findings": [finding.in_columns() for finding in answer.findings]}
+    shared = {"contact": contact.name, "findings": [finding.in_columns() for finding in answer.findings]}
     columns = {**leading, **plateau, **measured, **results}
-    return Columns(count, request.model, table.sha256, answer.inside, columns, shared, limits=answer.limits)
+    return Columns(count, request.model, contact.sha256, answer.inside, columns, shared, limits=answer.limits)
 
 
 def _rows(request: D33Columns, columns: Mapping[str, Floats]) -> int:

@@ -10,9 +10,11 @@ import numpy as np
 from service.problems import Refusal
 from service.schemas.tables import TableAxis, TableEntry, Tables
 from underskin.errors import TableError
+from underskin.surrogate.contact_model import ContactModel, ContactName
 from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
 from underskin.surrogate.influence_table import INFLUENCE_TABLE, InfluenceTable, load_influence
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 
 _Table = TypeVar("_Table")
 _NAMED = {"schema", "data_sha256", "default"}
@@ -28,6 +30,14 @@ def influence_table(folder: Path) -> InfluenceTable:
 def _contact_table(folder: Path) -> ContactTable:
     """The finite-strain contact; raises Refusal 503 with the reason when the table cannot be read."""
     return _read(load_contact, folder / CONTACT_TABLE)
+
+
+def contact_asked_for(table: SigmaTable, name: ContactName) -> ContactModel:
+    """The contact of this name; raises Refusal 503 with the reason when its table cannot be read."""
+    try:
+        return contact_model(table, name)
+    except TableError as error:
+        raise Refusal(503, str(error)) from error
 
 
 def _read(load: Callable[[Path], _Table], file: Path) -> _Table:

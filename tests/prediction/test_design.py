@@ -99,14 +99,14 @@ def answered(http: httpx.Client, **changed: Any) -> dict[str, Any]:
 
 
 def test_the_service_answers_in_lab_units(http: httpx.Client, server_url: str) -> None:
-    found, answer = of(), answered(http, d33_pc_per_n=14.0)
+    found, answer = of(), answered(http, d33_pc_per_n=14.0, contact="paper")
     assert answer["resolution_mm"] == pytest.approx(1e3 * found.resolution.width)
     assert answer["two_point_separation_mm"] == pytest.approx(1e3 * found.resolution.separation)
     assert answer["response_between_percent"] == pytest.approx(100 * found.resolution.between)
     assert answer["frf_pc_per_n"] == pytest.approx(7.3957, abs=1e-3)
     assert [sweep["axis"] for sweep in answer["sweeps"]] == ["a_over_h", "rt_over_h", "load_parameter"]
     with underskin.Client(server_url) as client:
-        assert client.design(**PROTOTYPE)["sigma"] == answer["sigma"]
+        assert client.design(**PROTOTYPE, contact="paper")["sigma"] == answer["sigma"]
 
 
 def test_what_the_table_does_not_reach_is_null(http: httpx.Client) -> None:

@@ -9,8 +9,8 @@ from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 
 LARGEST_SCATTER_MM = 0.3
@@ -35,7 +35,7 @@ class Rig:
     frequency_hz: Floats | None = None
 
 
-def simulate(table: SigmaTable, rig: Rig, random: np.random.Generator) -> Campaign:
+def simulate(table: ContactModel, rig: Rig, random: np.random.Generator) -> Campaign:
     """Every sensor under every indenter and preload, once."""
     sensors = tuple(
         Sensor(id=f"s{number}", x_mm=PITCH_MM * (number % 8), y_mm=PITCH_MM * (number // 8))
@@ -57,7 +57,12 @@ def simulate(table: SigmaTable, rig: Rig, random: np.random.Generator) -> Campai
     true = np.hypot(commanded + missed[0], missed[1])
     rho = float(skin.rt_over_h)
     sigma = positioned_sigma(
-        table, felt.a_over_h, rho, felt.load_parameter, true / rig.thickness_mm, LARGEST_SCATTER_MM / rig.thickness_mm
+        table,
+        felt.small_strain_a_over_h,
+        rho,
+        felt.load_parameter,
+        true / rig.thickness_mm,
+        LARGEST_SCATTER_MM / rig.thickness_mm,
     ).sigma
     level = charge_response.frf(rig.d33[number], sigma, rho) * np.exp(random.normal(0, rig.gain, len(design)))
     frequency = np.geomspace(1, 130, 40) if rig.frequency_hz is None else rig.frequency_hz

@@ -1,11 +1,12 @@
 """Charge and mean stress on every sensor of an array: the answer of `POST /v1/stress` and `underskin stress`."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from underskin.array_stress import load_integration as integration
+from underskin.array_stress.finite_strain import finite_strain
 from underskin.array_stress.load_integration import Load, charge
 from underskin.array_stress.request import LoadCase
 from underskin.array_stress.validation import findings, refuse_beside_skin, refuse_coarse, refuse_many, refuse_overlap
@@ -13,7 +14,9 @@ from underskin.errors import Mention, Requirement, out_of_range
 from underskin.findings.finding import Finding
 from underskin.physics.contact_pressure import MOST_A_OVER_H, SpherePressure, sphere_pressures
 from underskin.physics.elastic_layer import Layer, slip
+from underskin.surrogate.contact_table import CONTACT_TABLE
 from underskin.surrogate.influence_table import Influence, InfluenceTable
+from underskin.surrogate.solved_contact import solved_contact
 from underskin.units import Floats, Mask, checked, to_lab, to_si
 
 
@@ -62,6 +65,11 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
     pressures = _pressures(request, thickness)
     loads = [_contacts_load(request, pressures, thickness)] if request.contacts else _map_loads(request, thickness)
     total = integration.array_stress(influence, thickness, sensors, loads)
+    radii = np.array([pressure.radius for pressure in pressures])
+    if request.contact == "solved":
+        added = finite_strain(solved_contact(table.path.parent / CONTACT_TABLE), request, sensors)
+        total = replace(total, stress=total.stress + added.stress, error=total.error + added.error)
+        radii = added.contact_radius
     inside = total.inside & np.isfinite(total.stress)
     stress, error = (np.where(inside, values, np.nan) for values in (total.stress, total.error))
     columns = {
@@ -76,7 +84,7 @@ def answer(table: InfluenceTable, request: LoadCase) -> ArrayStress:
         sensors=tuple(sensor.id for sensor in request.sensors),
         inside=inside,
         reach_mm=float(to_lab("x_mm", influence.reach * thickness)),
-        contact_radius_mm=to_lab("x_mm", [pressure.radius for pressure in pressures]),
+        contact_radius_mm=to_lab("x_mm", radii),
         findings=findings(request),
     )
 

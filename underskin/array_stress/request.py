@@ -6,17 +6,19 @@ The skin's fields are named as in a campaign; x runs along its length, y along i
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast, get_args
 
 import numpy as np
 
 from underskin import errors
 from underskin.array_stress import pressure_map
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
+from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import validation as field
 from underskin.recordings.conditions import Sensors
 from underskin.recordings.readers import json_file
 from underskin.recordings.shown_values import shown
+from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
 
 MOST_CONTACTS = 1000
@@ -67,6 +69,12 @@ def _pressure_map(name: str, value: Any, units_checked: bool) -> PressureMap:
     return result
 
 
+def _contact(name: str, value: Any, _: bool) -> ContactName:
+    if value not in get_args(ContactName):
+        raise errors.not_one_of(name, shown(value), get_args(ContactName))
+    return cast(ContactName, value)
+
+
 def _refuse_pull(name: str, pressure: Floats) -> None:
     """Refuse negative cells, and name the first ones."""
     cells = np.argwhere(pressure < 0)
@@ -82,7 +90,8 @@ def _refuse_pull(name: str, pressure: Floats) -> None:
 class LoadCase:
     """A skin, its sensors, and either `contacts` or a `pressure_map`.
 
-    `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; left out: bonded.
+    `glue_stiffness` κ [-]: shear stress at the base over (G/h) times the slip there; left out: bonded. `contact`:
+    `paper`: small strain; `solved`: with what finite strain adds beneath contacts on a bonded incompressible layer.
     """
 
     thickness_mm: field.Declared
@@ -96,6 +105,7 @@ class LoadCase:
     length_mm: field.Declared | None = None
     contacts: Annotated[tuple[LabContact, ...], _contacts] = ()
     pressure_map: Annotated[PressureMap | None, _pressure_map] = None
+    contact: Annotated[ContactName, _contact] = "paper"
 
 
 def read_file(path: str, map_path: str | None = None) -> LoadCase:
@@ -141,4 +151,17 @@ def read_request(document: Any) -> LoadCase:
     if request.contacts and request.youngs_modulus_mpa is None:
         allowed = Requirement("is required with ", Mention("contacts"), ", whose radii depend on it")
         raise errors.required("youngs_modulus_mpa", allowed)
+    if request.contact == "solved":
+        _require_solvable(request)
     return request
+
+
+def _require_solvable(request: LoadCase) -> None:
+    """Raises InvalidInput where the solved contact does not know such loads or such a layer."""
+    if request.pressure_map is not None:
+        raise errors.conflicting("contact", request.contact, "must be 'paper' with a pressure_map: it has no contact")
+    if request.poisson_ratio != INCOMPRESSIBLE:
+        raise errors.out_of_range("poisson_ratio", request.poisson_ratio, "must be 0.5 with contact 'solved'")
+    if request.glue_stiffness is not None:
+        allowed = "must be left out with contact 'solved', which is of a bonded layer"
+        raise errors.conflicting("glue_stiffness", request.glue_stiffness, allowed)

@@ -94,13 +94,14 @@ def findings(request: LoadCase) -> list[Finding]:
         ]
     modulus = request.youngs_modulus_mpa or np.nan
     strained = [(_load_parameter(contact, modulus), i) for i, contact in enumerate(request.contacts)]
+    least = _LINEAR if request.contact == "paper" else np.inf
     slipping = [
         (float(np.hypot(*contact.tangential_force_n)) / contact.normal_force_n, i)
         for i, contact in enumerate(request.contacts)
     ]
     return [
         *_about_sensors(request),
-        *_worst(Reason.LOAD_NOT_LINEAR, "load_parameter", ((load, i) for load, i in strained if load > _LINEAR)),
+        *_worst(Reason.LOAD_NOT_LINEAR, "load_parameter", ((load, i) for load, i in strained if load > least)),
         *_worst(Reason.CONTACT_SLIPS, "ratio", ((ratio, i) for ratio, i in slipping if ratio > 1)),
     ]
 

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from underskin.cli import annotations, changes, diagnose, field, mechanism, other_packages, store, stored, stress, watch
+from underskin.cli.contact_option import Contact, ContactOption
 from underskin.cli.rigs import EstimatorOption, RigOption
-from underskin.errors import UnderskinError
+from underskin.errors import TableError, UnderskinError
 
 if TYPE_CHECKING:
     from underskin.prediction.answers import ComputedColumns
@@ -107,6 +108,7 @@ def frf(
     preload_n: PreloadN = None,
     d33_pc_per_n: Annotated[_Given, _column("Piezoelectric coefficient d33 of the sensor [pC/N].")] = None,
     poisson_ratio: PoissonRatio = None,
+    contact: ContactOption = Contact.PAPER,
     units_checked: UnitsChecked = False,
     input_file: Input = None,
     sheet: Sheet = None,
@@ -116,11 +118,12 @@ def frf(
     given = locals()
     options = {name: given[name] for name in (*_PRESSED_SKIN, "d33_pc_per_n")}
     from underskin.prediction import answers
+    from underskin.surrogate.solved_contact import contact_model
 
-    defaults = {"poisson_ratio": 0.5}
-    _answer(
-        options, defaults, (input_file, sheet), csv, lambda table, columns: answers.frf(table, columns, units_checked)
-    )
+    def compute(table: "SigmaTable", columns: "Mapping[str, Floats]") -> "ComputedColumns":
+        return answers.frf(contact_model(table, contact.value), columns, units_checked)
+
+    _answer(options, {"poisson_ratio": 0.5}, (input_file, sheet), csv, compute)
 
 
 @app.command(no_args_is_help=True)
@@ -135,6 +138,7 @@ def d33(
         _Given, _column("Standard uncertainty of the measured FRF [pC/N]; without it d33 has none.")
     ] = None,
     poisson_ratio: PoissonRatio = None,
+    contact: ContactOption = Contact.PAPER,
     units_checked: UnitsChecked = False,
     input_file: Input = None,
     sheet: Sheet = None,
@@ -159,7 +163,7 @@ def d33(
         _refuse(for_columns, "is for columns; files say it themselves")
         from underskin.cli.invert_files import invert_files
 
-        invert_files(files, rig, estimator, band, figures, together, csv)
+        invert_files(files, rig, estimator, band, figures, together, csv, contact.value)
         return
     only_files = ("rig", "estimator", "band", "figures", "together")
     for_files = [f"--{name}" for name in only_files if given[name] is not None]
@@ -167,10 +171,22 @@ def d33(
 
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
+    from underskin.prediction.other_contact import other_contact
+    from underskin.surrogate.solved_contact import contact_model
 
-    _answer(
-        options, defaults, (input_file, sheet), csv, lambda table, columns: answers.d33(table, columns, units_checked)
-    )
+    def compute(table: "SigmaTable", columns: "Mapping[str, Floats]") -> "ComputedColumns":
+        answer = answers.d33(contact_model(table, contact.value), columns, units_checked)
+        found = answer.columns["d33_pc_per_n"]
+        try:
+            other = other_contact(table, contact.value, columns, found, units_checked=units_checked)
+            sentence = other.sentence
+        except TableError as error:
+            sentence = f"d33 by the other contact is not known: {error}"
+        if sentence:
+            typer.echo(f"underskin: {sentence}", err=True)
+        return answer
+
+    _answer(options, defaults, (input_file, sheet), csv, compute)
 
 
 def _refuse(options: Sequence[str], why: str) -> None:

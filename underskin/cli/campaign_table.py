@@ -35,6 +35,7 @@ class InvertedFile:
     reading: Reading
     inversion: Inversion | InvalidInput
     moduli: Sequence[RecordingModulus]
+    by_other_contact: str = ""  # d33 of the array by it, in words, where it differs
 
     @property
     def title(self) -> str:
@@ -52,6 +53,7 @@ class InvertedFile:
     def notes(self) -> list[str]:
         """What was taken for what, findings in words, and each recording or sensor that is left out."""
         notes = reading_notes(self.reading)
+        notes += [self.by_other_contact] if self.by_other_contact else []
         campaign = self.reading.campaign
         findings = (
             self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.at_reading(campaign)

@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from underskin.cli.contact_option import Contact, ContactOption
+
 
 def _number(meaning: str) -> object:
     return typer.Option(help=meaning, metavar="NUMBER", show_default=False)
@@ -18,6 +20,7 @@ def field(
     poisson_ratio: Annotated[
         float, _number("Poisson's ratio, 0.5 if left out; below, the linear layer at small strain.")
     ] = 0.5,
+    contact: ContactOption = Contact.PAPER,
     r_points: Annotated[int, typer.Option(min=2, help="Distances from the axis.", metavar="COUNT")] = 61,
     depth_points: Annotated[int, typer.Option(min=2, help="Depths, from surface to base.", metavar="COUNT")] = 26,
     units_checked: Annotated[
@@ -41,9 +44,11 @@ def field(
     from underskin.prediction.answers import lab_columns
     from underskin.prediction.stress_field import field_from_lab
     from underskin.surrogate.sigma_table import load_table
+    from underskin.surrogate.solved_contact import contact_model
     from underskin.units import to_lab
 
-    found = field_from_lab(load_table(), given, r_points, depth_points, units_checked=units_checked)
+    model = contact_model(load_table(), contact.value)
+    found = field_from_lab(model, given, r_points, depth_points, units_checked=units_checked)
     r, depth, stress = (
         to_lab(name, values)
         for name, values in (("r_mm", found.r), ("depth_mm", found.depth), ("sigma_zz_mpa", found.sigma_zz[0]))
@@ -53,7 +58,8 @@ def field(
         section = {"depth_mm": np.repeat(depth, r.size), "r_mm": np.tile(r, depth.size), "sigma_zz_mpa": stress.ravel()}
         columns.write_csv(section, found.contact.inside, limits, stress.size)
         return
-    contact = {**{name: np.array(value) for name, value in given.items()}, **lab_columns(found.contact)}
-    error = {"section_error": found.section_error} if poisson_ratio == INCOMPRESSIBLE else {}  # else linear throughout
+    pressed = {**{name: np.array(value) for name, value in given.items()}, **lab_columns(found.contact)}
+    bounded = poisson_ratio == INCOMPRESSIBLE and contact is Contact.PAPER
+    error = {"section_error": found.section_error} if bounded else {}
     base = {**error, "r_mm": r, "sigma_zz_mpa": stress[-1]}
-    columns.write_table({**contact, **base}, found.contact.inside, limits, r.size)
+    columns.write_table({**pressed, **base}, found.contact.inside, limits, r.size)

@@ -10,12 +10,18 @@ from rich.progress import Progress
 
 from underskin.cli.campaign_table import InvertedFile, write_csv, write_tables
 from underskin.cli.rigs import rig_description_in
-from underskin.errors import FileError, InvalidInput, UnderskinError, not_unique, wrong_type
+from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
+from underskin.findings.formatting import significant
 from underskin.inversion.invert import Inversion, invert
+from underskin.inversion.other_contact import array_d33_by_other
+from underskin.prediction.other_contact import OTHER, WORDS
 from underskin.recordings import Reading, elastomer, join, read_file, validation
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
+from underskin.surrogate.contact_model import ContactName
 from underskin.surrogate.sigma_table import SigmaTable, load_table
+from underskin.surrogate.solved_contact import contact_model
+from underskin.units import to_lab
 
 _BandHz = tuple[float, float]
 
@@ -46,6 +52,7 @@ def invert_files(
     figures: Path | None,
     together: str | None,
     as_csv: bool,
+    contact: ContactName,
 ) -> None:
     """Print d33 and moduli of each file, or of all `together`; exit status 2 where one is unreadable or gives neither.
 
@@ -72,7 +79,7 @@ def invert_files(
             readings = [(together, join(together, every))]
         for name, reading in readings:
             with errors.about(name):
-                result = _inverted(name, reading, table, band_hz)
+                result = _inverted(name, reading, table, contact, band_hz)
                 _write_page(result, pages.get(name))
                 inverted.append(result)
     (write_csv if as_csv else write_tables)(inverted)
@@ -90,14 +97,32 @@ def _readings(
             yield str(file), reading
 
 
-def _inverted(name: str, reading: Reading, table: SigmaTable, band_hz: _BandHz | None) -> InvertedFile:
+def _inverted(
+    name: str, reading: Reading, table: SigmaTable, contact: ContactName, band_hz: _BandHz | None
+) -> InvertedFile:
     """The inversion of a campaign, or the reason why there is none, and its moduli."""
     inversion: Inversion | InvalidInput
+    other = ""
     try:
-        inversion = invert(reading.campaign, table, band_hz)
+        inversion = invert(reading.campaign, contact_model(table, contact), band_hz)
+        other = _by_other_contact(reading, table, contact, band_hz, inversion)
     except InvalidInput as error:
         inversion = error
-    return InvertedFile(name, reading, inversion, elastomer.of_campaign(reading.campaign))
+    return InvertedFile(name, reading, inversion, elastomer.of_campaign(reading.campaign), other)
+
+
+def _by_other_contact(
+    reading: Reading, table: SigmaTable, contact: ContactName, band_hz: _BandHz | None, inversion: Inversion
+) -> str:
+    """d33 of the array by it, in words; empty where it is nearly the same."""
+    try:
+        other = array_d33_by_other(reading.campaign, table, band_hz, inversion, contact)
+    except TableError as error:
+        return f"d33 by the other contact is not known: {error}"
+    if other is None:
+        return ""
+    value = significant(float(to_lab("d33_pc_per_n", other.value)), 4)
+    return f"d33 of the array {WORDS[OTHER[contact]]}: {value} pC/N"
 
 
 def _band(text: str) -> _BandHz:

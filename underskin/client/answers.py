@@ -41,8 +41,10 @@ class SigmaAnswer(ServiceAnswer):
 
 @dataclass(frozen=True)
 class PressedSkinAnswer(ServiceAnswer):
-    """Contact and stress on the sensor; units in the names, the others dimensionless."""
+    """Contact and stress on the sensor; units in the names, the others dimensionless. `contact`: `paper` or `solved`;
+    None with an adopted model."""
 
+    contact: str | None
     contact_radius_mm: Floats
     a_over_h: Floats
     rt_over_h: Floats
@@ -80,9 +82,10 @@ class D33Answer(PressedSkinAnswer):
 class StressAnswer(ServiceAnswer):
     """The load on each sensor: id, position, charge with the table's error, and stress (positive in compression).
 
-    `contact_radius_mm`: one entry a contact, none for a map.
+    `contact`: `paper` or `solved`; `contact_radius_mm`: one entry a contact, none for a map.
     """
 
+    contact: str | None
     sensor: tuple[str, ...]
     x_mm: Floats
     y_mm: Floats

@@ -30,6 +30,7 @@ from underskin.client.documents.field import FieldAnswer
 from underskin.client.fleets import Fleets
 from underskin.client.http_session import Session, path_of
 from underskin.client.mechanisms import Mechanisms
+from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
 
 _Answer = TypeVar("_Answer", bound=answers.ServiceAnswer)
@@ -90,11 +91,13 @@ class Client:
         poisson_ratio: ArrayLike = 0.5,
         frequency_hz: ArrayLike | None = None,
         units_checked: bool = False,
+        contact: ContactName | None = None,
         adopted: answers.Adopted | None = None,
     ) -> answers.FrfAnswer:
         """The FRF of a skin under a sphere; `frequency_hz` (a list for all rows) adds spectra.
 
-        `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of the skin.
+        `units_checked` accepts unusual magnitudes; `contact`: `paper` if left out, or `solved`; `adopted` uses the
+        adopted model of the skin.
         """
         return self._columns("frf", answers.FrfAnswer, locals())
 
@@ -114,13 +117,14 @@ class Client:
         frf_im_pc_per_n: ArrayLike | None = None,
         band_hz: tuple[float, float] | None = None,
         units_checked: bool = False,
+        contact: ContactName | None = None,
         adopted: answers.Adopted | None = None,
     ) -> answers.D33Answer:
         """d33 from plateau values `frf_pc_per_n`, or from lines averaged over a band.
 
         For lines give `frequency_hz` (for all rows), `frf_re_pc_per_n` and, if measured, `frf_im_pc_per_n` (rows ×
-        lines), and `band_hz`. `units_checked` accepts unusual magnitudes; `adopted` uses the adopted model of
-        the skin.
+        lines), and `band_hz`. `units_checked` accepts unusual magnitudes; `contact`: `paper` if left out, or
+        `solved`; `adopted` uses the adopted model of the skin.
         """
         return self._columns("d33", answers.D33Answer, locals())
 
@@ -130,16 +134,16 @@ class Client:
         values = {field.name: _field(field.name, document, single=False) for field in fields(answers.StressAnswer)}
         return answers.StressAnswer(**values | {"sensor": tuple(document["sensor"])})
 
-    def design(self, **fields: float) -> DesignAnswer:
+    def design(self, **fields: float | str) -> DesignAnswer:
         """Sensitivity and spatial resolution of a skin's design; `fields` as `POST /v1/design` takes them."""
         return DesignAnswer.of(self._request("POST", "/v1/design", fields))
 
-    def field(self, **fields: float) -> FieldAnswer:
+    def field(self, **fields: float | str) -> FieldAnswer:
         """The stress in a section through the layer under a sphere; `fields` as `GET /v1/field` takes them."""
         return FieldAnswer.of(self._request("GET", f"/v1/field?{urlencode(fields)}"))
 
     def tables(self) -> tuple[answers.TableEntry, ...]:
-        """The tables of the service: σ and influence, which answers are computed from, and contact, reference data."""
+        """The tables of the service that answers are computed from: σ, influence and contact."""
         document = self._request("GET", "/v1/tables")
         return tuple(
             answers.TableEntry(**{**entry, "axes": tuple(answers.TableAxis(**axis) for axis in entry["axes"])})
@@ -188,7 +192,7 @@ class Client:
 # Rows × lines; a single list is one row.
 _LINES = ("frf_re_pc_per_n", "frf_im_pc_per_n")
 # Fields of requests that are no columns.
-_SHARED = (*_LINES, "frequency_hz", "band_hz", "units_checked", "model", "skin_id", "sensor")
+_SHARED = (*_LINES, "frequency_hz", "band_hz", "units_checked", "model", "contact", "skin_id", "sensor")
 
 
 def _array(value: Any) -> Floats:

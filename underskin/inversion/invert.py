@@ -42,8 +42,8 @@ from underskin.recordings.frf.roll_off import roll_off
 from underskin.recordings.frf.stacks import stacked
 from underskin.recordings.physical_limits import excesses
 from underskin.recordings.plausibility import at_reading
+from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices, Mask, to_lab, to_si
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
@@ -132,15 +132,15 @@ class Inversion:
         return replace(self, cells=cells, sensors=self.sensors.wider(relative), campaign_d33=array)
 
 
-def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] | None = None) -> Inversion:
+def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float, float] | None = None) -> Inversion:
     """The d33 of an array, Re FRF / ((3/2) ρ² σ) with ρ = rT/h, from the `frf` recordings of a campaign.
 
     Parameters
     ----------
     campaign : Campaign
         The skin and its recordings.
-    table : SigmaTable
-        σ of a/h, rT/h and the load parameter L.
+    contact_model : ContactModel
+        The σ table, or the solved contact.
     band_hz : (low, high), optional
         The band that Re FRF is averaged over [Hz]; without it the flat zone.
 
@@ -170,11 +170,11 @@ def invert(campaign: Campaign, table: SigmaTable, band_hz: tuple[float, float] |
     zone = flat_zone(frfs, [(item.indenter_radius_mm, item.preload_n) for item in recorded], band_hz)
     level, noise, scatter = band_average(frfs, zone)
     zone = replace(zone, reason=zone.reason + lower_half(frfs, zone, level, noise) + _delayed(delay))
-    if (exchanged := exchanged_values(campaign.skin, recorded, table)) and not campaign.units_checked:
+    if (exchanged := exchanged_values(campaign.skin, recorded, contact_model)) and not campaign.units_checked:
         raise NoD33("preload_n", campaign.name, exchanged[0].statement)
-    contact = _Contact(campaign, recorded, table)
+    contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
-    reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, table)
+    reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
     left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
     if not inside.any():
         raise _none_usable(campaign, left_out)
@@ -254,7 +254,7 @@ class _Contact:
     """What the base model says of each recording's contact; `declared_percent`: standard deviation of its FRF by the
     tolerances of the skin."""
 
-    def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], table: SigmaTable) -> None:
+    def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], contact_model: ContactModel) -> None:
         described = campaign.skin
         assert described.thickness_mm is not None
         assert described.youngs_modulus_mpa is not None
@@ -268,21 +268,21 @@ class _Contact:
         )
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
-        self.transmitted = transmitted = transmission(table, skin, indenter, preload)
+        self.transmitted = transmitted = transmission(contact_model, skin, indenter, preload)
         centres = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in described.sensors}
         offset = [
             np.hypot(*np.subtract(item.position_mm or centres[item.sensor], centres[item.sensor])) for item in recorded
         ]
         self.thickness = thickness = float(skin.thickness)
         self.positioned = positioned_sigma(
-            table,
-            transmitted.a_over_h,
+            contact_model,
+            transmitted.small_strain_a_over_h,
             float(skin.rt_over_h),
             transmitted.load_parameter,
             to_si("thickness_mm", offset) / thickness,
             float(mixed_model.POSITIONS[-1]) / thickness,
         )
-        slopes = frf_gradient(table, skin, indenter, preload, 1.0)
+        slopes = frf_gradient(contact_model, skin, indenter, preload, 1.0)
         size = transmitted.frf(1.0)
         off = described.tolerances or Tolerances()
         changes = (

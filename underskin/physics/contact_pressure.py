@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import legendre, polynomial
 
 from underskin.physics.contact_curves import LARGEST_A_OVER_H, CurveGrid
 from underskin.physics.contact_integral_equation import ContactEquation
@@ -19,6 +19,7 @@ from underskin.physics.elastic_layer import Layer
 from underskin.units import Floats
 
 MOST_A_OVER_H = LARGEST_A_OVER_H
+_PARTS = 40  # Hertz pressures that make up another one
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,21 @@ class SpherePressure:
         x = np.sqrt(1 - t[:, None] ** 2 * (1 - ((1 + v) / 2) ** 2))
         share: Floats = -(t**2) * (legendre.legval(x, legendre.legder(series)) / x @ weight) / 2
         return share
+
+    def hertz_parts(self) -> tuple[Floats, Floats]:
+        """Radii over a and shares of the force of the Hertz pressures that together are this one (parts,).
+
+        By parts, with G of `ring_share` and G(1)/3 = 1 in Hertz theory: p is G(1)/3 of the Hertz pressure of radius a,
+        and −G'(x) x³/3 dx of that of each radius x a.
+        """
+        order = np.arange(self.shape.size)
+        series = np.zeros(2 * order.size - 1)
+        series[::2] = np.sqrt(4 * order + 1) * (-1.0) ** order * self.shape
+        g = -legendre.leg2poly(legendre.legder(series))[1:]
+        x, weight = np.polynomial.legendre.leggauss(_PARTS)
+        x, weight = (1 + x) / 2, weight / 2
+        shares = -polynomial.polyval(x, polynomial.polyder(g)) * x**3 * weight / 3
+        return np.append(x, 1.0), np.append(shares, polynomial.polyval(1.0, g) / 3)
 
 
 def sphere_pressures(

@@ -14,6 +14,7 @@ from underskin.prediction import plausibility
 from underskin.prediction.columns import rows
 from underskin.prediction.domain_limits import Words, in_words, of_numbers, of_pressed
 from underskin.prediction.pressed_skin import Transmission, transmission
+from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask, checked, finite, non_negative, to_lab, to_si
 
@@ -48,12 +49,12 @@ def sigma(table: SigmaTable, given: Mapping[str, Floats], model: SigmaModelName)
     return ComputedColumns({"sigma": answer.sigma, "rel_error": answer.rel_error}, answer.inside, domain, limits)
 
 
-def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
+def frf(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
     """FRF of a sensor under a preloaded sphere, FRF = d33 (3/2) (rT/h)² σ, and what leads to it.
 
     Parameters
     ----------
-    table : the table of σ.
+    contact_model : the σ table, or the solved contact.
     given : columns in lab units by field name: the skin's, the sphere's and `d33_pc_per_n`, of equal length or single.
     units_checked : accept magnitudes that look like a slip of units.
 
@@ -67,18 +68,18 @@ def frf(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     InvalidInput
         Names the field and the row of a value that cannot be used.
     """
-    reached = pressed(table, given, units_checked)
+    reached = pressed(contact_model, given, units_checked)
     d33 = checked("d33_pc_per_n", given["d33_pc_per_n"], units_checked=units_checked)
     frf = to_lab("frf_pc_per_n", reached.frf(d33))
-    return _skin_answer(table, reached, given, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
+    return _skin_answer(contact_model, reached, given, {**lab_columns(reached), "frf_pc_per_n": frf}, frf)
 
 
-def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
+def d33(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> ComputedColumns:
     """d33 of a sensor from the measured plateau of its FRF, d33 = FRF / ((3/2) (rT/h)² σ), and what leads to it.
 
     Parameters
     ----------
-    table : the table of σ.
+    contact_model : the σ table, or the solved contact.
     given : columns in lab units by field name: the skin's, the sphere's, `frf_pc_per_n` and perhaps
         `frf_uncertainty_pc_per_n`, the standard uncertainty; without it that of d33 is NaN.
     units_checked : accept magnitudes that look like a slip of units.
@@ -94,7 +95,7 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
     InvalidInput
         Names the field and the row of a value that cannot be used.
     """
-    reached = pressed(table, given, units_checked)
+    reached = pressed(contact_model, given, units_checked)
     plateau = measured(given)
     value, uncertainty = reached.d33(*(to_si(name, values) for name, values in plateau.items()))
     results = {
@@ -102,7 +103,7 @@ def d33(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> 
         "d33_uncertainty_pc_per_n": to_lab("d33_uncertainty_pc_per_n", uncertainty),
     }
     columns = {**plateau, **lab_columns(reached), **results}
-    answer = _skin_answer(table, reached, given, columns, results["d33_pc_per_n"])
+    answer = _skin_answer(contact_model, reached, given, columns, results["d33_pc_per_n"])
     return replace(answer, findings=plausibility.of_rows(plateau["frf_pc_per_n"], results["d33_pc_per_n"]))
 
 
@@ -125,11 +126,12 @@ def refused(given: Mapping[str, Floats], units_checked: bool) -> list[InvalidInp
     return found
 
 
-def pressed(table: SigmaTable, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
+def pressed(contact_model: ContactModel, given: Mapping[str, Floats], units_checked: bool) -> Transmission:
     """What reaches the sensor of a skin described in lab units; raises InvalidInput."""
     skin = Skin.from_lab(**{name: given[name] for name in _SKIN}, units_checked=units_checked)
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
-    return transmission(table, skin, indenter, checked("preload_n", given["preload_n"], units_checked=units_checked))
+    preload = checked("preload_n", given["preload_n"], units_checked=units_checked)
+    return transmission(contact_model, skin, indenter, preload)
 
 
 def lab_columns(reached: Transmission) -> dict[str, Floats]:
@@ -146,26 +148,28 @@ def lab_columns(reached: Transmission) -> dict[str, Floats]:
 
 
 def _skin_answer(
-    table: SigmaTable,
+    contact_model: ContactModel,
     reached: Transmission,
     given: Mapping[str, Floats],
     columns: Mapping[str, Floats],
     result: Floats,
 ) -> ComputedColumns:
     """A row whose result is not finite is outside, as one that the table does not hold."""
-    domain = f"{_table_domain(table)}, Poisson's ratio 0.5"
+    domain = f"{_table_domain(contact_model)}, Poisson's ratio 0.5"
     inside = reached.inside & np.isfinite(result)
-    return ComputedColumns(columns, inside, domain, limits_of_pressed(table, reached, given, inside, rows(given)))
+    return ComputedColumns(
+        columns, inside, domain, limits_of_pressed(contact_model, reached, given, inside, rows(given))
+    )
 
 
 def limits_of_pressed(
-    table: SigmaTable, reached: Transmission, given: Mapping[str, Floats], inside: Mask, count: int
+    contact_model: ContactModel, reached: Transmission, given: Mapping[str, Floats], inside: Mask, count: int
 ) -> Words | None:
     """Which limit each row of a pressed skin exceeds that is not inside; `given`: preload and Poisson's ratio."""
-    limits = of_pressed(reached, given["preload_n"], table.domain)
+    limits = of_pressed(reached, given["preload_n"], contact_model)
     return in_words(inside, count, limits, given["poisson_ratio"])
 
 
-def _table_domain(table: SigmaTable) -> str:
+def _table_domain(table: ContactModel) -> str:
     symbols = {"a_over_h": "a/h", "rt_over_h": "rT/h", "load_parameter": "L"}
     return ", ".join(f"{symbols[name]} {low:g} to {high:g}" for name, (low, high) in table.domain.items())

@@ -8,6 +8,7 @@ import numpy as np
 
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.prediction.pressed_skin import Transmission
+from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, Mask
 
 OTHER_MODULUS = "Poisson's ratio = {:g}: the table is of incompressible elastomer, 0.5"
@@ -34,16 +35,19 @@ def of_numbers(numbers: Mapping[str, Floats], domain: Domain) -> list[Limit]:
     return [Limit(SYMBOLS[name], numbers[name], *domain[name]) for name in SYMBOLS if name in domain]
 
 
-def of_pressed(reached: Transmission, preload_n: Floats, domain: Domain) -> list[Limit]:
-    """The limits of a skin under a sphere, with the preload at which each is reached: L grows with it, a/h with its
-    cube root."""
+def of_pressed(reached: Transmission, preload_n: Floats, contact_model: ContactModel) -> list[Limit]:
+    """The limits of a skin under a sphere, with the preload at which each is reached."""
+    domain, alpha = contact_model.domain, reached.small_strain_a_over_h
     load, over_h = (domain[name][1] for name in ("load_parameter", "a_over_h"))
     with np.errstate(all="ignore"):
+        at_limit, _ = contact_model.load_over_cube(np.array(over_h))
+        at_rows, _ = contact_model.load_over_cube(alpha)
         most = {
             "load_parameter": preload_n * (load / reached.load_parameter),
-            "a_over_h": preload_n * (over_h / reached.a_over_h) ** 3,
+            "a_over_h": preload_n * (over_h / alpha) ** 3 * (at_limit / at_rows),
         }
-    return [Limit(SYMBOLS[name], getattr(reached, name), *domain[name], most_n=most.get(name)) for name in SYMBOLS]
+    values = {"load_parameter": reached.load_parameter, "a_over_h": alpha, "rt_over_h": reached.rt_over_h}
+    return [Limit(SYMBOLS[name], values[name], *domain[name], most_n=most.get(name)) for name in SYMBOLS]
 
 
 def in_words(

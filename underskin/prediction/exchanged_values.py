@@ -14,7 +14,7 @@ from underskin.findings.finding import Finding
 from underskin.physics import hertz
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.conditions import SkinDescription
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, Mask, to_si
 
 _BEYOND = 0.5  # of the recordings as declared, at the least
@@ -22,7 +22,9 @@ _WITHIN = 0.9  # of the recordings once exchanged, at the least
 _LARGEST_MM = 30.0  # radius of a ball that a laboratory has: beyond it a preload in mN is likelier
 
 
-def exchanged_values(skin: SkinDescription, recorded: Sequence[FrfRecording], table: SigmaTable) -> list[Finding]:
+def exchanged_values(
+    skin: SkinDescription, recorded: Sequence[FrfRecording], contact_model: ContactModel
+) -> list[Finding]:
     """That preload and sphere of the recordings look exchanged, if they do."""
     if not recorded or skin.youngs_modulus_mpa is None:
         return []
@@ -32,7 +34,7 @@ def exchanged_values(skin: SkinDescription, recorded: Sequence[FrfRecording], ta
 
     def beyond(force: Floats, sphere_mm: Floats) -> Mask:
         load = hertz.load_parameter(force, to_si("indenter_radius_mm", sphere_mm), modulus)
-        return np.asarray(load > table.domain["load_parameter"][1])
+        return np.asarray(load > contact_model.domain["load_parameter"][1])
 
     as_declared = beyond(preload, radius_mm)
     as_exchanged = ~beyond(radius_mm, preload) & (preload < _LARGEST_MM)

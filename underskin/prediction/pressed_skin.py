@@ -1,7 +1,8 @@
 """The skin pressed by a sphere: contact radius, a/h, L, σ, stress on the sensor and FRF; and d33 from a measured FRF.
 
-Columns in SI that broadcast. `model` "paper" is the base model: Hertz radius on a half space, the contact edge still,
-σ of the bonded finite-strain layer from the table (Seminara 2018, equations 7 to 16).
+Columns in SI that broadcast. In the base model the contact edge stands still; the contact is one of two models:
+`paper`, the σ table: Hertz' radius on a half space, σ of the bonded finite-strain layer under Hertz' pressure as a dead
+load (Seminara 2018, equations 7 to 16); and `solved`: a sphere in frictionless contact with that layer itself.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from underskin.physics import charge_response, hertz
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, Mask
 
 
@@ -21,6 +22,7 @@ class Transmission:
 
     contact_radius: Floats  # a [m]
     a_over_h: Floats
+    small_strain_a_over_h: Floats  # of the contact at small strain, over which σ is tabulated
     rt_over_h: Floats
     load_parameter: Floats  # L
     sigma: Floats
@@ -37,13 +39,13 @@ class Transmission:
         return charge_response.d33(frf, frf_uncertainty, self.sigma, self.rel_error, self.rt_over_h)
 
 
-def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: ArrayLike) -> Transmission:
+def transmission(contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: ArrayLike) -> Transmission:
     """Contact radius, σ and mean stress of a skin pressed by a sphere, by the base model.
 
     Parameters
     ----------
-    table
-        The σ table.
+    contact_model
+        The σ table (`load_table`), or the solved contact (`solved_contact`).
     skin, indenter
         In SI, scalars or columns that broadcast.
     preload
@@ -52,7 +54,7 @@ def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Arr
     Returns
     -------
     Transmission
-        NaN in σ, error and stress where a row is outside the table; rows with ν ≠ 0.5 are outside, since the table is
+        NaN in σ, error and stress where a row is outside the table; rows with ν ≠ 0.5 are outside, since the tables are
         of an incompressible elastomer.
 
     Source: Seminara, Sensors 18 (2018) 459, equations 7 to 16.
@@ -66,14 +68,15 @@ def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Arr
         np.asarray(preload, dtype=float),
     )
     h, modulus, sensor_radius, poisson_ratio, radius, force = columns
-    a = hertz.contact_radius(force, radius, modulus, poisson_ratio)
+    contact = contact_model.radius(force, radius, modulus, poisson_ratio, h)
     load = hertz.load_parameter(force, radius, modulus)
-    answer = table.sigma(a / h, sensor_radius / h, load)
+    answer = contact_model.sigma(contact.small_strain_over_h, sensor_radius / h, load)
     inside = answer.inside & (poisson_ratio == INCOMPRESSIBLE)
     sigma = np.where(inside, answer.sigma, np.nan)
     return Transmission(
-        contact_radius=a,
-        a_over_h=a / h,
+        contact_radius=contact.radius,
+        a_over_h=contact.radius / h,
+        small_strain_a_over_h=contact.small_strain_over_h,
         rt_over_h=sensor_radius / h,
         load_parameter=load,
         sigma=sigma,
@@ -84,13 +87,13 @@ def transmission(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Arr
 
 
 def frf_gradient(
-    table: SigmaTable, skin: Skin, indenter: Indenter, preload: ArrayLike, d33: ArrayLike
+    contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: ArrayLike, d33: ArrayLike
 ) -> dict[str, Floats]:
-    """The derivatives of FRF = d33 · (3/2) ρ² σ(α, ρ, L), α = a/h ∝ (F R/E)^(1/3)/h, ρ = rT/h, L = F/(R² E).
+    """The derivatives of FRF = d33 · (3/2) ρ² σ(α, ρ, L), α = a/h of F R/(E h³), ρ = rT/h, L = F/(R² E).
 
     Parameters
     ----------
-    table, skin, indenter, preload
+    contact_model, skin, indenter, preload
         As for `transmission`.
     d33
         [C/N], (rows,) or one.
@@ -101,18 +104,19 @@ def frf_gradient(
         ∂FRF/∂ each of thickness, youngs_modulus, sensor_radius, indenter_radius, preload and d33, in SI, (rows,); NaN
         where the row is outside the table.
     """
-    reached = transmission(table, skin, indenter, preload)
-    rho = reached.rt_over_h
+    reached = transmission(contact_model, skin, indenter, preload)
+    alpha, rho = reached.small_strain_a_over_h, reached.rt_over_h
     scale = np.where(reached.inside, charge_response.frf(d33, 1.0, rho), np.nan)
-    slopes = table.gradient(reached.a_over_h, rho, reached.load_parameter)
-    # ∂FRF/∂ of the logarithm of each dimensionless number; d33's is FRF itself.
-    in_a, in_load = scale * slopes[0] * reached.a_over_h, scale * slopes[2] * reached.load_parameter
+    slopes = contact_model.gradient(alpha, rho, reached.load_parameter)
+    # ∂FRF/∂ of the logarithm of each dimensionless number, F R/(E h³), L and ρ.
+    _, growth = contact_model.load_over_cube(alpha)
+    in_force, in_load = scale * slopes[0] * alpha * growth, scale * slopes[2] * reached.load_parameter
     in_rho = scale * (2 * reached.sigma + slopes[1] * rho)
     return {
-        "thickness": -(in_a + in_rho) / skin.thickness,
-        "youngs_modulus": -(in_a / 3 + in_load) / skin.youngs_modulus,
+        "thickness": -(3 * in_force + in_rho) / skin.thickness,
+        "youngs_modulus": -(in_force + in_load) / skin.youngs_modulus,
         "sensor_radius": in_rho / skin.sensor_radius,
-        "indenter_radius": (in_a / 3 - 2 * in_load) / indenter.radius,
-        "preload": (in_a / 3 + in_load) / np.asarray(preload, dtype=float),
+        "indenter_radius": (in_force - 2 * in_load) / indenter.radius,
+        "preload": (in_force + in_load) / np.asarray(preload, dtype=float),
         "d33": charge_response.gain(reached.sigma, rho),
     }

@@ -11,8 +11,8 @@ import numpy as np
 
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import Transmission, transmission
+from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import sigma_beside
-from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Mask
 
 _SWEEP = 61  # points of a sweep
@@ -62,13 +62,15 @@ class Design:
     resolution: Resolution
 
 
-def design(table: SigmaTable, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float) -> Design:
+def design(
+    contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: float, pitch: float, dip: float
+) -> Design:
     """How much of a load reaches the sensors of a skin, and how finely its array locates it.
 
     Parameters
     ----------
-    table
-        The σ table.
+    contact_model
+        The σ table, or the solved contact.
     skin, indenter
         One skin and sphere, in SI.
     preload
@@ -84,31 +86,31 @@ def design(table: SigmaTable, skin: Skin, indenter: Indenter, preload: float, pi
     Design
         NaN in what lies outside the table's domain.
     """
-    contact = transmission(table, skin, indenter, preload)
-    point = tuple(float(part) for part in (contact.a_over_h, contact.rt_over_h, contact.load_parameter))
+    contact = transmission(contact_model, skin, indenter, preload)
+    point = tuple(float(part) for part in (contact.small_strain_a_over_h, contact.rt_over_h, contact.load_parameter))
     h = float(skin.thickness)
     inside = bool(contact.inside)
-    offset, response = sigma_beside(table, *point) if inside else (np.zeros(1), np.full(1, np.nan))
-    _, point_response = sigma_beside(table, 0.0, point[1], 0.0) if inside else (offset, response)
+    offset, response = sigma_beside(contact_model, *point) if inside else (np.zeros(1), np.full(1, np.nan))
+    _, point_response = sigma_beside(contact_model, 0.0, point[1], 0.0) if inside else (offset, response)
     return Design(
         contact=contact,
-        gamma=float(table.sigma(0.0, point[1], 0.0).sigma),
+        gamma=float(contact_model.sigma(0.0, point[1], 0.0).sigma),
         offset=offset * h,
         response=response,
         point_response=point_response,
-        sweeps=_sweeps(table, point),
+        sweeps=_sweeps(contact_model, point),
         resolution=resolution(offset * h, response, pitch, 2 * float(contact.contact_radius), dip),
     )
 
 
-def _sweeps(table: SigmaTable, point: tuple[float, ...]) -> tuple[Sweep, ...]:
+def _sweeps(contact_model: ContactModel, point: tuple[float, ...]) -> tuple[Sweep, ...]:
     sweeps = []
-    for place, (axis, (low, high)) in enumerate(table.domain.items()):
+    for place, (axis, (low, high)) in enumerate(contact_model.domain.items()):
         # σ turns fastest near L = 0, where it grows like its cube root.
         values = low + (high - low) * np.linspace(0, 1, _SWEEP) ** (3 if axis == "load_parameter" else 1)
         columns = [values if number == place else np.full(_SWEEP, own) for number, own in enumerate(point)]
-        gamma = table.sigma(0.0, columns[1], 0.0).sigma
-        sweeps.append(Sweep(axis, values, table.sigma(*columns).sigma, gamma))
+        gamma = contact_model.sigma(0.0, columns[1], 0.0).sigma
+        sweeps.append(Sweep(axis, values, contact_model.sigma(*columns).sigma, gamma))
     return tuple(sweeps)
 
 

@@ -1,14 +1,16 @@
 """The stress σ_zz in the layer under a sphere: a section through its depth, the last row of which is the base.
 
-The surface carries the Hertz pressure as a dead load and stresses are per undeformed area, as in the σ table. For small
-strain (L → 0) the whole section is exact (`physics.layer_stress`). What finite strain changes is tabulated on the base
-alone, for incompressible elastomer; that change is added in proportion to the depth:
+Stresses are per undeformed area. With the contact `paper` the surface carries the Hertz pressure as a dead load, as in
+the σ table; with `solved` that of the linear layer's own contact, a sum of Hertz pressures. For small strain (L → 0)
+the whole section is exact (`physics.layer_stress`). What finite strain changes is tabulated on the base alone, for
+incompressible elastomer; that change is added in proportion to the depth:
 
     σ_zz(r, d; L) ≈ σ_zz(r, d; 0) + d [σ_zz(r, 1; L) − σ_zz(r, 1; 0)]
 
-On the surface and on the base this is as good as pressure and table. Between them the finite elements of the table
-differ by up to `section_error`: their change is largest under the contact and is not that of the base. The force on
-every plane is F, since the change on the base has none.
+On the base this is as good as the table, and on the surface exact under a dead load. Between them the finite elements
+of the σ table differ by up to `section_error`: their change is largest under the contact and is not that of the base.
+Of a solved contact, whose surface finite strain changes too, no such bound is known. The force on every plane is F,
+since the change on the base has none.
 """
 
 from collections.abc import Mapping
@@ -17,12 +19,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from underskin.physics import charge_response, elastic_layer
+from underskin.physics.contact_integral_equation import ContactEquation
+from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
 from underskin.prediction.domain_limits import in_words, of_pressed
 from underskin.prediction.pressed_skin import Transmission, transmission
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, checked
 
 _AROUND_CONTACT, _AROUND_SENSOR, _LEAST = 2.0, 1.0, 3.0  # thicknesses that a section shows
@@ -50,7 +54,8 @@ class StressField:
     sigma_zz : ndarray, (forces, depths, radii)
         [Pa], tension positive; NaN where a force is not inside the table's domain.
     section_error : ndarray, (forces,)
-        Bound on the error between surface and base, over the largest stress at the same depth [-].
+        Bound on the error between surface and base, over the largest stress at the same depth [-]; NaN where it is not
+        known, of a solved contact.
     limits : sequence of str or None
         Which limit each force exceeds; None where it is inside.
     """
@@ -66,14 +71,14 @@ class StressField:
 
 
 def stress_field(
-    table: SigmaTable, skin: Skin, indenter: Indenter, preload: Floats, radii: int, depths: int
+    contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: Floats, radii: int, depths: int
 ) -> StressField:
     """The stress under a sphere.
 
     Parameters
     ----------
-    table
-        The σ table.
+    contact_model
+        The σ table, or the solved contact, which knows ν = 0.5 alone.
     skin, indenter
         One skin and one sphere, in SI.
     preload
@@ -81,21 +86,24 @@ def stress_field(
     radii, depths
         Number of distances from the axis and of depths, evenly spaced.
     """
-    contact = _contact(table, skin, indenter, preload)
+    contact = _contact(contact_model, skin, indenter, preload)
     h, inside = float(skin.thickness), contact.inside
     over_h = np.linspace(0.0, _end(contact), radii)
     depth = np.linspace(0.0, 1.0, depths)
     stress = np.full((preload.size, depths, radii), np.nan)
     error = np.full(preload.size, np.nan)
     if inside.any():
-        a, load = contact.a_over_h[inside], contact.load_parameter[inside]
-        stress[inside] = layer_stress(float(skin.poisson_ratio), a, over_h, depth)
+        a, load = contact.small_strain_a_over_h[inside], contact.load_parameter[inside]
+        section = layer_stress if contact_model.name == "paper" else _solved_section
+        stress[inside] = section(float(skin.poisson_ratio), a, over_h, depth)
         if float(skin.poisson_ratio) == INCOMPRESSIBLE:
-            change = table.profile(over_h, a[:, None], load[:, None]) - table.profile(over_h, a[:, None], 0.0)
-            stress[inside] += depth[:, None] * change[:, None, :]
+            strained, linear = (contact_model.profile(over_h, a[:, None], x) for x in (load[:, None], 0.0))
+            stress[inside] += depth[:, None] * (strained - linear)[:, None, :]
+    if contact_model.name == "paper":
+        load = contact.load_parameter[inside]
         error[inside] = _ERROR_OF_STRAIN * np.cbrt(load) + _ERROR_OF_LOAD * load
     scale = charge_response.mean_stress(preload, 1.0, h)
-    limits = in_words(inside, preload.size, of_pressed(contact, preload, table.domain))
+    limits = in_words(inside, preload.size, of_pressed(contact, preload, contact_model))
     return StressField(
         contact=contact,
         preload=preload,
@@ -109,7 +117,7 @@ def stress_field(
 
 
 def field_from_lab(
-    table: SigmaTable, given: Mapping[str, float], radii: int, depths: int, *, units_checked: bool
+    contact_model: ContactModel, given: Mapping[str, float], radii: int, depths: int, *, units_checked: bool
 ) -> StressField:
     """The same from numbers in lab units by field name: the skin's, `indenter_radius_mm` and `preload_n`.
 
@@ -123,16 +131,28 @@ def field_from_lab(
     indenter = Indenter.from_lab(indenter_radius_mm=given["indenter_radius_mm"], units_checked=units_checked)
     preload = np.atleast_1d(checked("preload_n", given["preload_n"], units_checked=units_checked))
     with np.errstate(all="ignore"):  # what overflows is outside
-        return stress_field(table, skin, indenter, preload, radii, depths)
+        return stress_field(contact_model, skin, indenter, preload, radii, depths)
 
 
-def _contact(table: SigmaTable, skin: Skin, indenter: Indenter, preload: Floats) -> Transmission:
-    """As the base model has it; for ν ≠ 0.5 with the linear layer's σ in the domain that the table has for 0.5."""
-    contact = transmission(table, skin, indenter, preload)
-    if float(skin.poisson_ratio) == INCOMPRESSIBLE:
+def _solved_section(poisson_ratio: float, a: Floats, r: Floats, depth: Floats) -> Floats:
+    """As `layer_stress`, under the pressures of the linear layer's own contacts of these radii."""
+    solved = ContactEquation(a).solve(Layer(poisson_ratio)).sphere_shape.value
+    parts = (SpherePressure(float(one), shape).hertz_parts() for one, shape in zip(a, solved, strict=True))
+    sections = [
+        np.tensordot(shares, layer_stress(poisson_ratio, one * radii, r, depth), 1)
+        for one, (radii, shares) in zip(a, parts, strict=True)
+    ]
+    return np.stack(sections)
+
+
+def _contact(contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: Floats) -> Transmission:
+    """As the base model has it; for ν ≠ 0.5 in the contact `paper` with the linear layer's σ in the domain that the
+    table has for 0.5."""
+    contact = transmission(contact_model, skin, indenter, preload)
+    if float(skin.poisson_ratio) == INCOMPRESSIBLE or contact_model.name != "paper":
         return contact
     a, rho = contact.a_over_h, contact.rt_over_h
-    inside = table.sigma(a, rho, contact.load_parameter).inside
+    inside = contact_model.sigma(a, rho, contact.load_parameter).inside
     sigma = np.full(a.shape, np.nan)
     sigma[inside] = elastic_layer.sigma(Layer(float(skin.poisson_ratio)), a[inside], rho[inside])
     mean = charge_response.mean_stress(preload, sigma, skin.thickness)

@@ -1,6 +1,6 @@
 """σ beside the sensor's centre, and what a scatter of the sphere's position does to it.
 
-An offset sensor averages the table's bottom profile T3(r; a/h, L) over its disc:
+An offset sensor averages the contact model's bottom profile T3(r; a/h, L) over its disc:
     σ(e) = (1/πρ²) ∫_disc profile(|e + s|) d²s, lengths in units of h.
 """
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
-from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats
 
 _SPACING = 0.05  # of the grids in r/h and e/h; the profile turns over lengths of 0.3 h and more
@@ -49,7 +49,7 @@ class PositionedSigma:
 
 
 def positioned_sigma(
-    table: SigmaTable,
+    contact_model: ContactModel,
     a_over_h: Floats,
     rt_over_h: float,
     load_parameter: Floats,
@@ -60,22 +60,23 @@ def positioned_sigma(
 
     Parameters
     ----------
-    table
-        The σ table.
+    contact_model
+        The σ table, or the solved contact.
     a_over_h, load_parameter, offset_over_h
-        (rows,) contact radius over thickness, L, and distance of the contact from the sensor's centre over thickness.
+        (rows,) contact radius at small strain over thickness, L, and distance of the contact from the sensor's centre
+        over thickness.
     rt_over_h
         Sensor radius over thickness, one for all rows.
     largest_scatter_over_h
         Up to which standard deviation of the position, over the thickness, `scattered` will be asked for.
     """
-    farthest, largest_disc = table.profile_end, table.domain["rt_over_h"][1]
+    farthest, largest_disc = contact_model.profile_end, contact_model.domain["rt_over_h"][1]
     disc_known = rt_over_h <= largest_disc
     rt_over_h = min(rt_over_h, largest_disc)
     largest_offset = float(np.max(offset_over_h, initial=0.0)) + 4 * largest_scatter_over_h
     offsets = _grid(min(largest_offset + 4 * _SPACING, farthest - rt_over_h))
     radii = np.minimum(_grid(min(offsets[-1] + rt_over_h + 4 * _SPACING, farthest)), farthest)
-    profile = _profiles(table, radii, a_over_h, load_parameter)
+    profile = _profiles(contact_model, radii, a_over_h, load_parameter)
     sigma = profile @ _disc_average(radii, offsets, rt_over_h).T
     curve = CubicSpline(offsets, np.nan_to_num(sigma), axis=1, bc_type=((1, np.zeros(len(sigma))), "not-a-knot"))
     commanded = _each_row(curve, offset_over_h[:, None])[:, 0]
@@ -83,20 +84,22 @@ def positioned_sigma(
     return PositionedSigma(np.where(seen, commanded, np.nan), offset_over_h, curve)
 
 
-def _profiles(table: SigmaTable, radii: Floats, a_over_h: Floats, load_parameter: Floats) -> Floats:
+def _profiles(contact_model: ContactModel, radii: Floats, a_over_h: Floats, load_parameter: Floats) -> Floats:
     """The profiles of contacts (rows, radii), some at a time: one evaluation holds up the other threads of a server."""
     pieces = (slice(first, first + _AT_ONCE) for first in range(0, max(len(a_over_h), 1), _AT_ONCE))
     return np.concatenate(
-        [table.profile(radii, a_over_h[piece, None], load_parameter[piece, None]) for piece in pieces]
+        [contact_model.profile(radii, a_over_h[piece, None], load_parameter[piece, None]) for piece in pieces]
     )
 
 
-def sigma_beside(table: SigmaTable, a_over_h: float, rt_over_h: float, load_parameter: float) -> tuple[Floats, Floats]:
+def sigma_beside(
+    contact_model: ContactModel, a_over_h: float, rt_over_h: float, load_parameter: float
+) -> tuple[Floats, Floats]:
     """Offsets e/h, from 0 as far as the table's profile reaches, and σ there of one contact; NaN outside the domain."""
-    farthest = table.profile_end
+    farthest = contact_model.profile_end
     offsets = _grid(farthest - rt_over_h)
     radii = np.minimum(_grid(farthest), farthest)
-    profile = table.profile(radii, a_over_h, load_parameter)
+    profile = contact_model.profile(radii, a_over_h, load_parameter)
     if not np.isfinite(profile).all():
         return offsets, np.full(len(offsets), np.nan)
     distance, weight = _over_disc(offsets, rt_over_h)

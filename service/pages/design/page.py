@@ -19,7 +19,7 @@ from service.pages.shared.html import compress, page
 from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, wrong_fields
 from service.problems import parsed
 from service.schemas.design import DesignAnswer, DesignRequest
-from service.usecases.design import design_answer, design_of
+from service.usecases.design import design_answer, design_of, other_sigma
 from service.usecases.materials import ELASTOMERS, FILMS, RATIO_SOURCE, with_values
 from underskin.errors import UnderskinError
 from underskin.surrogate.sigma_table import SigmaTable
@@ -156,7 +156,7 @@ def _tried(table: SigmaTable, sliders: Sliders) -> ShownDesign:
             f"/design/response.csv?{query}",
         ),
     ]
-    return ShownDesign(results(answer), figures, answer.limit, compared=rows)
+    return ShownDesign(results(answer, other_sigma(table, asked, answer)), figures, answer.limit, compared=rows)
 
 
 def _said(error: UnderskinError) -> str:

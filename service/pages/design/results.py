@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from service.pages.design.sliders import SLIDERS
 from service.pages.shared.formats import change_in_percent, short_and_exact
 from service.schemas.design import DesignAnswer
+from underskin.prediction.other_contact import OTHER, WORDS
 
 BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
 
@@ -33,11 +34,13 @@ class DesignResult:
         return short_and_exact(self.value, self.unit, self.digits)[1]
 
 
-def results(answer: DesignAnswer) -> list[DesignResult]:
-    """What a design tells, in order."""
+def results(answer: DesignAnswer, other_sigma: float | None = None) -> list[DesignResult]:
+    """What a design tells, in order; `other_sigma`: σ by the other contact model, where it is told."""
     apart = answer.two_point_separation_mm
     blind = answer.response_amid_percent is not None and answer.response_amid_percent < BLIND_PERCENT
     point = f"a/h {answer.a_over_h:.3g}, rT/h {answer.rt_over_h:.3g}, L {answer.load_parameter:.2g}"
+    if other_sigma is not None:
+        point += f"; {WORDS[OTHER[answer.contact]]} σ is {other_sigma:.4g}"
     anywhere = "wherever the array lies" if apart is not None else "not told apart everywhere at this pitch"
     entries = [
         DesignResult("sigma", "transmission σ", answer.sigma, "", 4, point),

@@ -134,6 +134,6 @@ def _figure(found: Searched, typed: Typed) -> Drawn:
 
 def _address(typed: Typed, offer: Offer) -> str:
     """The design view of an offer."""
-    values = offer.request.model_dump(exclude={"units_checked"})
+    values = offer.request.model_dump(exclude={"contact", "units_checked"})
     skin = {} if typed.skin_id is None else {"skin": typed.skin_id}
     return f"/design?{urlencode({**skin, **{name: f'{value:g}' for name, value in values.items()}})}"

@@ -17,11 +17,14 @@ from service.pages.shared.forms import UNLIKELY, in_form_words, number
 from service.pages.shared.html import compress, page
 from service.pages.shared.skin_values import UNITS, shown
 from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quantities, wrong_fields
-from underskin.errors import UnderskinError
+from underskin.errors import TableError, UnderskinError
 from underskin.physics.hertz import peak_pressure
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
+from underskin.prediction.answers import pressed
+from underskin.prediction.other_contact import STATED
 from underskin.prediction.stress_field import StressField, stress_field
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.surrogate.solved_contact import contact_model
 from underskin.units import checked, to_lab
 
 router = APIRouter(prefix="/field")
@@ -71,6 +74,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None) 
         error_percent=_error_percent(tried.field) if ok and tried.field is not None else 0.0,
         linear=tried.given.get("poisson_ratio") != INCOMPRESSIBLE,
         figures=_figures(tried.field, query) if ok and tried.field is not None else [],
+        solved_mpa=_by_solved_contact(table, tried) if ok else None,
         frames=f"/field/frames?{query}",
         count=FRAMES,
         same=_same(request, tried.given, units_checked=UNITS in request.query_params),
@@ -116,6 +120,19 @@ def _tried(request: Request, table: SigmaTable, values: Mapping[str, str]) -> Sh
         wrong = wrong_fields(refused, lambda error: in_form_words(error, _LABELS, unlikely=UNLIKELY))
         return ShownField(None, given, wrong=wrong)
     return ShownField(field, given, field.limits[0])
+
+
+def _by_solved_contact(table: SigmaTable, tried: ShownField) -> float | None:
+    """The sensor's mean stress [MPa] where it differs by more than 1 %; None elsewhere, and where it is not known, as
+    without the contact table, of which /tables tells."""
+    given = {name: np.array(value) for name, value in tried.given.items()}
+    assert tried.field is not None
+    paper = float(tried.field.contact.mean_stress[0])
+    try:
+        solved = float(pressed(contact_model(table, "solved"), given, units_checked=True).mean_stress)
+    except TableError:
+        return None
+    return float(to_lab("mean_stress_mpa", solved)) if abs(solved / paper - 1) > STATED else None
 
 
 def _computed(table: SigmaTable, given: Mapping[str, float], count: int, units_checked: bool) -> StressField:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 
 from service.dependencies import Store, Table
@@ -20,8 +21,9 @@ from service.schemas.columns import Columns
 from service.schemas.pressed_skin import D33Columns
 from service.store import Database
 from service.usecases.pressed_skin import d33
-from underskin.errors import InvalidInput, UnderskinError, conflicting, required, wrong_type
+from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, required, wrong_type
 from underskin.prediction.domain_checks import RowConditions, beyond
+from underskin.prediction.other_contact import other_contact
 from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
 from underskin.several_errors import noting
@@ -81,7 +83,7 @@ def view(request: Request, store: Store, table: Table, skin: str | None = None, 
         wrong=wrong,
         findings=[] if answer is None else answer.shared["findings"],
         words=_WORDS,
-        columns=None if answer is None else _columns(document, answer, adopted),
+        columns=None if answer is None else _columns(document, answer, adopted, table),
         adopted=adopted,
         outside=[] if answer is None else reasons(document, answer, table),
         query=request.url.query,
@@ -95,7 +97,7 @@ def rows_csv(request: Request, store: Store, table: Table, skin: str | None = No
     values, _ = shown(store, table, request.query_params, skin, FIELDS)
     document = _document(values, request.query_params, rows)
     adopted = by_model(store, table, skin, request.query_params, document)
-    return csv_answer("d33", _columns(document, _answered(table, store, document), adopted))
+    return csv_answer("d33", _columns(document, _answered(table, store, document), adopted, table))
 
 
 def _said(error: UnderskinError) -> str:
@@ -112,12 +114,32 @@ def _answered(table: SigmaTable, store: Database, document: dict[str, Any]) -> C
     return d33(table, store, parsed(D33Columns, document))
 
 
-def _columns(document: Mapping[str, Any], answer: Columns, adopted: ByModel | None) -> dict[str, list[Any]]:
+def _columns(
+    document: Mapping[str, Any], answer: Columns, adopted: ByModel | None, table: SigmaTable
+) -> dict[str, list[Any]]:
     """What was sent and what is answered, a row a measurement."""
     sent = {name: document.get(name, [math.nan] * answer.rows) for name in _ORDER}
     answered = {name: answer.full(name).tolist() for name in _ANSWERED}
     beside = {} if adopted is None else adopted.columns()
-    return {**sent, **answered, **beside, "status": list(answer.status())}
+    return {
+        **sent,
+        **answered,
+        **_by_solved_contact(document, answer, table),
+        **beside,
+        "status": list(answer.status()),
+    }
+
+
+def _by_solved_contact(document: Mapping[str, Any], answer: Columns, table: SigmaTable) -> dict[str, list[float]]:
+    """d33 by it, a row a measurement, where any differs from the paper's by more than 1 %; none without the contact
+    table, of which /tables tells."""
+    given = {name: np.asarray(value, dtype=float) for name, value in document.items() if name != UNITS}
+    try:
+        other = other_contact(table, "paper", given, answer.full("d33_pc_per_n"), units_checked=UNITS in document)
+    except TableError:
+        return {}
+    values = np.broadcast_to(other.d33, (answer.rows,))
+    return {"d33_solved_pc_per_n": values.tolist()} if other.differs.any() else {}
 
 
 def _document(values: Mapping[str, str], given: Mapping[str, str], rows: str) -> dict[str, Any]:

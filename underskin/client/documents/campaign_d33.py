@@ -186,6 +186,10 @@ class D33(Document):
     array_relative: D33Value | None
     """The same without `declared_percent`: to compare it with its sensors and with other dates."""
 
+    array_solved: D33Value | None
+    """`array` in contact with the layer itself, where it differs from the paper's by more than 1 %; null elsewhere,
+    and under an adopted model, whose diagnosis decided."""
+
     sensor_spread_percent: Scatter | None
     """Standard deviation of d33 over the sensors."""
 

@@ -41,8 +41,11 @@ class SweepAnswer(Document):
 class DesignAnswer(Document):
     """What the skin tells of a load, and of two."""
 
+    contact: Literal["paper", "solved"]
+    """As asked."""
+
     table_sha256: str
-    """SHA-256 of the σ table."""
+    """SHA-256 of the table of this contact."""
 
     status: Literal["ok", "out_of_domain"]
     """`out_of_domain`: outside the table, and null what depends on it; never extrapolated."""
@@ -51,7 +54,7 @@ class DesignAnswer(Document):
     """Which limit it exceeds, with the highest force; null where it is `ok`."""
 
     contact_radius_mm: float
-    """Radius a of the contact, Hertz [mm]."""
+    """Radius a of the contact [mm]."""
 
     a_over_h: float
     """a/h."""

@@ -1,0 +1,68 @@
+"""What finite strain adds to the stress on sensors beneath spheres, over the linear layer's own contacts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from underskin.array_stress.request import LoadCase
+from underskin.errors import out_of_range
+from underskin.physics import charge_response, hertz
+from underskin.surrogate.off_centre_sigma import sigma_beside
+from underskin.surrogate.solved_contact import SolvedContact
+from underskin.units import Floats, to_si
+
+
+@dataclass(frozen=True)
+class FiniteStrain:
+    """`stress` [Pa] on each sensor, tension positive, with the bound on its `error` (sensors,), and the radius [m] of
+    each contact (contacts,)."""
+
+    stress: Floats
+    error: Floats
+    contact_radius: Floats
+
+
+def finite_strain(solved: SolvedContact, request: LoadCase, sensors: Floats) -> FiniteStrain:
+    """The change beneath each contact as if it were alone; changes add.
+
+    Parameters
+    ----------
+    solved : SolvedContact
+    request : LoadCase
+        With contacts on a bonded incompressible layer.
+    sensors : ndarray, (sensors, 2)
+        Centres x, y [m].
+
+    Raises
+    ------
+    InvalidInput
+        For a contact outside the domain of the solved contact.
+    """
+    h, rho = float(to_si("thickness_mm", request.thickness_mm)), request.sensor_radius_mm / request.thickness_mm
+    modulus = to_si("youngs_modulus_mpa", request.youngs_modulus_mpa or np.nan)
+    force = to_si("normal_force_n", [contact.normal_force_n for contact in request.contacts])
+    radius = to_si("indenter_radius_mm", [contact.indenter_radius_mm for contact in request.contacts])
+    contact = solved.radius(force, radius, modulus, np.array(request.poisson_ratio), np.array(h))
+    load = hertz.load_parameter(force, radius, modulus)
+    known = solved.sigma(contact.small_strain_over_h, rho, load)
+    stress, error = np.zeros((2, len(sensors)))
+    for number, one in enumerate(request.contacts):
+        if not known.inside[number]:
+            raise _beyond(solved, number, one.normal_force_n, contact.small_strain_over_h[number], load[number])
+        point = float(contact.small_strain_over_h[number]), rho
+        offset, strained = sigma_beside(solved, *point, float(load[number]))
+        added = make_interp_spline(offset, strained - sigma_beside(solved, *point, 0.0)[1], k=3)
+        away = np.hypot(*(sensors - to_si("x_mm", [one.x_mm, one.y_mm])).T) / h
+        near = away <= offset[-1]
+        scale = float(charge_response.mean_stress(force[number], 1.0, h))
+        stress -= scale * np.where(near, added(np.minimum(away, offset[-1])), 0.0)
+        error += scale * np.where(near, known.rel_error[number] * known.sigma[number], 0.0)
+    return FiniteStrain(stress, error, contact.radius)
+
+
+def _beyond(solved: SolvedContact, number: int, force: float, a_over_h: float, load: float) -> Exception:
+    most_a, most_load = (solved.domain[name][1] for name in ("a_over_h", "load_parameter"))
+    found = f"a/h = {a_over_h:.3g}, L = F/(R²E) = {load:.3g}"
+    allowed = f"must press less with contact 'solved': a/h at most {most_a:g} and L at most {most_load:g} ({found})"
+    return out_of_range(f"contacts[{number}].normal_force_n", force, allowed)

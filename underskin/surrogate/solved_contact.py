@@ -1,0 +1,118 @@
+"""A rigid sphere in frictionless contact with the bonded incompressible layer itself, as a contact model: `solved`.
+
+The contact of the linear layer at the given force is exact (contact_integral_equation): its radius α = a/h, the
+transform p̂ of its pressure, and with M of the bonded layer the stress on the base (hankel_transform). What finite
+strain adds is in the contact table, over α and L^(1/3), L = F/(R² E):
+
+    σ(α, ρ, L) = (1/3) ∫ p̂(k) M(k) [2 J1(kρ)/(kρ)] k dk + (2/ρ²) ∫₀^ρ correction(r; α, L) r dr
+
+Both are put on the nodes of one spline, once in a process. The mechanism `layered_contact` has the same σ, with
+derivatives by more parameters (underskin/mechanisms/models/sigma_curves.py).
+"""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline, make_interp_spline
+from scipy.special import j0
+
+from underskin.physics.contact_integral_equation import ContactEquation, mode_transforms
+from underskin.physics.elastic_layer import Layer
+from underskin.physics.hankel_transform import disc_average, wave_numbers
+from underskin.physics.layered_radius import layered_radius
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.surrogate.contact_model import ContactModel, ContactName, ContactRadius
+from underskin.surrogate.contact_table import CONTACT_TABLE, ContactTable, load_contact
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+_RHO = 3.0 * np.linspace(0.0, 1.0, 65) ** 1.5  # rT/h of the nodes: as far as the σ table's
+_DISC_POINTS = 12  # of Gauss' rule along the disc's radius
+_SPLINE_ERROR = 1e-6  # largest relative one of the linear contact's σ (tests/surrogate/test_solved_contact.py)
+
+
+class SolvedContact(ContactModel):
+    """The layer's own contact, by its table."""
+
+    name = "solved"
+
+    def __init__(self, table: ContactTable) -> None:
+        """Tabulate; takes tenths of a second."""
+        self.sha256 = table.sha256
+        nodes, cbrt_load, _ = table.axes
+        a, r = (np.sort(np.append(axis, (axis[1:] + axis[:-1]) / 2)) for axis in (nodes, table.axes[2]))
+        linear, profile = _linear_contact(a, _RHO, r)
+        # A spline over the table's nodes is one over these too.
+        added = make_interp_spline(nodes, _disc_mean(table, _RHO), k=3)(a)
+        error = make_interp_spline(nodes, _disc_maximum(table, _RHO), k=1)(a)
+        sigma = linear[:, :, None] + added
+        self._tabulate(
+            {
+                "sigma/a_over_h": a,
+                "sigma/rt_over_h": _RHO,
+                "sigma/cbrt_load_parameter": cbrt_load,
+                "sigma/sigma": sigma,
+                "sigma/discretisation_error": error / sigma,
+                "sigma/interpolation_error": np.full_like(sigma, _SPLINE_ERROR),
+                "profile/a_over_h": a,
+                "profile/r_over_h": r,
+                "profile/profile": profile[:, :, None]
+                + make_interp_spline(nodes, table.profile_over(r).swapaxes(1, 2), k=3)(a),
+            }
+        )
+        self._radius_ratio = RectBivariateSpline(nodes, cbrt_load, table.contact_radius, s=0)
+
+    def radius(
+        self, force: Floats, indenter_radius: Floats, youngs_modulus: Floats, poisson_ratio: Floats, thickness: Floats
+    ) -> ContactRadius:
+        """NaN where ν is not 0.5; outside the table the radius is that at small strain."""
+        load = force * indenter_radius * (1 - INCOMPRESSIBLE**2) / (youngs_modulus * thickness**3)
+        a = np.where(poisson_ratio == INCOMPRESSIBLE, layered_radius().alpha(load), np.nan)
+        cbrt_load = np.cbrt(force / (indenter_radius**2 * youngs_modulus))
+        inside = (a <= self.axes[0][-1]) & (cbrt_load <= self.axes[2][-1])
+        ratio = np.where(inside, self._radius_ratio.ev(np.where(inside, a, 0.0), np.where(inside, cbrt_load, 0.0)), 1.0)
+        return ContactRadius(a, a * ratio * thickness)
+
+    def load_over_cube(self, a_over_h: Floats) -> tuple[Floats, Floats]:
+        """Of the linear layer's contact."""
+        return layered_radius().load_over_cube(a_over_h), layered_radius().growth(a_over_h)
+
+
+def contact_model(table: SigmaTable, name: ContactName) -> ContactModel:
+    """The contact of this name: `paper`, the σ table itself, or `solved`, of the contact table beside it.
+
+    Raises TableError where that cannot be read.
+    """
+    return table if name == "paper" else solved_contact(table.path.parent / CONTACT_TABLE)
+
+
+@lru_cache(maxsize=2)
+def solved_contact(path: Path | None = None) -> SolvedContact:
+    """The solved contact by the contact table at `path`, or the default one; raises TableError with the reason."""
+    return SolvedContact(load_contact(path))
+
+
+def _linear_contact(a: Floats, rho: Floats, r: Floats) -> tuple[Floats, Floats]:
+    """Of contacts a/h, from 0 on, with the linear layer: stress on discs (a, rho) and on the base (a, r)."""
+    k, weight = wave_numbers(float(a[-1] + max(rho[-1], r[-1])))
+    equation = ContactEquation(a[1:])
+    modes = mode_transforms(np.multiply.outer(a[1:], k), equation.modes)
+    pressure = np.einsum("akn,an->ak", modes, equation.solve(Layer()).sphere_shape.value)
+    passed = np.vstack([np.ones_like(k), pressure]) * (Layer().transmission(k).value * k / 3 * weight)
+    return passed @ disc_average(np.outer(k, rho)), passed @ j0(np.outer(k, r))
+
+
+def _disc_mean(table: ContactTable, rho: Floats) -> Floats:
+    """The mean of the correction over discs (a, rho, L^(1/3))."""
+    x, weight = np.polynomial.legendre.leggauss(_DISC_POINTS)
+    radii = np.outer(rho, (1 + x) / 2)
+    profile = table.profile_over(radii.ravel())
+    return np.asarray((profile.reshape(*profile.shape[:2], *radii.shape) @ (weight * (1 + x) / 2)).swapaxes(1, 2))
+
+
+def _disc_maximum(table: ContactTable, rho: Floats) -> Floats:
+    """The largest bound on the correction's error on each disc (a, rho, L^(1/3))."""
+    so_far = np.maximum.accumulate(table.correction_error, axis=2)
+    last = np.minimum(np.searchsorted(table.axes[2], rho), so_far.shape[2] - 1)
+    return so_far[:, :, last].swapaxes(1, 2)
