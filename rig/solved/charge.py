@@ -2,7 +2,8 @@
 
 A sphere's course gives, at some indentations, force and pressure on the base. The share of the force that a disc of
 radius rT at the offset e bears, Q/(d33 F) = ∫ p(r) w(r) 2πr dr / F, w the share of the circle of radius r inside the
-disc, is a polynomial of F^(1/3), fitted to the course. The recorded FRF is the first harmonic of Q at F + Fd sin ωt.
+disc, in parts within which w is smooth, is a polynomial of F^(1/3), fitted to the course. The recorded FRF is the first
+harmonic of Q at F + Fd sin ωt.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 
 from rig.solved.layer import Floats, PressedLayer, Sublayer
 
-_STEPS, _DEGREE = 13, 5
+_STEPS, _DEGREE, _PLACES = 13, 5, 400
 _MARGIN = 0.85  # the course reaches this much beyond the forces asked for
 _PHASES = np.sin(2 * np.pi * (np.arange(16) + 0.5) / 16)
 
@@ -37,9 +38,14 @@ class Course:
     def share(self, sensor: float, offset: float) -> Floats:
         """Polynomial in F^(1/3), highest power first, of the share of the force on a disc of this radius at an
         offset [h]."""
-        weight = inside(self.r, sensor, offset) * 2 * np.pi * self.r
-        borne = np.trapezoid(self.pressure * weight, self.r, axis=1) / self.force
-        return np.polyfit(np.cbrt(self.force), borne, _DEGREE)
+        near, far = abs(sensor - offset), sensor + offset
+        within = np.linspace(0, near, _PLACES)
+        across = (near + far) / 2 - (far - near) / 2 * np.cos(np.linspace(0, np.pi, _PLACES))
+        borne = np.zeros(len(self.force))
+        for r, part in ((within, np.full(_PLACES, float(offset < sensor))), (across, inside(across, sensor, offset))):
+            pressure = np.array([np.interp(r, self.r, row, right=0.0) for row in self.pressure])
+            borne += np.trapezoid(pressure * part * 2 * np.pi * r, r, axis=1)
+        return np.polyfit(np.cbrt(self.force), borne / self.force, _DEGREE)
 
     def contact_radius(self, force: Floats) -> Floats:
         """Contact radius at forces, interpolated [h]."""
@@ -55,7 +61,7 @@ def inside(r: Floats, sensor: float, offset: float) -> Floats:
     return np.where(r == 0, float(offset < sensor), np.arccos(np.clip(cosine, -1, 1)) / np.pi)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=8)
 def solve(skin: Skin, radius: float, lowest: float, highest: float, fineness: float = 1.5) -> Course:
     """The course of a sphere [h] over forces from `lowest` to `highest` [E h²]."""
     softest = min(part.material.modulus for part in skin.sublayers if part.thickness > 0.3)
