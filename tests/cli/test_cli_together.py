@@ -49,7 +49,7 @@ def test_files_together_tell_what_one_file_of_all_would(palm: Campaign, presses:
     assert {row["file"] for row in csv.DictReader(io.StringIO(parts.stdout))} == {"palm 3"}
     assert "8 recordings have ids that several files use" in parts.stderr
     shown = run("d33", *presses, "--together", "palm/3", "--figures", str(tmp_path / "pages")).stdout
-    assert (shown.splitlines()[0], shown.count("d33 of the array")) == ("palm/3", 1)
+    assert (shown.splitlines()[0], shown.count("d33 of the array")) == ("palm/3", 2)  # and by the solved contact
     assert [page.name for page in (tmp_path / "pages").iterdir()] == ["palm-3.html"]
 
 
@@ -67,7 +67,7 @@ def test_a_copy_of_a_file_counts_once(presses: list[str], tmp_path: Path) -> Non
 def test_an_unreadable_file_costs_only_itself(presses: list[str], tmp_path: Path) -> None:
     Path(presses[2]).write_text("{")
     answer = run("d33", *presses, str(tmp_path / "nowhere.json"), "--together", "palm")
-    assert (answer.returncode, answer.stdout.count("d33 of the array")) == (2, 1)
+    assert (answer.returncode, answer.stdout.count("d33 of the array")) == (2, 2)
     assert [line.split(": ")[1] for line in answer.stderr.splitlines()] == [presses[2], str(tmp_path / "nowhere.json")]
     none = run("d33", str(tmp_path / "nowhere.json"), "--together", "palm")
     assert (none.returncode, none.stdout) == (2, "")

@@ -12,7 +12,7 @@ from underskin.prediction.pressed_skin import Transmission, frf_gradient, transm
 from underskin.recordings.conditions import SkinDescription, frf_conditions
 from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import load_table
-from underskin.surrogate.solved_contact import solved_contact
+from underskin.surrogate.solved_contact import linear_contact, solved_contact
 
 SOLVED, TABLE = solved_contact(), load_table()
 MODULUS = 16e6
@@ -36,7 +36,7 @@ def random_rows(count: int) -> tuple[Skin, Indenter, np.ndarray]:
 
 
 @pytest.mark.parametrize(("alpha", "rho"), [(0.05, 0.02), (0.31, 0.6), (1.0, 0.2), (1.7, 1.1), (2.9, 2.7)])
-def test_linear_contact(alpha: float, rho: float) -> None:
+def testlinear_contact(alpha: float, rho: float) -> None:
     """At small strain radius and σ are the exact linear contact's, to the bound on the error."""
     h, radius = 1e-3, 10.0
     exact = SphereOnLayer(radius, MODULUS, h, Layer()).at_radius(alpha * h)
@@ -52,12 +52,10 @@ def test_linear_contact(alpha: float, rho: float) -> None:
 
 def test_spline_between_nodes() -> None:
     """Between all nodes in a/h and rT/h the linear contact's σ is within the bound that the table states."""
-    from underskin.surrogate.solved_contact import _linear_contact
-
     generator = np.random.default_rng(3)
     alpha = np.sort(np.append(0.0, generator.uniform(0, 3, 120)))
     rho = generator.uniform(0, 3, 120)
-    exact, _ = _linear_contact(alpha, rho, np.zeros(1))
+    exact, _ = linear_contact(alpha, rho, np.zeros(1))
     answer = SOLVED.sigma(alpha[:, None], rho, 0.0)
     assert np.abs(answer.sigma / exact - 1).max() < answer.rel_error.min()
 

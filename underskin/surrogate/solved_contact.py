@@ -42,7 +42,7 @@ class SolvedContact(ContactModel):
         self.sha256 = table.sha256
         nodes, cbrt_load, _ = table.axes
         a, r = (np.sort(np.append(axis, (axis[1:] + axis[:-1]) / 2)) for axis in (nodes, table.axes[2]))
-        linear, profile = _linear_contact(a, _RHO, r)
+        linear, profile = linear_contact(a, _RHO, r)
         # A spline over the table's nodes is one over these too.
         added = make_interp_spline(nodes, _disc_mean(table, _RHO), k=3)(a)
         error = make_interp_spline(nodes, _disc_maximum(table, _RHO), k=1)(a)
@@ -93,7 +93,7 @@ def solved_contact(path: Path | None = None) -> SolvedContact:
     return SolvedContact(load_contact(path))
 
 
-def _linear_contact(a: Floats, rho: Floats, r: Floats) -> tuple[Floats, Floats]:
+def linear_contact(a: Floats, rho: Floats, r: Floats) -> tuple[Floats, Floats]:
     """Of contacts a/h, from 0 on, with the linear layer: stress on discs (a, rho) and on the base (a, r)."""
     k, weight = wave_numbers(float(a[-1] + max(rho[-1], r[-1])))
     equation = ContactEquation(a[1:])

@@ -91,7 +91,7 @@ def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(vis
     visitor.drawn(2)
     force = page.get_by_label("force F").last
     force.fill("900")
-    page.get_by_text("exceeds 0.1: at most 25.6 N").wait_for()
+    page.get_by_text("exceeds 0.15: at most 38.4 N").wait_for(timeout=20_000)
     shown = page.locator(".results").inner_text()
     assert "not told apart everywhere" not in shown
     assert "outside the table" in shown
