@@ -1,6 +1,7 @@
 """Where mechanisms were found in this lab: the diagnoses, of campaigns as they are now, whose reports state them.
 
-Reports do not change once they are made, so that what each states is read once and kept by its number.
+Reports do not change once they are made, so that what each states is read once and kept by its id: after a restore a
+number may be that of another.
 """
 
 import threading
@@ -16,7 +17,7 @@ from service.store.tables import diagnoses as rows_of_diagnoses
 
 _AT_ONCE = 50  # reports
 _lock = threading.Lock()
-_read: WeakKeyDictionary[Database, dict[int, tuple[tuple[str, float], ...]]] = WeakKeyDictionary()
+_read: WeakKeyDictionary[Database, dict[str, tuple[tuple[str, float], ...]]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -45,11 +46,11 @@ def findings(store: Database) -> Findings:
     """Of the latest diagnosis of each campaign in use, and of campaigns together, that left nothing out; one whose
     campaigns are all in a later one is not counted again."""
     latest = store.read(_latest)
-    stated = _stated(store, [row.number for row in latest])
+    stated = _stated(store, {row.number: row.id for row in latest})
     found: dict[str, list[FoundIn]] = {}
     for row in latest:
         of_one = row.kind == "campaign"
-        for name, probability in stated[row.number]:
+        for name, probability in stated[row.id]:
             entry = FoundIn(
                 row.id,
                 row.campaign_id if of_one else None,
@@ -84,12 +85,12 @@ def _latest(connection: Connection) -> list[AnyRow]:
     return latest
 
 
-def _stated(store: Database, numbers: Sequence[int]) -> Mapping[int, tuple[tuple[str, float], ...]]:
-    """Mechanisms with their probabilities, by the diagnosis' number; those not yet read are read a few at a time."""
+def _stated(store: Database, ids: Mapping[int, str]) -> Mapping[str, tuple[tuple[str, float], ...]]:
+    """Mechanisms with their probabilities, by the diagnosis' id, of those with these numbers; those not yet read are read a few at a time."""
     with _lock:
         known = _read.setdefault(store, {})
-        missing = [number for number in numbers if number not in known]
+        missing = [number for number, name in ids.items() if name not in known]
         for start in range(0, len(missing), _AT_ONCE):
             for number, report in store.read(diagnoses.reports_of, missing[start : start + _AT_ONCE]).items():
-                known[number] = tuple((one["name"], one["probability"]) for one in report["mechanisms"])
+                known[ids[number]] = tuple((one["name"], one["probability"]) for one in report["mechanisms"])
         return dict(known)
