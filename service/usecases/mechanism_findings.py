@@ -86,7 +86,8 @@ def _latest(connection: Connection) -> list[AnyRow]:
 
 
 def _stated(store: Database, ids: Mapping[int, str]) -> Mapping[str, tuple[tuple[str, float], ...]]:
-    """Mechanisms with their probabilities, by the diagnosis' id, of those with these numbers; those not yet read are read a few at a time."""
+    """Mechanisms with their probabilities by the diagnosis' id; `ids` by number. Those not yet read are read a few at
+    a time."""
     with _lock:
         known = _read.setdefault(store, {})
         missing = [number for number, name in ids.items() if name not in known]
