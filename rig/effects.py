@@ -199,8 +199,13 @@ UNCATALOGUED: dict[str, Effect] = {
     ),
 }  # fmt: skip
 
-IN_CATALOGUE = {"amplitude_nonlinearity": "moving_contact_edge"}  # one law, at any amplitude and in its limit
+_IN_CATALOGUE = {"amplitude_nonlinearity": "moving_contact_edge"}  # one law, at any amplitude and in its limit
 KNOWN = {**EFFECTS, **UNCATALOGUED}
+
+
+def in_catalogue(effect: str) -> str:
+    """The name of an effect in the catalogue of PHYSICS.md, section 8; `unknown` where it is not in it."""
+    return "unknown" if effect in UNCATALOGUED else _IN_CATALOGUE.get(effect, effect)
 
 
 def checked(kind: str, document: Any) -> dict[str, Values]:

@@ -11,6 +11,7 @@ with the parameters of what is hidden free, and E too.
 import math
 from typing import Any
 
+from rig.effects import in_catalogue
 from rig.joint_campaign import Hidden, Joint, JointDocument
 from rig.joint_fit import deviation, least_chi2
 from rig.joint_hypotheses import hypothesis
@@ -51,7 +52,7 @@ def _document(joint: Joint, number: int) -> dict[str, Any]:
         "skin": document.skin,
         "date": None if dates is None else dates[0][:10],
         "recordings": kinds,
-        "effects": [hidden.effect for hidden in joint.hidden if number in hidden.documents],
+        "effects": [in_catalogue(hidden.effect) for hidden in joint.hidden if number in hidden.documents],
         "declared": {
             "youngs_modulus_mpa": experiment.skin.youngs_modulus_mpa,
             "thickness_mm": experiment.skin.thickness_mm,
@@ -79,7 +80,7 @@ def _hidden(joint: Joint, hidden: Hidden) -> dict[str, Any]:
     if hidden.effect != "modulus_error":
         modulus_free = _gain(joint, hidden, everything, curves=True, declared=False)
     return {
-        "effect": hidden.effect,
+        "effect": in_catalogue(hidden.effect),
         "parameters": dict(hidden.parameters),
         "documents": [joint.documents[number].experiment.name for number in hidden.documents],
         "sensors": list(hidden.sensors) or None,

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from rig import visible_curves
-from rig.effects import IN_CATALOGUE, UNCATALOGUED
+from rig.effects import in_catalogue
 from rig.elastomer import RecordedCurve, true_modulus
 from rig.experiment import Experiment
 from rig.identifiable import THRESHOLD, visibility
@@ -16,7 +16,7 @@ SCHEMA = "truth/1"
 
 def truth_of(experiment: Experiment) -> dict[str, Any]:
     """The truth for any kind: effects by their catalogue names (`unknown` where not in it), and every parameter."""
-    names = ["unknown" if name in UNCATALOGUED else IN_CATALOGUE.get(name, name) for name in experiment.effects]
+    names = [in_catalogue(name) for name in experiment.effects]
     skin, on = experiment.skin, experiment.effects
     factors = {name: float(on[f"{name}_error"]["factor"]) if f"{name}_error" in on else 1.0
                for name in ("modulus", "thickness")}  # fmt: skip

@@ -25,11 +25,12 @@ from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
 from underskin.inversion.outliers import outlying
 from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
 from underskin.physics.charge_response import gain
-from underskin.physics.skin import Indenter, Skin
+from underskin.physics.skin import Indenter
 from underskin.prediction import domain_checks
+from underskin.prediction.declared_skin import DECLARED, declared_skin, log_slopes
 from underskin.prediction.domain_checks import usable
 from underskin.prediction.exchanged_values import exchanged_values
-from underskin.prediction.pressed_skin import frf_gradient, transmission
+from underskin.prediction.pressed_skin import transmission
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.conditions import Tolerances
 from underskin.recordings.frf.band_halves import lower_half
@@ -256,16 +257,7 @@ class _Contact:
 
     def __init__(self, campaign: Campaign, recorded: Sequence[FrfRecording], contact_model: ContactModel) -> None:
         described = campaign.skin
-        assert described.thickness_mm is not None
-        assert described.youngs_modulus_mpa is not None
-        assert described.sensor_radius_mm is not None
-        skin = Skin.from_lab(
-            thickness_mm=described.thickness_mm,
-            youngs_modulus_mpa=described.youngs_modulus_mpa,
-            sensor_radius_mm=described.sensor_radius_mm,
-            poisson_ratio=described.poisson_ratio,
-            units_checked=True,  # the campaign's reader has checked them
-        )
+        skin = declared_skin(described)
         indenter = Indenter(to_si("indenter_radius_mm", [item.indenter_radius_mm for item in recorded]))
         preload = to_si("preload_n", [item.preload_n for item in recorded])
         self.transmitted = transmitted = transmission(contact_model, skin, indenter, preload)
@@ -282,15 +274,10 @@ class _Contact:
             to_si("thickness_mm", offset) / thickness,
             float(mixed_model.POSITIONS[-1]) / thickness,
         )
-        slopes = frf_gradient(contact_model, skin, indenter, preload, 1.0)
-        size = transmitted.frf(1.0)
+        slopes = log_slopes(contact_model, skin, indenter, preload)
         off = described.tolerances or Tolerances()
-        changes = (
-            slopes["thickness"] * thickness * off.thickness_percent,
-            slopes["sensor_radius"] * skin.sensor_radius * off.sensor_radius_percent,
-            slopes["youngs_modulus"] * skin.youngs_modulus * off.youngs_modulus_percent,
-        )
-        self.declared_percent = np.linalg.norm(changes, axis=0) / size
+        changes = [slopes[name] * getattr(off, f"{name}_percent") for name in DECLARED]
+        self.declared_percent = np.linalg.norm(changes, axis=0)
 
 
 def _estimated(ids: tuple[str, ...], rows: RecordingD33, contact: _Contact, zone: FlatZone) -> Inversion:

@@ -4,9 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from service.store import Database, open_store
+from service.store import Database, database, open_store
 from service.usecases import mechanism_catalogue, mechanism_findings, mechanisms
+from tests.service.conftest import emptied
 from tests.service.routes.test_mechanisms import WARM
+from tests.support.diagnosed import diagnosed, report, resonant
+from tests.support.store_server import Server
 from underskin.surrogate.sigma_table import load_table
 
 
@@ -33,3 +36,16 @@ def test_a_file_that_is_removed_while_the_catalogue_is_read_is_not_shown(
         store.close()
         file.unlink(missing_ok=True)
         mechanisms.catalogue()  # as it was for other tests
+
+
+def test_what_a_restored_store_holds_under_the_same_numbers_is_read(server: Server) -> None:
+    """Another diagnosis may have the number of one that was looked at before."""
+    store = database(server.place.database_url, server.place.folder)
+    try:
+        for mechanism in ("contact_resonance", "modulus_error"):
+            emptied(server)
+            stated = {**report()["mechanisms"][0], "name": mechanism}
+            diagnosed(server, resonant(mechanism), {**report(), "mechanisms": [stated]})
+            assert set(mechanism_findings.findings(store).by_mechanism) == {mechanism}
+    finally:
+        store.close()

@@ -1,13 +1,15 @@
 """What the declared values of a skin may be off by, in d33."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.mechanisms.parameter import Normal
-from underskin.physics.skin import Indenter, Skin
-from underskin.prediction.pressed_skin import frf_gradient, transmission
+from underskin.physics.skin import INCOMPRESSIBLE, Indenter
+from underskin.prediction.declared_skin import declared_skin, log_slopes
 from underskin.recordings.conditions import Tolerances, frf_of
-from underskin.units import Floats, to_si
+from underskin.units import to_si
 
 
 def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
@@ -33,20 +35,11 @@ def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
 
 def _by_sensor_radius(problem: FittingProblem) -> float:
     """∂ ln FRF/∂ ln rT of the base model, the median of the recordings inside the table; 0 where none is."""
-    skin, frfs = problem.lines.campaign.skin, frf_of(problem.lines.campaign)
-    assert skin.thickness_mm is not None
-    assert skin.youngs_modulus_mpa is not None
-    assert skin.sensor_radius_mm is not None
-    declared = Skin.from_lab(
-        thickness_mm=skin.thickness_mm,
-        youngs_modulus_mpa=skin.youngs_modulus_mpa,
-        sensor_radius_mm=skin.sensor_radius_mm,
-        units_checked=True,
-    )
+    campaign = problem.lines.campaign
+    frfs = frf_of(campaign)
+    skin = declared_skin(replace(campaign.skin, poisson_ratio=INCOMPRESSIBLE))  # as the table is
     indenter = Indenter(to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in frfs]))
     preload = to_si("preload_n", [entry.preload_n for entry in frfs])
-    table = problem.table
-    slopes: Floats = frf_gradient(table, declared, indenter, preload, 1.0)["sensor_radius"] * declared.sensor_radius
-    relative = slopes / transmission(table, declared, indenter, preload).frf(1.0)
-    inside = np.isfinite(relative)
-    return float(np.median(relative[inside])) if inside.any() else 0.0
+    slopes = log_slopes(problem.table, skin, indenter, preload)["sensor_radius"]
+    inside = np.isfinite(slopes)
+    return float(np.median(slopes[inside])) if inside.any() else 0.0

@@ -1,5 +1,6 @@
 """What the base model idealises although declared facts say it: laws without a free parameter, such as the layer's."""
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -21,10 +22,11 @@ def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> li
     that is by the evidence.
     """
     named = problem.lines.mechanisms.named
+    stated = {frozenset(answer.names) for answer in search.answers}
     return [
         {
             "name": name,
-            "probability": round(sum(_probability(answer, problem, name) for answer in search.answers), 3),
+            "probability": round(sum(_probability(one, problem, name, stated) for one in search.answers), 3),
             "effect_percent": rounded(_effect_percent(problem, shown, name), 2),
         }
         for name in named
@@ -32,11 +34,12 @@ def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> li
     ]
 
 
-def _probability(answer: Answer, problem: FittingProblem, name: str) -> float:
-    """The posterior of an answer and the law together."""
+def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Collection[frozenset[str]]) -> float:
+    """The posterior of an answer and the law together; 0 of one beside which the answer with the law is `stated`."""
     if answer.explanation is None or name in answer.names:
         return answer.probability * (0.5 if answer.explanation is None else 1.0)
-    if answer.probability < _COUNTS:
+    with_law = frozenset({name, *answer.explanation.names, *answer.alone})
+    if answer.probability < _COUNTS or with_law in stated:
         return 0.0
     measured = "youngs_modulus" if problem.lines.curves else "d33"
     found = beside(problem, answer.explanation, name, measured)

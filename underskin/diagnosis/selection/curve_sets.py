@@ -5,7 +5,6 @@ alike share the bend between them in many ways. So where the best set leaves mor
 from starts over the parameters of both.
 """
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -18,16 +17,6 @@ from underskin.diagnosis.selection.smaller_sets import Explanations, was_stuck
 
 _LEFT = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior expects one
 _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
-
-
-def all_pairs(names: Sequence[str], explanations: Explanations) -> list[Request]:
-    """Every pair, from the better of its two: few mechanisms act on curves, and two may hide each other."""
-    requests = []
-    for one, other in itertools.combinations(names, 2):
-        known = [explanations[key] for key in (frozenset([one]), frozenset([other])) if key in explanations]
-        parent = max(known, key=lambda entry: entry.log_evidence, default=None)
-        requests.append(Request((one, other), parent))
-    return requests
 
 
 def afresh(problem: FittingProblem, explanations: Explanations, pairs: Sequence[Request]) -> Explanations:

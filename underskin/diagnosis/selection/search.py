@@ -1,10 +1,11 @@
 """Which sets of mechanisms are fitted; how probable each is, answers.py works out.
 
-Priors over sets are fixed (priors.py). Singles are all fitted; pairs and triples grow greedily from the best, but of
-curves all pairs are. The best are then fitted again without each of their mechanisms (smaller_sets.py); from what fits
-better for it, sets grow once more.
+Priors over sets are fixed (priors.py). Singles are all fitted; pairs and triples grow greedily from the best, but all
+pairs are fitted of curves, and of laws of declared values, material, contact and increment. The best are then fitted
+again without each of their mechanisms (smaller_sets.py); from what fits better for it, sets grow once more.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -129,7 +130,7 @@ class _Sets:
         for size in range(2, largest + 1):
             self.integrate(1)
             if curves and size == 2:
-                requests = curve_sets.all_pairs(self.names, self.explanations)
+                requests = self._all_pairs(self.names)
                 self.explain(requests)
                 self.explanations |= curve_sets.afresh(self.problem, self.explanations, requests)
             else:
@@ -162,8 +163,16 @@ class _Sets:
                     over_both.append(Request(names))
         if size == 2:
             paired = [name for name in self.names if known[name].stage in _PAIRED]
-            over_both += curve_sets.all_pairs(paired, self.explanations)
+            over_both += self._all_pairs(paired)
         return [*requests, *over_both]
+
+    def _all_pairs(self, names: Sequence[str]) -> list[Request]:
+        """Every pair, from the better of its two: two may hide each other."""
+        requests = []
+        for pair in itertools.combinations(names, 2):
+            known = [self.explanations[key] for one in pair if (key := frozenset([one])) in self.explanations]
+            requests.append(Request(pair, max(known, key=lambda entry: entry.log_evidence, default=None)))
+        return requests
 
     def refit_smaller(self) -> bool:
         """Fit the best sets again without each of their mechanisms; whether any fits better for it."""
