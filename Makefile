@@ -24,6 +24,9 @@ PIP = -m pip install --quiet --disable-pip-version-check --no-compile
 PIP_INSTALL = $(PYTHON) $(PIP)
 
 .DEFAULT_GOAL := help
+
+# Parts of the set-up that do not wait for each other run side by side.
+MAKEFLAGS += --jobs=2
 .PHONY: help serve unit test check docs tables paper tour openapi mechanisms ledger house proof bench soak lock clean
 
 help: ## this list
