@@ -15,7 +15,8 @@ def prove(
         list[str] | None,
         typer.Argument(
             help="open, sealed, recordings, paper, mixture, ceiling, quiet, curves, quiet_curves, unlisted, "
-            "quiet_unlisted, left_out, joint, wrong_modulus, slips, search, coverage, sensitivity; default: all."
+            "quiet_unlisted, left_out, joint, wrong_modulus, slips, search, coverage, sensitivity, solved_contact; "
+            "default: all."
         ),
     ] = None,
     count: Annotated[int | None, typer.Option(min=1, help="Campaigns of each part at most; default: all.")] = None,

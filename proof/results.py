@@ -18,6 +18,7 @@ from proof import (
     search_misses,
     sensitivity,
     slips,
+    solved_contact,
     unlisted,
     wrong_modulus,
 )
@@ -107,6 +108,7 @@ PARTS: dict[str, Part] = {
     "sensitivity": sensitivity.judge_sensitivity,
     "wrong_modulus": wrong_modulus.judge_wrong_modulus,
     "slips": slips.judge_slips,
+    "solved_contact": solved_contact.judge_solved,
 }
 
 

@@ -1,7 +1,6 @@
 """FRF campaigns made by solving the contact (`rig.solved`): what is named in them, and whether quoted d33 holds.
 
-`python -m proof.solved_contact --count N`; the campaigns and the reports are kept in the folder of single answers, so
-that a stopped run resumes. Declared sizes are off by their tolerances, so the absolute interval of d33 is judged.
+Declared sizes are off by their tolerances, so the absolute interval of d33 is judged.
 An answer is
 - `right`: the law that is in the data, beside laws of the plain world; these alone, or no mismatch where even they do
   not show, in the plain world and where the effect does not show;
@@ -12,17 +11,13 @@ An answer is
 An effect that does not show and moves d33 by more than the tolerances is a row of its own: no interval can know of it.
 """
 
-import argparse
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from proof.cases import MadeCase
 from proof.names import one_name_each
-from proof.statistics import Share, share
 from proof.stored import Work, digest_of, of_each, reports, sources, stored
 from rig.solved.campaign import document, drawn
 from rig.solved.worlds import PLAIN
@@ -37,6 +32,7 @@ CLASSES = (RIGHT, EQUIVALENT, PARTLY, HONEST, WRONG)
 
 Report = Mapping[str, Any]
 Truth = Mapping[str, Any]
+Judgement = Mapping[str, Any]
 
 
 def judge_solved(work: Work, progress: Callable[[int, int], None]) -> dict[str, Any]:
@@ -108,65 +104,17 @@ def _names(report: Report) -> tuple[str, ...]:
     return one_name_each(one["name"] for one in report["mechanisms"])
 
 
-def summary(judged: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The table of classes, and the lines on confident statements and on quoted d33."""
-    rows = {effect: [one for one in judged if one["effect"] == effect] for effect in sorted(_effects(judged))}
-    rows["effect shows"] = [one for one in judged if one["visible"]]
+def rows(judged: Sequence[Judgement]) -> dict[str, list[Judgement]]:
+    """The campaigns by effect, by whether the effect shows, and all."""
+    found = {effect: [one for one in judged if one["effect"] == effect] for effect in sorted(_effects(judged))}
+    found["effect shows"] = [one for one in judged if one["visible"]]
     unseen = [one for one in judged if not one["visible"] and one["effect"] != PLAIN]
-    rows["does not show"] = unseen
-    rows["  moves d33"] = [one for one in unseen if abs(one["plain_world_off"]) > _MOVES]
-    rows["all but these"] = [one for one in judged if one not in rows["  moves d33"]]
-    rows["all"] = list(judged)
-    lines = [f"{'':14s} {'n':>4s} " + " ".join(f"{name:>10s}" for name in CLASSES) + "   quoted d33 inside, rms"]
-    for name, some in rows.items():
-        counts = " ".join(f"{sum(one['class'] == grade for one in some):10d}" for grade in CLASSES)
-        lines.append(f"{name:14s} {len(some):4d} {counts}   {_quoted(some)}")
-    confident = [one for one in judged if one["class"] != HONEST]
-    wrong = share([one["class"] == WRONG for one in confident])
-    stated = share([one["class"] != HONEST for one in judged if one["visible"]])
-    return [
-        *lines,
-        f"confident statements: {len(confident)} of {len(judged)}, wrong {_of(wrong)}",
-        f"stated with confidence where the effect shows: {_of(stated)}",
-    ]
+    found["effect does not show"] = unseen
+    found["of these, d33 moved"] = [one for one in unseen if abs(one["plain_world_off"]) > _MOVES]
+    found["all but these"] = [one for one in judged if one not in found["of these, d33 moved"]]
+    found["all"] = list(judged)
+    return found
 
 
-def _effects(judged: Sequence[Mapping[str, Any]]) -> set[str]:
+def _effects(judged: Sequence[Judgement]) -> set[str]:
     return {one["effect"] for one in judged}
-
-
-def _quoted(some: Sequence[Mapping[str, Any]]) -> str:
-    quoted = [one for one in some if one["quoted"]]
-    if not quoted:
-        return "none"
-    off = np.array([one["off"] for one in quoted])
-    return f"{_of(share([one['inside'] for one in quoted]))}, {100 * np.sqrt(np.mean(off**2)):.1f} %"
-
-
-def _of(found: Share) -> str:
-    low, high = found.interval
-    return f"{found.right}/{found.count} ({100 * low:.0f}–{100 * high:.0f} %)"
-
-
-def main() -> None:
-    """Judge and print."""
-    parser = argparse.ArgumentParser(description="Judge the diagnosis on campaigns whose contact is solved.")
-    parser.add_argument("--count", type=int, default=COUNT, help="campaigns, the first of the seed")
-    parser.add_argument("--workers", type=int, default=1, help="processes")
-    parser.add_argument("--work-dir", type=Path, default=Path("build/proof"), help="where single answers are kept")
-    asked = parser.parse_args()
-    result = judge_solved(Work(asked.work_dir, asked.workers, asked.count), lambda _done, _of: None)
-    for one in result["judged"]:
-        off = "-" if one["off"] is None else f"{100 * one['off']:+.1f} ± {100 * one['half_width']:.1f} %"
-        quoted = " quoted" if one["quoted"] else ""
-        place = "inside" if one["inside"] else "OUTSIDE"
-        print(
-            f"{one['class']:10s} {one['name']} {one['effect']:12s} gain {one['chi2_gain_of_truth']:.0f}, over plain "
-            f"{one['chi2_gain_over_plain_world']:.0f}: {one['verdict']} {one['probability']:.2f} "
-            f"{'+'.join(one['names'])} | d33 {off} {place}{quoted}"
-        )
-    print("\n".join(summary(result["judged"])))
-
-
-if __name__ == "__main__":
-    main()

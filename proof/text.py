@@ -14,6 +14,7 @@ from proof.text_curves import curves, quiet_curves
 from proof.text_joint import joint
 from proof.text_real import paper_array, recordings
 from proof.text_slips import slips
+from proof.text_solved import solved_contact
 from proof.text_summary import summary
 from proof.text_unlisted import alarms, hidden, left_out
 from proof.text_wide import coverage, search_misses, sensitivity
@@ -42,6 +43,7 @@ amplitude at one amplitude are twins, and nobody could name the one or the other
 def document(parts: Mapping[str, Result]) -> str:
     """The page of all parts that were worked out."""
     sections = {
+        "solved_contact": solved_contact,
         "open": _concealed,
         "sealed": _sealed,
         "mixture": lambda result: _mixture(result, parts.get("ceiling")),

@@ -4,7 +4,8 @@ from typing import Any
 
 import pytest
 
-from proof.solved_contact import compared, graded, summary
+from proof.solved_contact import compared, graded
+from proof.text_solved import solved_contact
 
 PLAIN: dict[str, Any] = {
     "effect": "plain", "exact_name": None, "nearest_names": [], "d33_pc_per_n": 14.0, "chi2_gain_of_truth": 300.0,
@@ -57,6 +58,8 @@ def test_quoted_d33() -> None:
     judged.append(compared(UNSEEN, report("explained", *LAWS, d33=None)))
     assert [one["inside"] for one in judged] == [True, False, False]
     assert judged[0]["off"] == pytest.approx(0.4 / 14)
-    everything = next(line for line in summary(judged) if line.split()[:2] == ["all", "3"])
-    assert "1/2 (" in everything
-    assert summary(judged)[-2].startswith("confident statements: 2 of 3, wrong 0/2")
+    page = solved_contact({"seed": 1, "judged": judged})
+    everything = next(line for line in page.splitlines() if line.startswith("| all |"))
+    assert [cell.strip() for cell in everything.split("|")[2:8]] == ["3", "2", "0", "0", "1", "0"]
+    assert "| 1 of 2: 50 %" in everything
+    assert "Confident statements that are wrong:\n0 of 2: 0 %" in page

@@ -1,0 +1,47 @@
+"""The page's section on campaigns whose contact is solved."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proof.markdown import table
+from proof.phrases import percent
+from proof.solved_contact import CLASSES, HONEST, RIGHT, WRONG, Judgement, rows
+from proof.statistics import share
+from rig.solved.worlds import PLAIN
+
+
+def solved_contact(result: Mapping[str, Any]) -> str:
+    """What is named and what is quoted where finite elements made the campaigns."""
+    judged = result["judged"]
+    confident = [one for one in judged if one["class"] != HONEST]
+    shows = [one["class"] != HONEST for one in judged if one["visible"]]
+    plain = [one["class"] == RIGHT for one in judged if one["effect"] == PLAIN]
+    body = [[name, *_counts(some), *_quoted(some)] for name, some in rows(judged).items() if some]
+    return f"""\
+## Campaigns made by solving the contact
+
+{len(judged)} campaigns of `rig/solved` (seed {result["seed"]}): a sphere in true contact with a neo-Hookean layer at
+finite strain, by finite elements, alone (*{PLAIN}*) or with one more effect; declared sizes are off by their
+tolerances. *Right* is the law that is in the data beside those of the plain world; *honest* asserts nothing, or an
+unlisted law. An effect shows if it gains more than 20 in χ² over the plain world. One that does not and moves d33 by
+more than the tolerances is a row of its own: no interval can know of it.
+
+{table(["effect", "campaigns", *CLASSES, "quoted d33 inside", "rms error"], body)}
+Plain world named: {percent(share(plain))}. Confident statements that are wrong:
+{percent(share([one["class"] == WRONG for one in confident]))}. Where the effect shows, stated with confidence:
+{percent(share(shows))}.
+"""
+
+
+def _counts(some: Sequence[Judgement]) -> list[str]:
+    return [str(len(some)), *(str(sum(one["class"] == grade for one in some)) for grade in CLASSES)]
+
+
+def _quoted(some: Sequence[Judgement]) -> list[str]:
+    quoted = [one for one in some if one["quoted"]]
+    if not quoted:
+        return ["none quoted", ""]
+    off = np.array([one["off"] for one in quoted])
+    return [percent(share([one["inside"] for one in quoted])), f"{100 * np.sqrt(np.mean(off**2)):.1f} %"]
