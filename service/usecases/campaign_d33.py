@@ -10,9 +10,9 @@ from underskin import InvalidInput
 from underskin.units import to_lab
 
 if TYPE_CHECKING:
+    from underskin.inversion.elastomer import RecordingModulus
     from underskin.inversion.invert import Inversion
     from underskin.inversion.mixed_model import Estimate
-    from underskin.recordings.elastomer import RecordingModulus
 
 
 def of_inversion(inversion: "Inversion") -> dict[str, Any]:

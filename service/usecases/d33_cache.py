@@ -217,8 +217,9 @@ def _inverted(
     campaign: Campaign, table: SigmaTable, band_hz: BandHz | None
 ) -> "tuple[dict[str, Any], Inversion | None]":
     # Imported here: statistics take half a second to load, which a start need not wait for.
+    from underskin.inversion import elastomer
     from underskin.inversion.invert import invert
-    from underskin.recordings import elastomer, plausibility
+    from underskin.recordings import plausibility
 
     moduli, without_modulus = of_moduli(elastomer.of_campaign(campaign))
     try:

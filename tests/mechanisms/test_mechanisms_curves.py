@@ -54,7 +54,7 @@ def test_the_base_model_is_hertz_with_a_contact_point() -> None:
 def test_where_no_modulus_is_declared_it_is_free_and_found_by_hertz() -> None:
     recorded = indentation(DEPTH, skin=replace(SKIN, youngs_modulus_mpa=None))
     model = compose([], recorded, table())
-    assert [parameter.unit for parameter in model.parameters] == ["MPa", "-", "mm"]
+    assert [parameter.unit for parameter in model.parameters] == ["MPa", "-", "-", "mm"]
     start = fit_of(model)
     assert np.exp(start[0]) == pytest.approx(E_MPA, rel=1e-3)
     assert model.predict(start).value == pytest.approx(hertz_force(DEPTH, R_MM, E_MPA), abs=2e-3)
@@ -214,10 +214,12 @@ NEEDS_RECORDINGS = pytest.mark.skipif(
 
 
 def fitted(names: Sequence[str], recorded: Campaign, measured: Floats) -> tuple[Floats, float]:
-    """Fit with noise of 0.5 % and the priors: the fit coordinates, the residual in percent of the largest force."""
+    """Fit the linear contact with noise of 0.5 % and the priors: the fit coordinates, the residual in percent of the
+    largest force."""
     model = compose(names, recorded, table())
     priors = [parameter.prior for parameter in model.parameters]
-    mean, sd = np.array([(prior.mean, prior.sd) for prior in priors if isinstance(prior, Normal)]).T
+    centres = [(prior.mean, prior.sd) if isinstance(prior, Normal) else (0.0, 1e-3) for prior in priors]
+    mean, sd = np.array(centres).T
     noise = 0.005 * measured.max()
 
     def misfit(fit: Floats) -> Floats:

@@ -6,7 +6,7 @@ import pytest
 from tests.support.sphere_curves import campaign, hertz, pressed, ways
 from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
-from underskin.recordings import elastomer
+from underskin.inversion import elastomer
 from underskin.recordings.campaign import Campaign
 from underskin.recordings.curve_defects import periodic_error
 from underskin.recordings.curve_signs import falling

@@ -8,7 +8,8 @@ import pytest
 
 from tests.support.blocks import block
 from underskin import InvalidInput
-from underskin.recordings import curve_signs, elastomer, plausibility
+from underskin.inversion import elastomer
+from underskin.recordings import curve_signs, plausibility
 from underskin.recordings.campaign import Campaign, IndentationRecording, from_dict, samples_of
 
 SIGNS = list(product((1, -1), (1, -1)))

@@ -15,9 +15,9 @@ from underskin.cli.rigs import reading_notes
 from underskin.errors import InvalidInput
 from underskin.findings.alike import recordings_called, told_together
 from underskin.findings.formatting import significant
+from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion
 from underskin.recordings import plausibility
-from underskin.recordings.elastomer import RecordingModulus
 from underskin.recordings.reading import Reading
 from underskin.units import to_lab
 

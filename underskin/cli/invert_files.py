@@ -12,10 +12,11 @@ from underskin.cli.campaign_table import InvertedFile, write_csv, write_tables
 from underskin.cli.rigs import rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
 from underskin.findings.formatting import significant
+from underskin.inversion import elastomer
 from underskin.inversion.invert import Inversion, invert
 from underskin.inversion.other_contact import array_d33_by_other
 from underskin.prediction.other_contact import OTHER, WORDS
-from underskin.recordings import Reading, elastomer, join, read_file, validation
+from underskin.recordings import Reading, join, read_file, validation
 from underskin.recordings.frf.estimators import Estimator
 from underskin.recordings.rig_description import RigDescription
 from underskin.surrogate.contact_model import ContactName

@@ -17,7 +17,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.models.compression import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
-from underskin.mechanisms.models.nuisances import D33, THICKNESS, YOUNGS_MODULUS
+from underskin.mechanisms.models.nuisances import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.models.response import joined
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
@@ -40,7 +40,7 @@ HOOKS = {  # by the stage that calls them
 }
 T = TypeVar("T")
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
-_NUISANCES = (*(entry.name for entry in (D33, YOUNGS_MODULUS, THICKNESS)), "contact_point")
+_NUISANCES = (*(entry.name for entry in (D33, YOUNGS_MODULUS, THICKNESS, STRAIN_SHARE)), "contact_point")
 
 
 def check(mechanism: Mechanism, others: Sequence[Mechanism] = ()) -> None:

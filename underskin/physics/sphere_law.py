@@ -7,8 +7,11 @@ On the half space, with the contact radius a and E' = E/(1 − ν²) (Sneddon, I
 For small a/R these are Hertz's δ = a²/R and F = 4E'a³/(3R); at a given depth the force is lower than Hertz's by about a
 tenth of δ/R. On a layer of thickness h, δ is multiplied by the layer's ratio B(a/h), and F = ∫ k dδ with the stiffness
 k = 2E'a S(a/h) of the flat punch (contact_curves).
+
+Finite strain makes δ larger at the same force, by a function of a/h of the linear contact and of L = F/(R²E).
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +24,13 @@ _NODES = 4001
 _WIDEST = 0.999  # of R, up to which the contact radius is tabulated
 _PARABOLOID_TO = 10.0  # of R, the same of a paraboloid, which a fit that goes astray may ask for
 PARABOLOID = 0.4  # of R: pressed less deep, a paraboloid's force is within 4 % of the sphere's
+LOAD_OF_REDUCED = 4 / 3  # L = F/(R²E) over F/(R²E'), at ν = ½
+# δ of the whole sphere over the paraboloid's at the same force is 1 + this L^(2/3): Sneddon's law to its second order,
+# with a/R = (9L/16)^(1/3).
+WHOLE_OF_LOAD = (9 / 16) ** (2 / 3) / 15
+
+# δ over the linear contact's at the same force, less 1, of a/h and L^(1/3)
+Softening = Callable[[Floats, Floats], Floats]
 
 
 class SphereLaw:
@@ -34,7 +44,15 @@ class SphereLaw:
         Depth [m] up to which the law is known: on a layer that at a/h = LARGEST_A_OVER_H.
     """
 
-    def __init__(self, radius: float, thickness: float | None, poisson_ratio: float, *, whole: bool = False) -> None:
+    def __init__(
+        self,
+        radius: float,
+        thickness: float | None,
+        poisson_ratio: float,
+        softening: Softening | None = None,
+        *,
+        whole: bool = False,
+    ) -> None:
         """Tabulate the law."""
         widest = (_WIDEST if whole else _PARABOLOID_TO) * radius
         if thickness is not None:
@@ -45,7 +63,12 @@ class SphereLaw:
             ratio = _ratios(poisson_ratio)(a / thickness)
             depth, stiffness = depth * ratio[:, 1], stiffness * ratio[:, 2]
         steps = np.diff(depth) * (stiffness[1:] + stiffness[:-1]) / 2
-        self._depth, self._root = depth, np.cbrt(np.append(0.0, np.cumsum(steps))) ** 2
+        force = np.append(0.0, np.cumsum(steps))
+        if softening is not None:
+            cbrt_load = np.cbrt(LOAD_OF_REDUCED * force) / np.cbrt(radius) ** 2
+            larger = softening(np.zeros_like(a) if thickness is None else a / thickness, cbrt_load)
+            depth = depth * (1 + larger - (WHOLE_OF_LOAD * cbrt_load**2 if whole else 0.0))
+        self._depth, self._root = depth, np.cbrt(force) ** 2
         self.deepest = float(depth[-1])
 
     def __call__(self, depth: Floats) -> Floats:

@@ -8,14 +8,14 @@ power of the depth than a sphere's. That power is 1 under a flat punch or a stag
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from underskin.errors import InvalidInput, unusable
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.physics.sphere_law import PARABOLOID, SphereLaw
+from underskin.physics.sphere_law import PARABOLOID, Softening, SphereLaw
 from underskin.recordings.campaign import IndentationRecording
 from underskin.recordings.curve_jumps import roughness
 from underskin.recordings.loading_branch import loading_branch
@@ -54,6 +54,7 @@ class IndentationModulus:
     thickness: float | None
     declared_thickness: float | None
     noise: float
+    finite_strain: float = 0.0  # of E, by which it is higher where the solved contact is taken
 
     @property
     def statement(self) -> str:
@@ -62,11 +63,12 @@ class IndentationModulus:
         over = f"{self.depth / self.radius:.2g} of the radius"
         if self.declared_thickness is not None:
             over += f", {self.depth / self.declared_thickness:.2g} of the thickness"
+        strain = f"; up to {100 * self.finite_strain:.2g} % more by finite strain" if self.finite_strain > 0 else ""
         times = self.residual / self.noise if self.noise > 0 else 0.0
         misses = f", {times:.2g} times the noise: the law is not all" if times > _NOT_ALL else ""
         return (
             f"sphere on a {self._body}, contact from {contact:.4g} mm, pressed {over} deep; it leaves "
-            f"{self.residual:.2g} N (root mean square{misses})"
+            f"{self.residual:.2g} N (root mean square{misses}){strain}"
         )
 
     @property
@@ -94,7 +96,10 @@ class _Fit:
 
 
 def of_indentation(
-    recording: IndentationRecording, poisson_ratio: float, thickness_mm: float | None = None
+    recording: IndentationRecording,
+    poisson_ratio: float,
+    thickness_mm: float | None = None,
+    softening: Softening | None = None,
 ) -> IndentationModulus:
     """The modulus of an `indentation` recording; raises InvalidInput where no number can be quoted."""
     thickness = None if thickness_mm is None else float(to_si("thickness_mm", thickness_mm))
@@ -104,14 +109,22 @@ def of_indentation(
         float(to_si("indenter_radius_mm", recording.indenter_radius_mm)),
         poisson_ratio,
         thickness,
+        softening,
     )
 
 
 def indentation_modulus(
-    displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None = None
+    displacement: Floats,
+    force: Floats,
+    radius: float,
+    poisson_ratio: float,
+    thickness: float | None = None,
+    softening: Softening | None = None,
 ) -> IndentationModulus:
     """The sphere's modulus with a free contact point, and a free force offset where points before contact show it.
 
+    The modulus is the linear contact's. What finite strain adds to the depth is known for one contact alone
+    (`softening`): the uncertainty is that of a value anywhere between the moduli without and with it.
     Raises InvalidInput where the loading branch has too few points, does not load, or leaves the modulus open, where it
     is pressed deeper than the law holds, and where it follows no sphere's law.
     """
@@ -125,7 +138,12 @@ def indentation_modulus(
     tip = _tip(depth, load, fit, thickness)
     if tip is not None:
         raise tip.refusal
-    return found
+    if softening is None:
+        return found
+    softer = _as_deep(depth, load, radius, used, poisson_ratio, softening)
+    more = float(softer.fitted[0] / fit.fitted[0]) - 1
+    uncertainty = float(np.hypot(found.uncertainty, found.modulus * more / np.sqrt(3)))
+    return replace(found, uncertainty=uncertainty, finite_strain=more)
 
 
 def estimate(
@@ -209,7 +227,11 @@ def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip
 
 
 def _sphere_fit(
-    depth: Floats, load: Floats, radius: float, poisson_ratio: float, thickness: float | None
+    depth: Floats,
+    load: Floats,
+    radius: float,
+    poisson_ratio: float,
+    thickness: float | None,
 ) -> tuple[_Fit, float | None]:
     """The fit on the declared layer, or on the half space where that is plainly the better law; and the thickness that
     it is of."""
@@ -222,12 +244,19 @@ def _sphere_fit(
     return layer, thickness
 
 
-def _as_deep(depth: Floats, load: Floats, radius: float, thickness: float | None, poisson_ratio: float) -> _Fit:
+def _as_deep(
+    depth: Floats,
+    load: Floats,
+    radius: float,
+    thickness: float | None,
+    poisson_ratio: float,
+    softening: Softening | None = None,
+) -> _Fit:
     """With the whole sphere in place of the paraboloid where it is pressed deep."""
-    fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio))
+    fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening))
     if depth.max() - fit.contact < PARABOLOID * radius:
         return fit
-    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, whole=True))
+    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, whole=True))
 
 
 def _to_power(law: Callable[[Floats], Floats], power: float) -> Callable[[Floats], Floats]:

@@ -10,7 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
@@ -42,6 +42,9 @@ class ContactTable(Table):
         self.correction_error = state["correction_error"]
         self.contact_radius, self.indentation = state["contact_radius"], state["indentation"]
         self.stiffness = state["stiffness"]
+        x = self.axes[1][1:, None]
+        coefficients = np.linalg.lstsq(x ** np.array([1.0, 2.0, 3.0]), self.indentation[:, 1:].T - 1, rcond=None)[0]
+        self._softening = CubicSpline(self.axes[0], coefficients.T)
         self._over_radius = make_interp_spline(self.axes[2], state["correction"], k=3, axis=2)
 
     @property
@@ -65,6 +68,19 @@ class ContactTable(Table):
         In σ's scale: T3 = −(3F/2πh²) · (linear contact + correction).
         """
         return np.asarray(self._over_radius(r_over_h))
+
+    def softening_coefficients(self, a_over_h: Floats) -> Floats:
+        """p0, p1 and p2 (…, 3) of δ/δ_linear − 1 = x (p0 + p1 x + p2 x²) at the same force, x = L^(1/3).
+
+        Within 2e-5 of the table at its nodes; the last a/h stands for wider contacts.
+        """
+        return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
+
+    def softening(self, a_over_h: Floats, cbrt_load: Floats) -> Floats:
+        """δ/δ_linear − 1 at the same force; the last L stands for larger ones."""
+        x = np.minimum(cbrt_load, self.axes[1][-1])
+        p0, p1, p2 = np.moveaxis(self.softening_coefficients(a_over_h), -1, 0)
+        return np.asarray(x * (p0 + x * (p1 + x * p2)))
 
 
 def load_contact(path: Path | None = None) -> ContactTable:

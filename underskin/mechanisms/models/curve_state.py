@@ -37,6 +37,7 @@ class Curve:
 
     modulus: Differentiated  # E [Pa]
     poisson_ratio: Differentiated
+    strain_share: Differentiated | None = None  # of an indentation: that of finite strain's correction (Sphere)
     thickness: Differentiated | None = None  # h [m]
     layered: bool = False
     work_of_adhesion: Differentiated | None = None  # [J/m²]

@@ -1,10 +1,10 @@
 """The force of indentation curves, sample by sample, under a set of mechanisms.
 
 Base model: Hertz on a half space, F = (4/3) E/(1 − ν²) √R (d − d0)^(3/2), with the contact point d0 and, where none is
-declared, E free; under a sphere that is pressed deep, Sneddon's law of the whole sphere in its place. Stages: declared
-value → material → contact radius, depth and force together with the stage's give, through the body's history where it
-relaxes. What the load cell adds, a zero, a drift and a gain, stands in the
-covariance (diagnosis/noise).
+declared, E free; under a sphere that is pressed deep, Sneddon's law of the whole sphere in its place; and a share of
+what finite strain adds to the depth. Stages: declared value → material → contact radius, depth and force together with
+the stage's give, through the body's history where it relaxes. What the load cell adds, a zero, a drift and a gain,
+stands in the covariance (diagnosis/noise).
 """
 
 from collections.abc import Callable, Sequence
@@ -20,6 +20,7 @@ from underskin.mechanisms.models.creeping_contact import Adhesion, Path, relaxin
 from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
 from underskin.mechanisms.models.curves import CurveModel, declared_modulus, times_of
 from underskin.mechanisms.models.nuisances import (
+    STRAIN_SHARE,
     contact_point,
     modulus_parameter,
     required_modulus,
@@ -70,6 +71,7 @@ class IndentationModel(CurveModel):
         curve = Curve(
             modulus=modulus,
             poisson_ratio=constant(self._skin.poisson_ratio, 0, modulus.value.shape[:-1]),
+            strain_share=nuisances[STRAIN_SHARE.name],
             thickness=None if thickness is None else to_si("thickness_mm", thickness) * nuisances["thickness"],
         )
         for mechanism in self._mechanisms:
@@ -144,7 +146,8 @@ class IndentationModel(CurveModel):
         stiffening = None if curve.stiffening is None else Stiffening(*map(numbers, curve.stiffening))
         give = 0.0 if curve.stage_stiffness is None else 1.0 / numbers(curve.stage_stiffness)
         reduced = numbers(curve.modulus) / (1 - poisson_ratio**2)
-        return Sphere(reduced, self._radius, layers, stiffening, give, self._whole)
+        assert curve.strain_share is not None
+        return Sphere(reduced, self._radius, layers, stiffening, give, self._whole, numbers(curve.strain_share))
 
 
 def _adhesion(curve: Curve) -> Adhesion | None:
@@ -197,7 +200,7 @@ def _nuisances(recordings: Sequence[IndentationConditions], skin: SkinDescriptio
     thickness = [] if skin.thickness_mm is None else [thickness_parameter(skin)]
     if not estimates:
         required_modulus(skin)
-    return [modulus_parameter(skin, estimates), *thickness, *contact_points]
+    return [modulus_parameter(skin, estimates), STRAIN_SHARE, *thickness, *contact_points]
 
 
 def _secant_modulus(entry: IndentationRecording, poisson_ratio: float) -> float:

@@ -1,5 +1,6 @@
 """Parameters that every model has, whatever its mechanisms: of FRFs d33 and factors on the declared modulus and
-thickness; of a curve its modulus and where its contact begins.
+thickness; of a curve its modulus and where its contact begins,
+and of an indentation what finite strain adds to its depth.
 """
 
 from collections.abc import Sequence
@@ -8,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from underskin.errors import required
-from underskin.mechanisms.parameter import Normal, Parameter
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
 from underskin.recordings.conditions import SkinDescription
 from underskin.units import to_lab
 
@@ -25,6 +26,10 @@ YOUNGS_MODULUS = Parameter(
     "youngs_modulus", "-", 0.9, 1.1, Normal(0.0, 0.02), "log", limit=1.0, reason=_DECLARED_MODULUS
 )
 THICKNESS = Parameter("thickness", "-", 0.95, 1.05, Normal(0.0, 0.01), "log", limit=1.0, reason=_DECLARED_THICKNESS)
+_STRAIN_SHARE = "0 is the linear contact, 1 the solved frictionless one of a neo-Hookean layer; friction lies between"
+STRAIN_SHARE = Parameter(
+    "finite_strain", "-", 0.0, 1.0, Uniform(), "linear", limit=None, reason=_STRAIN_SHARE, closed=(0.0, 1.0)
+)
 _LEAST_SD = 1e-4  # of a factor on a value that is declared to be exact
 _BOUNDS = 5.0  # standard deviations
 _WIDE_SD = 1.5  # of the logarithm of a modulus that nobody declared

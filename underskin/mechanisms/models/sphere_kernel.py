@@ -1,16 +1,17 @@
 """Compiled: the contact of a sphere as a function of its radius, and the radius at a travel; see sphere_contact.
 
-Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 8) holds the reduced modulus E', the
-sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, and 1
-where the sphere is pressed so deep that it is no paraboloid (else 0).
-`cubics` (layers, cells, powers, 4) are a layer's ratios over a/h from 0 to `LARGEST_A_OVER_H`, highest power first, of
-each point or one for all.
+Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 9) holds the reduced modulus E', the
+sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, 1
+where the sphere is pressed so deep that it is no paraboloid (else 0), and the share of finite strain's correction.
+`cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
+from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has those of one cell.
 """
 
 import math
 
 from underskin.compiled import compiled
 from underskin.physics.contact_curves import LARGEST_A_OVER_H
+from underskin.physics.sphere_law import LOAD_OF_REDUCED, WHOLE_OF_LOAD
 from underskin.units import Floats, Mask
 
 _STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where the law ends
@@ -22,9 +23,10 @@ _NO_CONTACT = 1e-15  # m, which stands for no radius
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
 _BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
 _HALVINGS = 40
+LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
 _LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
 
-Own = tuple[float, float, float, float, float, float, float, float]  # a body's numbers
+Own = tuple[float, float, float, float, float, float, float, float, float]  # a body's numbers
 Four = tuple[float, float, float, float]
 
 _ROWS = "float64[:, :, ::1]"
@@ -57,7 +59,7 @@ def _secant_ratio(strain: float, coefficient: float, form: float, exponent: floa
 @compiled()
 def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
     own = body[point, curve, min(sample, body.shape[2] - 1)]
-    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7]
+    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7], own[8]
 
 
 @compiled()
@@ -79,11 +81,33 @@ def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
 
 
 @compiled()
+def _strain_ratio(
+    load: float, by_load: float, whole: float, cubics: Floats, u: float, per_h: float
+) -> tuple[float, float]:
+    """δ of the solved contact over the linear one's at the same force, less 1, and its derivative by a.
+
+    x (p0 + p1 x + p2 x²) with x = L^(1/3) of the `load` L, d ln L/da = `by_load`; each p is a cubic over a/h.
+    """
+    x = min(load ** (1 / 3), LARGEST_CBRT_LOAD)
+    by_x = by_load * x / 3.0 if x < LARGEST_CBRT_LOAD else 0.0
+    c3, c2, c1, c0 = cubics[0], cubics[1], cubics[2], cubics[3]
+    p0 = ((c3[4] * u + c2[4]) * u + c1[4]) * u + c0[4]
+    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - whole * WHOLE_OF_LOAD
+    p2 = ((c3[6] * u + c2[6]) * u + c1[6]) * u + c0[6]
+    by_p0 = (3.0 * c3[4] * u + 2.0 * c2[4]) * u + c1[4]
+    by_p1 = (3.0 * c3[5] * u + 2.0 * c2[5]) * u + c1[5]
+    by_p2 = (3.0 * c3[6] * u + 2.0 * c2[6]) * u + c1[6]
+    ratio = x * (p0 + x * (p1 + x * p2))
+    by_a = (p0 + x * (2.0 * p1 + 3.0 * x * p2)) * by_x + x * (by_p0 + x * (by_p1 + x * by_p2)) * per_h
+    return ratio, by_a
+
+
+@compiled()
 def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
     """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
     by a."""
-    modulus, radius, _, thickness, coefficient, form, exponent, whole = own
-    growth, inverse = 0.0, 1.0 / a
+    modulus, radius, _, thickness, coefficient, form, exponent, whole, share = own
+    cell, u, per_h, growth, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
     if coefficient >= 0:
         strain = _STRAIN * a / radius
         ratio, slope = _secant_ratio(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
@@ -117,6 +141,12 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
             stiffness * of_stiffness,
             stretch * of_stretch,
         )
+    if share != 0:
+        ratio, by_a = _strain_ratio(
+            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - growth, whole, cubics[cell], u, per_h
+        )
+        total = 1.0 + share * ratio
+        depth, by_depth = depth * total, by_depth + share * by_a / total
     return (force, depth, stiffness, stretch), (by_force, by_depth, by_stiffness, by_stretch)
 
 
@@ -217,7 +247,7 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
                 low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
                 if thickness > 0:
                     low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
-                if own[2] == 0 and thickness == 0 and own[4] < 0 and own[7] == 0:
+                if own[2] == 0 and thickness == 0 and own[4] < 0 and own[7] == 0 and own[8] == 0:
                     low = high = _LAST * unit
                 for _ in range(_HALVINGS if low < high else 0):
                     middle = math.sqrt(low * high)

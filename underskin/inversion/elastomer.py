@@ -11,6 +11,7 @@ from underskin.recordings.campaign import Campaign, CompressionRecording, Indent
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.exchanged_columns import require_own_columns
 from underskin.recordings.sphere_modulus import IndentationModulus, of_indentation
+from underskin.surrogate.contact_table import load_contact
 
 
 @dataclass(frozen=True)
@@ -35,7 +36,7 @@ def of_campaign(campaign: Campaign) -> list[RecordingModulus]:
                 _require_height(recording)
                 result = of_compression(recording)
             elif isinstance(recording, IndentationRecording):
-                result = of_indentation(recording, skin.poisson_ratio, skin.thickness_mm)
+                result = of_indentation(recording, skin.poisson_ratio, skin.thickness_mm, load_contact().softening)
             else:
                 continue
             if not result.modulus > 0:
