@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from rig.solved.layer import Material, PressedLayer, Sublayer
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
@@ -15,13 +16,19 @@ from underskin.units import Floats
 E_MPA, H_MM = 2.0, 2.5
 
 
-def force_of(names: list[str], thickness_mm: float, radius_mm: float, depth_mm: Floats, share: float) -> Floats:
+def force_of(names: list[str], radius_mm: float, depth_mm: Floats, share: float, **values: float) -> Floats:
     """[N], with the contact beginning at 0."""
     depth = np.concatenate([np.linspace(0.0, 0.9 * depth_mm[0], 10), depth_mm])
-    skin = replace(SKIN, thickness_mm=thickness_mm, youngs_modulus_mpa=E_MPA)
+    skin = replace(SKIN, thickness_mm=H_MM, youngs_modulus_mpa=E_MPA)
     recording = IndentationRecording("i", radius_mm, depth, hertz_force(depth, radius_mm, E_MPA))
     campaign = Campaign("one", skin, (recording,))
-    return predicted(names, campaign, **{"contact_point i": 0.0, "finite_strain": share})[10:]
+    return predicted(names, campaign, **{"contact_point i": 0.0, "finite_strain": share, **values})[10:]
+
+
+def solved_force(material: Material, radius: float, depths: Floats) -> Floats:
+    """[N] by the rig's solver, lengths in thicknesses."""
+    pressed = PressedLayer((Sublayer(1.0, material),), radius, float(np.sqrt(radius * depths[-1])), 1.5)
+    return np.array([pressed.press(depth) for depth in depths]) * E_MPA * H_MM**2
 
 
 @pytest.mark.parametrize(
@@ -30,11 +37,26 @@ def force_of(names: list[str], thickness_mm: float, radius_mm: float, depth_mm: 
 def test_solved_force(radius: float, depths: list[float]) -> None:
     """The force is within 0.5 % of the finite-strain solution of the rig's solver, which shares no code; the linear
     layer's is up to several percent above."""
-    pressed = PressedLayer((Sublayer(1.0, Material()),), radius, float(np.sqrt(radius * depths[-1])), 1.5)
-    solved = np.array([pressed.press(depth) for depth in depths]) * E_MPA * H_MM**2
-    at = ["layered_contact"], H_MM, radius * H_MM, np.array(depths) * H_MM
+    solved = solved_force(Material(), radius, np.array(depths))
+    at = ["layered_contact"], radius * H_MM, np.array(depths) * H_MM
     assert force_of(*at, share=1.0) == pytest.approx(solved, rel=5e-3)
     assert force_of(*at, share=0.0)[-1] > 1.015 * solved[-1]
+
+
+def test_solved_stiffening() -> None:
+    """Yeoh's layer is followed within 0.3 % by the stiffening of the neo-Hookean contact, with E within 1.5 %; taken as
+    stiffening of the linear contact it has E twice as far off."""
+    depths = np.linspace(0.02, 0.16, 10)
+    solved = solved_force(Material(c2=1.0), 1.0, depths)
+
+    def misfit(fit: Floats, share: float) -> Floats:
+        values = {"youngs_modulus": np.exp(fit[0]), "stiffening_coefficient": np.exp(fit[1]), "stiffening_form": 1.0}
+        return force_of(["layered_contact", "strain_stiffening"], H_MM, H_MM * depths, share, **values) / solved - 1
+
+    right, linear = (least_squares(misfit, [0.0, 1.0], args=(share,)) for share in (1.0, 0.0))
+    assert np.sqrt(np.mean(right.fun**2)) < 3e-3
+    assert abs(right.x[0]) < 0.015
+    assert abs(linear.x[0]) > 1.8 * abs(right.x[0])
 
 
 @pytest.mark.parametrize("stiffening", [None, Stiffening(*(np.full((1, 1, 1), value) for value in (0.5, 1.0, 2.0)))])
@@ -67,6 +89,6 @@ def test_share(stiffening: Stiffening | None, thickness: float | None) -> None:
 def test_depth_beyond_the_table(names: list[str]) -> None:
     """Beyond the table's load the correction stays, so that the force goes on without a kink."""
     depth = np.linspace(0.02, 1.2, 400)
-    force = force_of(names, H_MM, 2.0, depth, 1.0)
+    force = force_of(names, 2.0, depth, 1.0)
     assert (np.diff(force) > 0).all()
     assert np.abs(np.diff(np.diff(force) / np.diff(depth), 2)).max() < 0.02 * np.ptp(np.diff(force) / np.diff(depth))

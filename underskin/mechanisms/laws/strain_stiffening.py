@@ -106,11 +106,10 @@ class StrainStiffening(Mechanism):
     law = """FRF: E = E0 (1 + s ε), ε = 0.2 a/R the contact's representative strain, a³ = 3FR(1 − ν²)/(4E), solved
     together. Curves: nominal stress (E/3)(λ⁻² − λ) f(J), J = 3 (I/3)^(m/2), I = λ² + 2/λ − 3, λ = 1 − strain;
     compression f = 1 + 2 c2 J + 3 c3 J² (at m = 2 Yeoh's law, at m = 1 the modulus grows with the strain itself); under
-    a sphere f = (1 + q c J)^(1/q), the secant ratio at ε multiplying the modulus."""
+    a sphere f = (1 + q c J)^(1/q) at ε multiplies the modulus of the neo-Hookean contact."""
     assumptions = """incompressible and isotropic; a contact is as stiff as a uniaxial sample at its representative
     strain; for FRFs the a in it is Hertz' also where the contact is the layer's or sticks. With c2 = c3 = 0 a
-    compression is neo-Hookean, as the base model is; under a sphere c = 0 is neo-Hookean too, and the base model is
-    recovered at small strain."""
+    compression is neo-Hookean, as the base model is, and so is a sphere's contact at c = 0."""
     source = """Yeoh, Rubber Chem. Technol. 66 (1993) 754; Tabor, The Hardness of Metals (1951), for 0.2 a/R; Lin,
     Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904."""
     stage = Stage.MATERIAL
@@ -134,13 +133,12 @@ class StrainStiffening(Mechanism):
             return {}
         shortened = 1.0 - _COMPARED
         invariant = shortened**2 + 2.0 / shortened - 3.0
-        neo_hookean = (shortened**-2 - shortened) / (3.0 * _COMPARED)
         coefficient, form, exponent = (values[f"stiffening_{name}"] for name in ("coefficient", "form", "exponent"))
         grown = coefficient * (3.0 * exp(exponent * (0.5 * np.log(invariant / 3.0))))
         bend = where(np.abs(form.value) > _STRAIGHT, form, _STRAIGHT)
         power = 1.0 + bend * grown
         factor = exp(log(where(power.value > _LOCKED, power, _LOCKED)) / bend)
-        return {"stiffening": (neo_hookean * factor - 1.0) / _COMPARED}
+        return {"stiffening": (factor - 1.0) / _COMPARED}
 
     def told(self, values: Mapping[str, float]) -> str:
         """Of a compression, that it is softer than a neo-Hookean solid where it is."""

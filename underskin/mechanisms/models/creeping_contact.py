@@ -10,7 +10,7 @@ go:
 (Ting, J. Appl. Mech. 33 (1966) 845: without adhesion the stretches ℓ, ℓ_s are 0, and so is H(t1,t)). K is the stiffness
 of the contact as large as at t1, ℓ its adhesive stretch when it was reached and ℓ_s that at which it lets go; an edge
 that moves sees the instantaneous modulus (Greenwood & Johnson, Phil. Mag. A 43 (1981) 697). What stiffens has E times
-its secant ratio at the present contact: u, K and F above are those at rest, and F is multiplied by it. Where all
+its ratio of stiffening at the present contact: u, K and F above are those at rest, and F is multiplied by it. Where all
 rings but those of the first touch have let go, these are an elastic contact of modulus E(0) e at the depth
 [(1−g) δ + Σ g Y]/e with the work of separation over e²; it ends at that contact's pull-off. Y is the fading memory of δ
 (relaxation). δ and u run straight between samples.

@@ -3,9 +3,10 @@
 All follows from the contact radius a. Without adhesion, on the half space: δ = a²/R, F = 4E'a³/(3R), and at a fixed
 edge the stiffness is K = 2E'a; on the layer these are multiplied by functions of a/h (contact_curves). An edge whose
 energy release rate is w is stretched by ℓ: δ and F fall by ℓ and K ℓ, on the half space ℓ = √(2πaw/E') (Johnson,
-Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its secant ratio at the
-representative strain 0.2 a/R (Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129 (2007) 904). What the stage commands is
-δ + F/k.
+Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301). A stiffening elastomer has E' times its nominal stress
+over a neo-Hookean solid's at the representative strain 0.2 a/R (after Lin, Dimitriadis & Horkay, J. Biomech. Eng. 129
+(2007) 904, whose ratio to Hooke's law would count the neo-Hookean solid's own 9 % at a/R 0.4, where a sphere's contact
+gets softer by 5 %). What the stage commands is δ + F/k.
 
 Pressed deep, the sphere is no paraboloid: δ = a artanh(a/R), dF = 2E'a dδ (Sneddon, Int. J. Eng. Sci. 3 (1965) 47).
 Finite strain makes the contact softer: at the same force, δ of the solved frictionless contact of the round sphere with

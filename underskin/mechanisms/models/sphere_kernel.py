@@ -22,9 +22,7 @@ _TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is ab
 _NO_CONTACT = 1e-15  # m, which stands for no radius
 _EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
 _BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
-_HALVINGS = 40
 LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
-_LAST = 0.25 ** (2 / 3)  # a of JKR's contact at its least depth, in units of (2πwR²/E')^(1/3)
 
 Own = tuple[float, float, float, float, float, float, float, float, float]  # a body's numbers
 Four = tuple[float, float, float, float]
@@ -34,10 +32,10 @@ _BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
 
 
 @compiled()
-def _secant_ratio(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
-    """Nominal uniaxial stress at a compressive strain, over E times the strain, and its logarithmic slope.
+def _stiffened(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
+    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and its logarithm's slope.
 
-    Neo-Hookean times (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
+    (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
     """
     strain = max(strain, 1e-9)
     stretch = 1.0 - strain
@@ -52,8 +50,7 @@ def _secant_ratio(strain: float, coefficient: float, form: float, exponent: floa
         slope /= total
     if logarithm > _LARGEST_RATIO:
         logarithm, slope = _LARGEST_RATIO, 0.0
-    slope += (2.0 / stretch**3 + 1.0) / stress - 1.0 / strain
-    return stress / (3.0 * strain) * math.exp(logarithm), slope
+    return math.exp(logarithm), slope
 
 
 @compiled()
@@ -110,7 +107,7 @@ def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
     cell, u, per_h, growth, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
     if coefficient >= 0:
         strain = _STRAIN * a / radius
-        ratio, slope = _secant_ratio(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
+        ratio, slope = _stiffened(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
         modulus *= ratio
         growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
     depth, stiffness = a * a / radius, 2.0 * modulus * a
@@ -233,6 +230,33 @@ def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Fl
                 a[point, curve, sample] = radius
 
 
+@compiled()
+def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: Floats) -> float:
+    """The radius between two at which the travel's slope is 0; the bound that is nearer where it keeps its sign.
+
+    Regula falsi (Illinois) of slope √a over a^(3/2), which is straight for JKR's contact with a half space.
+    """
+    below, above = low**1.5, high**1.5
+    at_below = _travel(low, root_work, own, cubics)[1] * math.sqrt(low)
+    at_above = _travel(high, root_work, own, cubics)[1] * math.sqrt(high)
+    if at_below >= 0:
+        return low
+    if at_above <= 0:
+        return high
+    radius, before = high, 0.0
+    for _ in range(_STEPS):
+        power = (below * at_above - above * at_below) / (at_above - at_below)
+        radius, before = power ** (2 / 3), radius
+        if abs(radius - before) <= _TOLERANCE * radius:
+            break
+        found = _travel(radius, root_work, own, cubics)[1] * math.sqrt(radius)
+        if found > 0:
+            above, at_above, at_below = power, found, 0.5 * at_below
+        else:
+            below, at_below, at_above = power, found, 0.5 * at_above
+    return radius
+
+
 @compiled(f"void({_ROWS}, {_BODY}, {_ROWS}, {_ROWS})")
 def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
     """Fill the radius and the travel at which the travel is least in equilibrium."""
@@ -247,14 +271,7 @@ def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, tr
                 low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
                 if thickness > 0:
                     low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
-                if own[2] == 0 and thickness == 0 and own[4] < 0 and own[7] == 0 and own[8] == 0:
-                    low = high = _LAST * unit
-                for _ in range(_HALVINGS if low < high else 0):
-                    middle = math.sqrt(low * high)
-                    if _travel(middle, root_work, own, layer)[1] > 0:
-                        high = middle
-                    else:
-                        low = middle
+                high = _least_travel(low, high, root_work, own, layer) if low < high else high
                 radius[point, curve, sample] = high
                 travel[point, curve, sample] = _travel(high, root_work, own, layer)[0]
 
