@@ -150,3 +150,10 @@ def test_one_way_alone_tells_an_error_of_the_travel_from_hum_not() -> None:
 def test_a_drift_in_the_air_is_no_periodic_error() -> None:
     depth = ways(-0.1, 0.3, -0.1, samples=400)
     assert implausible(campaign(depth, pressed(depth) + 0.2 * depth**2)) == []
+
+
+def test_constant_force() -> None:
+    """A channel that was not connected has no sine, and no modulus."""
+    depth = np.concatenate([np.round(-0.02 + 0.008 * np.arange(41), 6), np.full(2399, 0.3)])
+    (found,) = elastomer.of_campaign(campaign(depth, np.ones_like(depth)))
+    assert isinstance(found.result, InvalidInput)

@@ -116,10 +116,13 @@ def _without_periodic_error(curve: CurveRecording, oriented: Orientation) -> tup
         return curve, []
     corrected = np.array(curve.force_n, dtype=float)
     corrected[finite] = force - error.at(travel)
+    left = float(np.ptp(corrected[finite]))
+    if left == 0:  # no contact is left to correct
+        return curve, []
     arguments = {
         "period_mm": error.period,
         "amplitude_n": error.amplitude,
-        "percent": 100 * error.amplitude / float(np.ptp(corrected[finite])),
+        "percent": 100 * error.amplitude / left,
     }
     if curve.time_s is not None and len(oriented.turns) <= _ONE_WAY:
         lasting = abs(float(curve.time_s[finite[-1]] - curve.time_s[finite[0]]))

@@ -54,7 +54,7 @@ class IndentationModulus:
     thickness: float | None
     declared_thickness: float | None
     noise: float
-    finite_strain: float = 0.0  # of E, by which it is higher where the solved contact is taken
+    finite_strain: float = 0.0  # by which E is higher where the solved contact is taken
 
     @property
     def statement(self) -> str:
@@ -63,7 +63,11 @@ class IndentationModulus:
         over = f"{self.depth / self.radius:.2g} of the radius"
         if self.declared_thickness is not None:
             over += f", {self.depth / self.declared_thickness:.2g} of the thickness"
-        strain = f"; up to {100 * self.finite_strain:.2g} % more by finite strain" if self.finite_strain > 0 else ""
+        strain = (
+            f"; up to {100 * self.finite_strain / self.modulus:.2g} % more by finite strain"
+            if 0 < self.finite_strain < self.modulus
+            else ""
+        )
         times = self.residual / self.noise if self.noise > 0 else 0.0
         misses = f", {times:.2g} times the noise: the law is not all" if times > _NOT_ALL else ""
         return (
@@ -141,9 +145,8 @@ def indentation_modulus(
     if softening is None:
         return found
     softer = _as_deep(depth, load, radius, used, poisson_ratio, softening)
-    more = float(softer.fitted[0] / fit.fitted[0]) - 1
-    uncertainty = float(np.hypot(found.uncertainty, found.modulus * more / np.sqrt(3)))
-    return replace(found, uncertainty=uncertainty, finite_strain=more)
+    more = float(softer.fitted[0] - fit.fitted[0]) * (1 - poisson_ratio**2)
+    return replace(found, uncertainty=float(np.hypot(found.uncertainty, more / np.sqrt(3))), finite_strain=more)
 
 
 def estimate(
