@@ -1,7 +1,7 @@
 """Every reader on damaged files: cut, shuffled, overwritten, random. An error that names the file, never another one.
 
-40 files a format, and of the formats that libraries in C read one in the process apart that real files are read in; with
-UNDERSKIN_SOAK=1 100,000 and 2,000 of each.
+40 files a format, and one of the formats that libraries in C read in the process apart that real files are read in;
+100,000 and 2,000 of each format with UNDERSKIN_SOAK=1.
 """
 
 import functools
