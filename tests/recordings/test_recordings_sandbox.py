@@ -229,6 +229,7 @@ def test_references_in_a_campaign_are_refused_as_values() -> None:
     assert [(problem.recording, problem.field) for problem in problems] == [("r1", "sensor")]
 
 
+@pytest.mark.usefixtures("understood_here")
 def test_a_name_given_by_a_client_never_becomes_a_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("../../escape.h5", str(tmp_path / "absolute.h5"), "\0", "x" * 5000, "-rf"):
