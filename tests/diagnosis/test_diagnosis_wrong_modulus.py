@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
-from tests.support.lean_reports import COSTLY, beside, lean_report
+from tests.support.lean_reports import beside, lean_report
 from underskin.recordings.campaign import Campaign, frf_recordings
 from underskin.surrogate.sigma_table import SigmaTable
 
@@ -72,7 +72,7 @@ def test_contacts_kept_are_told(made: Campaign, too_small: dict[str, Any]) -> No
 
 def test_a_campaign_of_which_no_contact_lies_within_is_explained(table: SigmaTable) -> None:
     hard = campaign(replace(WIDE, preloads_n=(1.0, 1.25, 1.5, 1.8), spheres_mm=(4.0,), repeats=2), table)
-    report = lean_report(declared(hard, TRUE_MPA / 3.3), table, *COSTLY)
+    report = lean_report(declared(hard, TRUE_MPA / 3.3), table, *FEW)
     assert report["verdict"] != "insufficient_data"
     assert report["verdict"] == "ambiguous"
     assert ["modulus_error"] in [entry["mechanisms"] for entry in report["alternatives"] if entry["probability"] > 0.1]
