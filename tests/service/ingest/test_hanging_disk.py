@@ -8,8 +8,8 @@ import httpx
 import orjson
 import pytest
 
+from bench.soak import SOAK
 from tests.service.pages.forms import BROWSING, token_of
-from tests.support.cases import first
 from tests.support.hanging.disk import CALLS, HangingDisk
 from tests.support.store_server import Place, Server, campaign, running
 
@@ -46,7 +46,7 @@ def send(server: Server, number: int) -> int:
     ).status_code
 
 
-@pytest.mark.parametrize("call", ["writing", *first(0, (one for one in CALLS if one != "writing"))])
+@pytest.mark.parametrize("call", CALLS if SOAK else ["writing"])
 def test_others_are_answered_while_the_disk_of_uploads_hangs(
     hanging_server: Server, disk: HangingDisk, call: str
 ) -> None:
