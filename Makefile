@@ -12,8 +12,8 @@ TEST_PACKAGES = nginx openssl octave curl postgresql chromium iproute2
 PEERS = tesseract nanite
 GENERATOR = openapi-client
 
-# Two processes more than two cores, since tests of servers and pages also wait; the tests of one file stay in one of
-# them, since they share servers. They come in the order of tests/conftest.py.
+# Two processes more than two cores, since tests of servers and pages also wait; tests/conftest.py says which tests stay
+# together in one of them, and in which order they come.
 PYTEST = $(PYTHON) -m pytest --numprocesses 4 --dist loadfile --no-loadscope-reorder
 
 # Modules stay compiled: servers, workers and commands start some hundred times in the tests.

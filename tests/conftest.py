@@ -12,6 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 from hypothesis import HealthCheck, settings
+from xdist.scheduler import LoadFileScheduling
 
 from bench import soak
 from tests.support.server import Server, running
@@ -38,7 +39,24 @@ _STARTED_BY = {
     "database": {"cluster"},
 }
 _NO_UNIT = {"server", "browser", "database", "slow", "soak"}
+# Folders of which one process of a run tests all, so that it starts servers, database and browser once; those before
+# others that hold them.
+_SHARING = ("tests/service/pages", "tests/service/store", "tests/service")
 _unit_test_under_way = ""
+
+
+class _ByServers(LoadFileScheduling):  # type: ignore[misc]  # which has no types
+    """Tests are handed out by the file, those that share servers by the folder."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file = nodeid.partition("::")[0]
+        return next((folder for folder in _SHARING if file.startswith(f"{folder}/")), file)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> LoadFileScheduling:
+    """Hand out tests to the processes of a run."""
+    return _ByServers(config, log)
 
 
 @pytest.fixture(scope="session")
@@ -92,8 +110,8 @@ def _after_one_has_compiled() -> Iterator[None]:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark each test with what it needs, and `unit` where that is nothing but a second of this process.
 
-    Those of the soak are left out of other runs. Files of quick tests come last, so that all processes of a run end
-    together.
+    Those of the soak are left out of other runs. Folders that share servers come first, files of quick tests last, so
+    that all processes of a run end together; those with a browser after others, which then still can have event loops.
     """
     if not soak.SOAK:
         of_the_soak = [item for item in items if item.get_closest_marker("soak")]
@@ -105,7 +123,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if _NO_UNIT.isdisjoint(marker.name for marker in item.iter_markers()):
             item.add_marker("unit")
     slow = {item.path for item in items if item.get_closest_marker("unit") is None}
-    items.sort(key=lambda item: item.path not in slow)
+    seen = {item.path for item in items if item.get_closest_marker("browser")}
+    shared = {item.path for item in items if item.nodeid.startswith(_SHARING)}
+    items.sort(key=lambda item: (item.path not in shared, item.path in seen & shared, item.path not in slow))
 
 
 def _needs(item: pytest.Item) -> set[str]:

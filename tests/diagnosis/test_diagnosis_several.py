@@ -124,7 +124,7 @@ def silent(campaign: Campaign, sensor: str, seed: int) -> Campaign:
     return replace(campaign, recordings=tuple(entries))
 
 
-@pytest.mark.parametrize("seed", first(2, [4, 5, 6, 7]))
+@pytest.mark.parametrize("seed", first(1, [4, 5, 6, 7]))
 def test_a_sensor_that_died_between_two_dates_comes_first_and_hides_no_other(seed: int, table: SigmaTable) -> None:
     """It is left out of all that is said of both: its noise is no sensor with 13 times the others' charge."""
     before, after = dates()

@@ -31,18 +31,21 @@ def table() -> SigmaTable:
 
 @pytest.mark.slow
 def test_intervals_cover_as_often_as_they_say_and_usual_scatter_is_never_set_aside(table: SigmaTable) -> None:
+    """And of whole sensors seldom one is accused, at most in a campaign of twenty."""
     random = np.random.default_rng(1)
-    arrays, sensors, cells = [], [], []
+    arrays, sensors, cells, accused = [], [], [], 0
     for _ in range(CAMPAIGNS):
         rig, array = drawn(random)
         found = invert(simulate(table, rig, random), table)
         assert found.left_out == ()
         assert found.campaign_d33 is not None
+        accused += bool(found.flags)
         arrays.append(covered(found.campaign_d33, np.array(array)))
         sensors.append(np.mean(covered(found.sensors, rig.d33)))
         cells.append(np.mean(covered(found.cells.d33, rig.d33[found.cells.sensor])))
     for hits in (arrays, sensors, cells):
         assert 0.93 <= np.mean(hits) <= 0.97
+    assert accused <= CAMPAIGNS / 20
 
 
 @pytest.mark.parametrize("position_mm", [0.0, 0.25])

@@ -62,7 +62,7 @@ def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, ch
     assert named == (change in ("weak", "strong", "dead", "inverted"))
 
 
-@pytest.mark.slow
+@pytest.mark.soak
 def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
     random = np.random.default_rng(6)
     accused = 0

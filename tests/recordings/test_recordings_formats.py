@@ -32,6 +32,8 @@ from underskin.recordings.readers import json_file
 MAY, JUNE = np.datetime64("2024-05-03T10:00:00"), np.datetime64("2024-06-03T10:00:00.500000")
 UNSET = np.datetime64("1904-01-01T00:00:00")
 
+pytestmark = pytest.mark.usefixtures("understood_here")
+
 
 def test_json_to_hdf5_and_back_loses_nothing() -> None:
     odd = {**FRF, "id": "Ω/1", "frequency_hz": [0.1, 1 / 3, 1e9], "load_cycles": 2**53 - 1, "dwell_s": 1e-12}
@@ -108,14 +110,12 @@ def test_a_table_with_a_row_that_does_not_fit_is_refused_by_line() -> None:
         read_contents(b"a;b\n1;2\n2;3\n3", "a.csv")
 
 
-@pytest.mark.slow
 def test_tdms() -> None:
     assert the_time_series(tdms(2), "run.tdms", rig()) == []
     assert contents(tdms(1), "run.tdms").properties == {"operator": "me", "run.preload": 1.0}
 
 
 @pytest.mark.parametrize("lost", ["bytes", "length"])
-@pytest.mark.slow
 def test_an_interrupted_tdms_acquisition_is_read_up_to_the_last_whole_segment(lost: str) -> None:
     whole = tdms(4)
     last = whole.rindex(b"TDSm")
@@ -194,7 +194,6 @@ def test_an_interrupted_lvm_acquisition_is_said() -> None:
         read_contents(lvm().replace("\t1100.0000", "\tx", 1).encode(), "run.lvm")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("write", [matlab_5, matlab_73])
 def test_matlab(write: Any) -> None:
     recording = {**COMMON, "sample_rate_hz": {"property": "fs"}}
@@ -202,7 +201,6 @@ def test_matlab(write: Any) -> None:
     assert contents(write(matlab_variables()), "run.mat").properties == {"fs": 1000.0, "operator": "me"}
 
 
-@pytest.mark.slow
 def test_matlab_structures_and_matrices() -> None:
     data = matlab_5(
         {"run": {"force": FORCE, "fs": 2.0}, "both": np.column_stack([FORCE, CHARGE]), "cell": [{"a": 1}, "x"]}

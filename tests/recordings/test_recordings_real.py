@@ -13,7 +13,7 @@ from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
 from underskin.recordings.channels import Contents
 
-pytestmark = pytest.mark.slow  # each file is read in a process of its own
+pytestmark = pytest.mark.usefixtures("understood_here")
 
 
 def of_each_folder(count: int, files: list[Path]) -> list[Path]:

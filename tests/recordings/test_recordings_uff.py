@@ -9,7 +9,7 @@ from underskin.errors import FileError
 from underskin.recordings import read_contents, read_file
 from underskin.recordings.campaign import to_dict
 
-pytestmark = pytest.mark.slow  # each file is read in a process of its own
+pytestmark = pytest.mark.usefixtures("understood_here")
 
 # pyuff's writer of binary datasets leaves its file to the garbage collector.
 leaky_writer = pytest.mark.filterwarnings(

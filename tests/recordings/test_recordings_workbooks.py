@@ -18,7 +18,7 @@ from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import to_dict
 
-pytestmark = pytest.mark.slow  # each file is read in a process of its own
+pytestmark = pytest.mark.usefixtures("understood_here")
 
 Sheet = Sequence[Sequence[Any]]
 

@@ -5,6 +5,7 @@ import pytest
 from tests.service.requests import problem_of
 from tests.support.store_server import Server
 
+BACKEND = "sqlite"
 CURVE = b"depth;load\n0;0\n100;2\n200;3"
 RIG = """schema: rig/1
 kind: indentation

@@ -93,7 +93,7 @@ def test_the_client_and_the_commands_choose_the_estimator(server: Server, tmp_pa
         require_estimated(server, ids)
     done = server.place.command("import", str(file), "--estimator", "H9", *there)
     assert (done.returncode, "'H9' is not one of 'H1', 'H2', 'Hv'" in done.stderr) == (2, True)
-    told = {name: server.place.command("d33", str(file), "--estimator", name, "--csv").stdout for name in ESTIMATORS}
+    told = {name: server.place.command("d33", str(file), "--estimator", name, "--csv").stdout for name in ("H2", "Hv")}
     for name, text in told.items():
         array = next(line for line in text.splitlines() if ",array," in line)
         assert float(array.split(",")[6]) == pytest.approx(d33(server, ids[name]), rel=1e-6)

@@ -140,7 +140,7 @@ def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
 
 def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:
     for path in first(
-        4, (place, "/", "/loads?thickness_mm=x", "/upload", "/skins/many", "/design", "/field", "/d33", "/fleets")
+        3, ("/", "/loads?thickness_mm=x", place, "/upload", "/skins/many", "/design", "/field", "/d33", "/fleets")
     ):
         dark.go(path)
         ground = dark.page.evaluate("getComputedStyle(document.documentElement).backgroundColor")

@@ -36,6 +36,12 @@ def diagnosis_id(diagnosing: Server) -> str:
     return str(found["id"])
 
 
+@pytest.fixture(scope="module")
+def kept_id(server: Server) -> str:
+    """Of a report that was kept."""
+    return diagnosed(server, resonant("limits"), report(), "limits")[1]
+
+
 def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dict[str, Any]]) -> None:
     """As CSV and as rig descriptions; a file of the first one, read by its description, ticks its row off."""
     plan = visitor.page.get_by_role("region", name="The plan")
@@ -116,10 +122,8 @@ def test_the_next_experiment_is_planned_within_the_reader_s_rig(
         ({"recordings": "0001" + "9" * 4400}, "must be a whole number from 1 to 50"),
     ],
 )
-def test_limits_that_no_rig_has_are_refused(
-    diagnosing: Server, diagnosis_id: str, query: dict[str, str], told: str
-) -> None:
-    shown = diagnosing.http.get(f"/diagnoses/{diagnosis_id}/plan", params=query, headers=BROWSING).text
+def test_limits_that_no_rig_has_are_refused(server: Server, kept_id: str, query: dict[str, str], told: str) -> None:
+    shown = server.http.get(f"/diagnoses/{kept_id}/plan", params=query, headers=BROWSING).text
     assert re.search(told, shown) is not None, shown
 
 

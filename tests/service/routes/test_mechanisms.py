@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.support.cases import first
 from tests.support.diagnosed import sent
 from tests.support.diagnosis_campaigns import Made
 from tests.support.diagnosis_campaigns import campaign as made_campaign
@@ -118,23 +119,24 @@ def test_a_document_is_kept_once_and_nothing_else_can_be_discarded(lab: Server, 
 
 
 REFUSED = (
-    (WARM.replace("gain", "weather"), 422, "acts_on"),
-    (WARM.replace("rise *", "__import__('os').system('x') *"), 422, "line 6"),
     (WARM.replace("name: warm_amplifier", "name: ../evil"), 422, "name"),
     ("a: [", 422, "not YAML"),
     ("", 422, "schema"),
+    (WARM.replace("low: -0.1", f"low: -{10**30}"), 422, "line 8"),
     ('{"diagnosis_id": "d-1"}', 422, "name"),
     ('{"name": "a", "name": "b", "diagnosis_id": "d-1"}', 422, "given twice"),
     ("x" * 100_001, 413, "100000 bytes"),
-    (WARM.replace("The amplifier's gain", '"\\ud800" #'), 422, "description: the character U+D800"),
     ('{"schema": "mechanism/1", "name": "\\ud800"}', 400, "surrogate"),
-    (WARM.replace("low: -0.1", f"low: -{10**30}"), 422, "line 8"),
+    # As tests/mechanisms/test_declared_mechanisms.py has them.
+    (WARM.replace("gain", "weather"), 422, "acts_on"),
+    (WARM.replace("rise *", "__import__('os').system('x') *"), 422, "line 6"),
+    (WARM.replace("The amplifier's gain", '"\\ud800" #'), 422, "description: the character U+D800"),
     (WARM.replace("prior: {mean: 0, sd: 0.03}", "prior: {mean: 0, sd: 1.0e+20}"), 422, "of the prior"),
 )
 
 
 def test_what_cannot_be_kept_is_refused_with_its_reason(lab: Server) -> None:
-    for body, status, said in REFUSED:
+    for body, status, said in first(8, REFUSED):
         kind = "application/json" if body.startswith("{") else "application/yaml"
         answer = lab.http.post("/v1/mechanisms", content=body.encode(), headers={"Content-Type": kind})
         assert (answer.status_code, said in answer.text) == (status, True), f"{body[:200]}: {answer.text}"

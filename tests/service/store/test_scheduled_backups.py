@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from service.usecases.scheduled_backups import OWNER, kept
-from tests.service.backends import BACKENDS
 from tests.service.store.scheduled import NO_WORKERS, doctor, scheduled, wait_for
 from tests.support import postgres
 from tests.support.diagnosed import sent
@@ -26,7 +25,6 @@ def metric(server: Server, name: str) -> float:
     return float(found[1])
 
 
-@pytest.mark.parametrize("place", BACKENDS, indirect=True)
 def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_path: Path) -> None:
     folder = tmp_path / "backups"
     with running(place, **NO_WORKERS) as server:

@@ -2,11 +2,13 @@
 
 import re
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import orjson
 import pytest
 
+from service.store import campaigns, database
 from tests.support.store_server import Place, Server, campaign, running
 from underskin import Client, ServiceError
 from underskin.recordings.campaign import parse, to_dict
@@ -44,9 +46,11 @@ def test_corrections_exclusions_and_withdrawals(client: Client) -> None:
 
 
 def test_pages_are_turned(client: Client, server: Server) -> None:
-    for number in range(3):
-        documents = [campaign(f"{number}-{index}", sensors=1, lines=3) for index in range(70)]
-        assert server.http.post("/v1/campaigns", json=documents).json()["campaigns"]
+    store = database(server.place.database_url, server.place.folder)
+    with closing(store), store.writing() as connection:
+        for number in range(210):
+            one = parse(campaign(f"{number}", sensors=1, lines=3))
+            campaigns.add(connection, campaigns.NewCampaign(one, None))
     assert len({entry["id"] for entry in client.campaigns.all()}) == 210
     assert len({entry["id"] for entry in client.skins.all()}) == 210
 
