@@ -1,7 +1,6 @@
 """The noise of the raw samples of a curve, over how many of them it hides the travel, and where a curve jumps."""
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from underskin.units import Floats, Indices
 
@@ -39,6 +38,8 @@ def jumps(force: Floats, noise: float, block: int) -> Indices:
     """
     if block == 1 or len(force) < 2 * block + 1:
         return np.zeros(0, dtype=np.intp)
+    from scipy.ndimage import maximum_filter1d  # takes 0.2 s to load, which few need
+
     longer = np.pad(force, 2 * block, mode="reflect", reflect_type="odd")  # straight on at both ends
     means = np.convolve(longer, np.full(block, 1 / block), mode="valid")  # of longer[i : i + block]
     at = np.arange(len(force)) + 2 * block
