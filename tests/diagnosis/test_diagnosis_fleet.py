@@ -194,3 +194,10 @@ def test_a_skin_of_few_recordings_borrows_strength_from_its_sisters(table: Sigma
     assert max(widths) < 0.5 * np.log(alone["high"] / alone["low"])
     assert sum(inside) >= max(1, len(inside) - 1)  # of six, less is as probable as 3 %, at 95 % each
     assert max(widths) < 0.1  # 0.08, of which two gains of 2 % make 0.055
+
+
+def test_modulus_error_left_out(table: SigmaTable) -> None:
+    """Skins are compared in thickness and d33 alone where `without` names the error of the modulus."""
+    fleet = lean_fleet(sisters(3), table, "batch", (*FEW, "modulus_error"))
+    assert departures(fleet) == {}
+    assert population(fleet, "d33")["mean"] == pytest.approx(14.0, rel=0.05)

@@ -54,7 +54,8 @@ class FleetSkin:
         assert skin.youngs_modulus_mpa is not None  # FRFs have no model without them
         assert skin.thickness_mm is not None
         self.declared: Floats = np.log([skin.youngs_modulus_mpa, skin.thickness_mm, 1.0])  # (quantities,)
-        self.errors = tuple(name for name in ERRORS if name not in candidate.search.unsupported)
+        tried = set(candidate.problem.lines.mechanisms.named) - set(candidate.search.unsupported)
+        self.errors = tuple(name for name in ERRORS if name in tried)
         self.departures = (*self.errors, D33)
         self._fitted = self._fits(tuple(dict.fromkeys(candidate.supported(names) for names in sets)), bench)
 
