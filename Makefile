@@ -67,9 +67,10 @@ tables: $(VENV)/.runtime ## solve the shipped tables again
 paper: $(VENV)/.dev ## regenerate docs/paper.md and its figures
 	$(PYTHON) -m docs.paper
 
-tour: $(VENV)/.dev ## regenerate docs/tour.md and its screenshots
+tour: $(VENV)/.dev ## regenerate docs/tour.md, its screenshots and the picture of a report
 	@scripts/system-packages.sh chromium
 	$(PYTHON) -m docs.tour
+	$(PYTHON) -m docs.reading
 
 openapi: $(VENV)/.dev ## regenerate the examples of the OpenAPI document and the client's typed answers
 	$(PYTHON) -m scripts.openapi_examples

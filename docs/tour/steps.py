@@ -127,7 +127,7 @@ STEPS = (
         "without, on recordings that it was not fitted to, and what to mind. Printed, or saved as PDF from the "
         "browser's print dialog, the summary and its three figures are the first page. Folded below: where recordings "
         "and model disagree, the parameters with intervals, the alternatives and why not, what these recordings cannot "
-        "tell, and what to measure next. [How it reasons](diagnosis.md).",
+        "tell, and what to measure next. [How to read it](diagnosis.md), [how it works](how-it-works.md).",
         _diagnosis,
     ),
     TourStep(
