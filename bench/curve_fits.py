@@ -12,7 +12,7 @@ import numpy as np
 from bench.curve_peers import Curve, hertz_left, jkr_left, nanite_left
 from bench.figures import Figure
 from proof.real import recorded
-from underskin.diagnosis.data.curve_samples import curve_lines, finite_samples
+from underskin.diagnosis.data.dataset import curve_lines, finite_samples
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
 from underskin.recordings.campaign import IndentationRecording, parse
 from underskin.recordings.curve_course import course

@@ -9,8 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from bench.figures import Figure
 from underskin.mechanisms import compose
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 from underskin.surrogate.sigma_table import load_table
 from underskin.units import Floats
 

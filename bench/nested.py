@@ -17,7 +17,7 @@ from bench.figures import Figure
 from tests.support.nested_sampling import Posterior, Sampled, nested
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
-from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.surrogate.sigma_table import load_table

@@ -14,7 +14,7 @@ from proof.cases import FileCase
 from proof.judge import Judged, judge
 from proof.names import one_name_each
 from proof.stored import Work, reports
-from underskin.cli.reports import write_report
+from underskin.cli.diagnose import write_report
 
 
 def judge_open(work: Work, campaigns: Path, progress: Callable[[int, int], None]) -> dict[str, Any]:

@@ -9,10 +9,9 @@ import numpy as np
 
 from rig.joint_campaign import Joint, JointDocument
 from rig.joint_hypotheses import skin_covariance
-from underskin.diagnosis.inference.knowledge import Knowledge
+from underskin.diagnosis.inference.hypothesis import Knowledge
 from underskin.diagnosis.several.fleet import SPREADS
-from underskin.diagnosis.several.population import REGULAR, Make, State, populations
-from underskin.diagnosis.several.skin import FAR, QUANTITIES
+from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Make, State, populations
 from underskin.units import Floats
 
 _DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what is declared; of d33, about the truth

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau
+from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, Plateau
 from underskin.diagnosis.selection.priors import PRIORS
 from underskin.mechanisms.base import Mechanism
 from underskin.mechanisms.parameter import HeavyTailed, Parameter

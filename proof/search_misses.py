@@ -21,8 +21,7 @@ from rig.wide_tails import WIDE
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request, integrated
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.noise_refinement import frf_problem
-from underskin.diagnosis.selection.search import search
+from underskin.diagnosis.selection.search import frf_problem, search
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.registry import Known
 from underskin.recordings.campaign import from_dict

@@ -21,12 +21,11 @@ from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Normal, Parameter, 
 from underskin.mechanisms.base import AXES, NEEDED_FIELDS, UNITS
 from underskin.mechanisms.contract import HOOKS, check
 from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.mechanisms.models.pickup import Pickup, together
+from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, together
 from underskin.mechanisms.parameter import ActsOn
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import GROUP, built_in
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 
 EXAMPLE = ROOT / "examples" / "lab-skin"
 

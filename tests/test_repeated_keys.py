@@ -16,7 +16,7 @@ from tests.support import preloaded
 from tests.support.repository import ROOT
 from underskin.errors import FileError
 from underskin.recordings import read_file, rig_description
-from underskin.recordings.readers.repeated_keys import repeated_key
+from underskin.recordings.readers.json_file import repeated_key
 
 EXAMPLES = ROOT / "examples" / "formats"
 CAMPAIGN = (EXAMPLES / "template.json").read_text()

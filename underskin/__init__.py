@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from underskin.physics.skin import Indenter, Skin
     from underskin.prediction.forward_model import Predicted, predict
     from underskin.prediction.pressed_skin import Transmission, transmission
-    from underskin.recordings.campaign import Campaign
-    from underskin.recordings.conditions import Conditions, SkinDescription, frf_conditions
+    from underskin.recordings.campaign import Campaign, Conditions, SkinDescription, frf_conditions
     from underskin.recordings.reading import Reading, read_file
     from underskin.surrogate.sigma_table import SigmaTable, load_table
     from underskin.surrogate.solved_contact import solved_contact
@@ -71,7 +70,7 @@ __all__ = [
 _MODULES = {
     "Campaign": "recordings.campaign",
     "Client": "client.service_client",
-    "Conditions": "recordings.conditions",
+    "Conditions": "recordings.campaign",
     "Indenter": "physics.skin",
     "Inversion": "inversion.invert",
     "Predicted": "prediction.forward_model",
@@ -81,12 +80,12 @@ _MODULES = {
     "Sigma": "physics.charge_response",
     "SigmaTable": "surrogate.sigma_table",
     "Skin": "physics.skin",
-    "SkinDescription": "recordings.conditions",
+    "SkinDescription": "recordings.campaign",
     "Transmission": "prediction.pressed_skin",
     "diagnose": "diagnosis.diagnose",
     "diagnose_fleet": "diagnosis.diagnose",
     "diagnose_together": "diagnosis.diagnose",
-    "frf_conditions": "recordings.conditions",
+    "frf_conditions": "recordings.campaign",
     "invert": "inversion.invert",
     "load_table": "surrogate.sigma_table",
     "predict": "prediction.forward_model",

@@ -17,17 +17,10 @@ from numba.core import config
 from numba.core.caching import CacheImpl, InTreeCacheLocator
 
 KERNELS = (
-    "underskin.diagnosis.inference.cost_kernel",
-    "underskin.diagnosis.inference.line_kernel",
-    "underskin.diagnosis.inference.normal_kernel",
-    "underskin.diagnosis.inference.pickup_kernel",
-    "underskin.diagnosis.inference.settle_kernel",
-    "underskin.diagnosis.noise.roughness_kernel",
-    "underskin.diagnosis.selection.process_kernel",
-    "underskin.mechanisms.models.creep_kernel",
-    "underskin.mechanisms.models.hertz_kernel",
-    "underskin.mechanisms.models.sigma_kernel",
-    "underskin.mechanisms.models.sphere_kernel",
+    "underskin.diagnosis.inference.kernels",
+    "underskin.diagnosis.kernels",
+    "underskin.mechanisms.models.sphere_kernels",
+    "underskin.mechanisms.models.sigma_kernels",
     "underskin.physics.bessel_kernel",
     "underskin.physics.contact_kernel",
     "underskin.surrogate.table_kernel",

@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 
 from underskin.mechanisms import CATALOGUE, Kind, Mechanism, Model, Parameter, compose
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    FrfRecording,
+    IndentationRecording,
+    Sensor,
+    SkinDescription,
+)
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 

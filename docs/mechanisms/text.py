@@ -9,10 +9,9 @@ from docs.mechanisms.signatures import shown
 from docs.mechanisms.silicones import RESULTS
 from docs.paper.markdown import table
 from underskin.mechanisms import HeavyTailed, Mechanism, Normal, Parameter
-from underskin.mechanisms.models.nuisances import D33, THICKNESS, YOUNGS_MODULUS
+from underskin.mechanisms.models.composition import D33, THICKNESS, YOUNGS_MODULUS
 from underskin.mechanisms.registry import built_in
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 
 _INTRODUCTION = """\
 # What may have been left out

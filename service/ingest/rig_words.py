@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from service.ingest.field_words import CHANNELS, RECORDING
-from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, Property, SignalMapping
-from underskin.recordings.rig_description import RigDescription
+from underskin.recordings.rig_description import AUTOMATIC, ChannelMapping, Property, RigDescription, SignalMapping
 
 _SIGNS = {-1: "turned round", AUTOMATIC: "turned round where it falls as it is pressed"}
 _CURVES = {"file": "a curve is the whole file", "groups": "a curve is each group of rows"}

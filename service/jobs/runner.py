@@ -15,7 +15,7 @@ from service.log import LastingFailure
 from service.store import AnyRow, Database, StorageFailed, StoreMoved, diagnoses
 from underskin import __version__
 from underskin.mechanisms.declared.folder import digest
-from underskin.recordings.shown_values import LONGEST_NAME
+from underskin.recordings.validation import LONGEST_NAME
 
 logger = logging.getLogger("underskin")
 

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 
 from service.middleware.long_json import LONG_BYTES, NotJson, as_lists, document_of
 from service.problems import Refusal, given_twice, require_few_fields
-from underskin.recordings.readers.repeated_keys import repeated_key
+from underskin.recordings.readers.json_file import repeated_key
 
 _long = asyncio.Semaphore(2)  # long bodies that are parsed at once
 

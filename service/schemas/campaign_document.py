@@ -9,7 +9,7 @@ from dataclasses import MISSING
 from typing import Any, get_args
 
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings import noted_columns
+from underskin.recordings import validation
 from underskin.recordings import validation as field
 from underskin.recordings.campaign import (
     LINES,
@@ -18,11 +18,15 @@ from underskin.recordings.campaign import (
     CompressionRecording,
     FrfRecording,
     IndentationRecording,
+    Sensor,
+    SkinDescription,
+    Tolerances,
     read_estimator,
+    read_sensors,
+    read_tolerances,
 )
-from underskin.recordings.conditions import Sensor, SkinDescription, Tolerances, read_sensors, read_tolerances
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.shown_values import LONGEST_NAME
+from underskin.recordings.validation import LONGEST_NAME
 from underskin.units import LAB
 
 Schema = dict[str, Any]
@@ -51,12 +55,12 @@ _OF_CHECK: Mapping[Callable[..., Any], Schema] = {
     field.frequencies: _column(minimum=_LOWEST_HZ, maximum=_HIGHEST_HZ),
     field.not_falling: _column(),
     field.coherence: _column(minimum=0, maximum=1 + field.COHERENCE_ROUNDING),
-    noted_columns.further: {
+    validation.further: {
         "type": "object",
-        "maxProperties": noted_columns.MOST_CONDITIONS,
+        "maxProperties": validation.MOST_CONDITIONS,
         "propertyNames": {
-            "pattern": f"^{noted_columns.CONDITION.pattern}$",
-            "not": {"enum": sorted(noted_columns.BUILT_IN_AXES)},
+            "pattern": f"^{validation.CONDITION.pattern}$",
+            "not": {"enum": sorted(validation.BUILT_IN_AXES)},
         },
         "additionalProperties": {"anyOf": [{"type": "number"}, _NAME, _NULL]},
     },

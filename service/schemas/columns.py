@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, InstanceOf, Ta
 
 from underskin.findings.codes import FindingCode
 from underskin.prediction.columns import statuses, to_csv, told
-from underskin.prediction.domain_limits import Words
+from underskin.prediction.pressed_skin import Words
 from underskin.units import Floats
 
 _ROWS_AT_ONCE = 65_536  # that become JSON in one call

@@ -14,7 +14,7 @@ from service.store.errors import Conflict, Missing
 from service.store.tables import AnyRow, campaigns, recording_digests, recordings
 from service.store.times import now
 from underskin.recordings.campaign import Campaign, Recording
-from underskin.recordings.repeats import digest
+from underskin.recordings.reading import digest
 
 # All that lists show of a recording: not its arrays.
 _LISTED = [column for column in recordings.c if column.name not in ("campaign", "position", "arrays")]

@@ -16,8 +16,7 @@ import orjson
 
 from service.store.tables import AnyRow
 from service.store.times import stored
-from underskin.recordings.campaign import KINDS, Campaign, Recording
-from underskin.recordings.conditions import Sensor, SkinDescription, Tolerances
+from underskin.recordings.campaign import KINDS, Campaign, Recording, Sensor, SkinDescription, Tolerances
 from underskin.units import Floats
 
 _LEVEL = 1  # higher levels take several times longer and save a few per cent

@@ -10,7 +10,7 @@ from service.store import skins
 from service.store.campaigns import CURRENT
 from service.store.tables import AnyRow, campaigns, recording_digests, recordings
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.repeats import digest
+from underskin.recordings.reading import digest
 
 _AT_A_TIME = 1000  # digests in one query: databases limit their number
 _IN_FIGURES = (recordings.c.excluded_at.is_(None), recordings.c.kind == "frf")

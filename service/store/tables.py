@@ -134,7 +134,7 @@ changes = Table(
     Index("changes_of_campaign", "campaign_id", "number"),
 )
 
-# Derived from what a recording holds: identical ones have the same (underskin.recordings.repeats).
+# Derived from what a recording holds: identical ones have the same (underskin.recordings.reading).
 recording_digests = Table(
     "recording_digests",
     metadata,

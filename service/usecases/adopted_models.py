@@ -17,9 +17,8 @@ from service.usecases.mechanisms import catalogue
 from underskin.errors import conflicting, out_of_range, required
 from underskin.physics.charge_response import gain
 from underskin.prediction.answers import limits_of_pressed, pressed
-from underskin.prediction.domain_limits import NOT_FINITE, Words
-from underskin.prediction.pressed_skin import Transmission
-from underskin.recordings.conditions import frf_conditions
+from underskin.prediction.pressed_skin import NOT_FINITE, Transmission, Words
+from underskin.recordings.campaign import frf_conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats, Mask, finite, non_negative
 

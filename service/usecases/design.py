@@ -9,8 +9,7 @@ from service.usecases.tables import contact_asked_for
 from underskin import Indenter, Skin
 from underskin.errors import out_of_range
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.prediction.answers import limits_of_pressed
-from underskin.prediction.other_contact import OTHER, STATED
+from underskin.prediction.answers import OTHER, STATED, limits_of_pressed
 from underskin.prediction.pressed_skin import transmission
 from underskin.prediction.skin_design import Design, design
 from underskin.surrogate.sigma_table import SigmaTable

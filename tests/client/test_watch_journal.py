@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from underskin.client.watch.journal import NAME, Journal, Target
+from underskin.client.watch import NAME, Journal, Target
 from underskin.errors import UnderskinError
 
 TARGET = Target("http://bench", "palm", "terms")

@@ -12,9 +12,7 @@ import pytest
 
 from tests.support.store_server import campaign
 from underskin.client.service_client import Client
-from underskin.client.watch.folder import WatchedFolder
-from underskin.client.watch.journal import Journal
-from underskin.client.watch.watcher import Watcher
+from underskin.client.watch import Journal, WatchedFolder, Watcher
 from underskin.errors import ServiceError
 
 SETTLE_S = 5.0
@@ -85,7 +83,7 @@ def watched(folder: Path, service: Service, clock: list[float]) -> Iterator[Benc
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     now = [1000.0]
-    monkeypatch.setattr("underskin.client.watch.folder.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("underskin.client.watch.time.monotonic", lambda: now[0])
     return now
 
 

@@ -10,8 +10,7 @@ import pytest
 from tests.diagnosis.rig_pads import pressed
 from tests.support.cases import first
 from tests.support.slip_campaigns import looked_at
-from underskin.recordings.campaign import Campaign, CompressionRecording, parse
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import Campaign, CompressionRecording, SkinDescription, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow

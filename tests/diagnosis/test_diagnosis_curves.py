@@ -24,8 +24,7 @@ from tests.support.pressed_curves import pressed
 from tests.support.slip_campaigns import looked_at
 from underskin import Conditions, SkinDescription, load_table, predict
 from underskin.physics.sphere_law import SphereLaw
-from underskin.recordings.campaign import Campaign, IndentationRecording, parse
-from underskin.recordings.conditions import IndentationConditions
+from underskin.recordings.campaign import Campaign, IndentationConditions, IndentationRecording, parse
 from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats

@@ -15,8 +15,7 @@ from rig.wide_tails import WIDE
 from tests.support.cases import first
 from tests.support.diagnosis_campaigns import Made, campaign
 from tests.support.lean_reports import beside, lean_report, whole_report
-from underskin.recordings.campaign import parse
-from underskin.recordings.conditions import Tolerances
+from underskin.recordings.campaign import Tolerances, parse
 from underskin.surrogate.sigma_table import SigmaTable
 
 pytestmark = pytest.mark.slow

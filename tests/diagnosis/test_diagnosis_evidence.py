@@ -15,8 +15,8 @@ from tests.support.nested_sampling import Posterior, nested
 from underskin.diagnosis.data.dataset import lines
 from underskin.diagnosis.inference.evidence import Evidence, laplace
 from underskin.diagnosis.inference.explanation import FittingProblem, Request, integrated
-from underskin.diagnosis.inference.likelihood import log_likelihoods
-from underskin.diagnosis.inference.optimizer import Fitter
+from underskin.diagnosis.inference.fit import Fitter
+from underskin.diagnosis.inference.hypothesis import log_likelihoods
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
 

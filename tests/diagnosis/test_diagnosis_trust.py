@@ -18,8 +18,7 @@ from tests.support.slip_campaigns import looked_at
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms import CATALOGUE
 from underskin.recordings import read_file
-from underskin.recordings.campaign import Campaign, IndentationRecording, frf_recordings, from_dict
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import Campaign, IndentationRecording, SkinDescription, frf_recordings, from_dict
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 

@@ -20,8 +20,7 @@ from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE
 from underskin.mechanisms.declared.saving import document
 from underskin.prediction.adopted_model import adopted, not_adopted
-from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings, parse
-from underskin.recordings.conditions import frf_of
+from underskin.recordings.campaign import Campaign, FrfRecording, frf_of, frf_recordings, parse
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 

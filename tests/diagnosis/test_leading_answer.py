@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from underskin.diagnosis.reporting.answer_statement import answer_statement
+from underskin.diagnosis.reporting.law_statement import answer_statement
 from underskin.diagnosis.selection.answers import Answer, leading_first
 
 pytestmark = pytest.mark.slow

@@ -8,10 +8,9 @@ import pytest
 from tests.support.repository import ROOT
 from underskin.recordings import read_contents, read_file, rig_description
 from underskin.recordings.campaign import CompressionRecording, FrfRecording, IndentationRecording
-from underskin.recordings.channel_mapping import ChannelMapping, Property
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.formats import MODULES
-from underskin.recordings.rig_description import CurveChannel, Trim
+from underskin.recordings.rig_description import ChannelMapping, CurveChannel, Property, Trim
 
 TEXT = (ROOT / "docs" / "formats.md").read_text()
 

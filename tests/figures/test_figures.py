@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from underskin.diagnosis.reporting.line_styles import PAPER
+from underskin.diagnosis.reporting.page_styles import PAPER
 from underskin.errors import InvalidInput
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.curves import ForceCurve, force_curves
@@ -12,7 +12,7 @@ from underskin.figures.frf import frf_overview, frf_recordings
 from underskin.figures.history import SensorPoints, d33_history
 from underskin.figures.traces import raw_traces
 from underskin.recordings.channels import Channel
-from underskin.recordings.frf.summary import FrfLines, FrfSpread
+from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
 
 SENSORS = ("s1", "s2", "s3")
 D33 = np.array([14.0, 15.0, 3.0])

@@ -14,10 +14,10 @@ from tests.support.repository import ROOT
 from underskin.array_stress.request import read_request
 from underskin.errors import ErrorCode, FileError, InvalidInput, not_one_of, required, unequal_lengths, wrong_type
 from underskin.findings import english, sentences
-from underskin.findings.arguments import DefectKind, ImplausibleD33, UnitGuess
 from underskin.findings.codes import FindingCode, Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
+from underskin.findings.sentences import DefectKind, ImplausibleD33, UnitGuess
 from underskin.recordings.campaign import from_dict, parse
 from underskin.units import checked
 

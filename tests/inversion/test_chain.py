@@ -8,8 +8,8 @@ import pytest
 from tests.support.shaken_series import D33, delayed, high_pass, low_pass, shaken
 from underskin.findings.codes import FindingCode
 from underskin.inversion.invert import Inversion, invert
-from underskin.recordings.frf.channel_noise import without_noise_bias
 from underskin.recordings.frf.estimation import broadband
+from underskin.recordings.frf.line_choice import without_noise_bias
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 pytestmark = pytest.mark.slow

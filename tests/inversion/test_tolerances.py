@@ -11,8 +11,7 @@ from tests.support.instrument_files import hdf5
 from tests.support.simulated_campaign import Rig, simulate
 from underskin.inversion.invert import invert
 from underskin.recordings import read_file, rig_description
-from underskin.recordings.campaign import parse, to_dict
-from underskin.recordings.conditions import Tolerances
+from underskin.recordings.campaign import Tolerances, parse, to_dict
 from underskin.recordings.readers import json_file
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 

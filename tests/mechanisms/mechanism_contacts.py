@@ -5,8 +5,7 @@ import os
 from pathlib import Path
 
 from tests.support.mechanism_campaigns import SKIN, campaign, frf_recording, predicted
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import FrfRecording, SkinDescription
 
 H, E = 2.5e-3, 2e6  # of mechanism_campaigns.SKIN [m, Pa]
 RHO = 0.6

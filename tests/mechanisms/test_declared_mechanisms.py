@@ -18,7 +18,7 @@ from underskin.cli.mechanism import app
 from underskin.errors import FileError, InvalidInput
 from underskin.mechanisms.declared import saving
 from underskin.mechanisms.declared.document import parse
-from underskin.mechanisms.declared.expressions import read
+from underskin.mechanisms.declared.mechanism import read
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.mechanisms.registry import CATALOGUE

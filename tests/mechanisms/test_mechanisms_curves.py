@@ -23,8 +23,7 @@ from tests.support.oracle import NEEDS_ORACLE
 from tests.support.sphere_contact import SphereOnLayer
 from underskin.mechanisms import Normal, compose
 from underskin.physics.elastic_layer import Layer
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
 from underskin.units import Floats
 
 E_MPA, R_MM, H_MM = 2.0, 4.0, 2.5

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from underskin.mechanisms.models.cubic_basis import CubicBasis
-from underskin.mechanisms.models.sigma_kernel import disc_averages
+from underskin.mechanisms.models.sigma_curves import CubicBasis
+from underskin.mechanisms.models.sigma_kernels import disc_averages
 
 
 def _averages(offsets: np.ndarray, disc: float, values: np.ndarray, basis: CubicBasis) -> np.ndarray:

@@ -6,7 +6,7 @@ from scipy.optimize import brentq
 
 from tests.mechanisms.indentation_loops import E_MPA, NO_CREEP, R_MM, REDUCED, R, force_at, jkr
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
-from underskin.mechanisms.models.sphere_contact import Sphere, Stiffening
+from underskin.mechanisms.models.indentation import Sphere, Stiffening
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.units import Floats

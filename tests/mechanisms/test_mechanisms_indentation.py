@@ -28,8 +28,7 @@ from underskin.mechanisms import Unsupported, compose
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.physics.elastic_layer import Layer
-from underskin.recordings.campaign import IndentationRecording
-from underskin.recordings.conditions import Conditions, IndentationConditions, SkinDescription
+from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording, SkinDescription
 
 # A loop that relaxes.
 

@@ -7,7 +7,7 @@ from tests.mechanisms.test_unnamed_laws import coordinates
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.saving import document
-from underskin.mechanisms.unnamed.frequency_laws import frequency_laws, phase_of_bump
+from underskin.mechanisms.unnamed.grammar import frequency_laws, phase_of_bump
 from underskin.units import Floats
 
 

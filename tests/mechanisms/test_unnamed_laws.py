@@ -16,10 +16,8 @@ from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
 from underskin.mechanisms.unnamed.expressions import course, expression
 from underskin.mechanisms.unnamed.forms import shapes
 from underskin.mechanisms.unnamed.grammar import Grammar, combination
-from underskin.mechanisms.unnamed.laws import RecordingLaw, UnnamedLaw
-from underskin.mechanisms.unnamed.level_tables import LevelTables
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Conditions, frf_of
+from underskin.mechanisms.unnamed.laws import LevelTables, RecordingLaw, UnnamedLaw
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, frf_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Array, Floats
 

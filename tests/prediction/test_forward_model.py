@@ -18,8 +18,14 @@ from tests.support.mechanism_campaigns import (
 )
 from underskin import Conditions, InvalidInput, SkinDescription, frf_conditions, predict
 from underskin.mechanisms import compose
-from underskin.recordings.campaign import Campaign, FrfRecording, Recording
-from underskin.recordings.conditions import CompressionConditions, FrfConditions, IndentationConditions
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionConditions,
+    FrfConditions,
+    FrfRecording,
+    IndentationConditions,
+    Recording,
+)
 from underskin.units import Floats
 
 DEPTH_MM = np.linspace(0.0, 0.3, 7)

@@ -11,7 +11,7 @@ from proof.text_wide import by_priors, by_subset
 from rig import strengths, wide_tails
 from rig.draw import drawn
 from rig.wide_tails import WIDE
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR
+from underskin.diagnosis.noise import GAIN_PRIOR
 from underskin.diagnosis.selection.priors import PRIORS
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.recordings.campaign import parse

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter, lfilter_zi
 
-from underskin.recordings.frf.estimation import Frf
+from underskin.recordings.frf.spectra import Frf
 from underskin.units import Complexes, Floats
 
 RATE = 2000.0

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from underskin.errors import FileError, InvalidInput
 from underskin.recordings.channels import Block, Channel, Contents
-from underskin.recordings.readers.channel_arithmetic import parse
-from underskin.recordings.readers.derived_channels import with_derived
+from underskin.recordings.readers.channel_arithmetic import parse, with_derived
 from underskin.recordings.readers.unit_labels import unit
 
 SAMPLES = np.array([1.0, -2.0, 3.5, 0.25])

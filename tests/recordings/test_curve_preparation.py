@@ -8,8 +8,7 @@ from underskin.errors import InvalidInput
 from underskin.findings.finding import Finding
 from underskin.inversion import elastomer
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.curve_defects import periodic_error
-from underskin.recordings.curve_signs import falling
+from underskin.recordings.curve_preparation import falling, periodic_error
 from underskin.recordings.plausibility import implausible
 
 pytestmark = pytest.mark.slow

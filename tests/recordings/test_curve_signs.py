@@ -9,7 +9,7 @@ import pytest
 from tests.support.blocks import block
 from underskin import InvalidInput
 from underskin.inversion import elastomer
-from underskin.recordings import curve_signs, plausibility
+from underskin.recordings import curve_preparation, plausibility
 from underskin.recordings.campaign import Campaign, IndentationRecording, from_dict, samples_of
 
 SIGNS = list(product((1, -1), (1, -1)))
@@ -59,7 +59,7 @@ def test_what_pulls_a_sphere_on_its_way_out_tells_no_sign(
     start_mm: float, end_mm: float, force: int, travel: int
 ) -> None:
     expected = tuple(name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0)
-    assert curve_signs.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
+    assert curve_preparation.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
 
 
 def test_a_sphere_that_is_still_pulled_where_it_is_deepest_is_not_turned() -> None:
@@ -67,7 +67,7 @@ def test_a_sphere_that_is_still_pulled_where_it_is_deepest_is_not_turned() -> No
     rows = np.flatnonzero((np.arange(160) < 80) & (curve.displacement_mm < 0.06))
     pressed_lightly = samples_of(curve, rows)
     assert pressed_lightly.force_n[-1] < 0
-    assert curve_signs.counted_negative(pressed_lightly) == ()
+    assert curve_preparation.counted_negative(pressed_lightly) == ()
 
 
 @pytest.mark.parametrize(("force", "travel"), SIGNS)
@@ -78,7 +78,7 @@ def test_what_is_negative_is_told_and_turned(make: object, modulus_mpa: float, f
     expected = [name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0]
     told = [finding for finding in plausibility.implausible(campaign) if finding.code == "sign_flipped"]
     assert [finding.arguments["fields"] for finding in told] == ([expected] if expected else [])
-    turned, changed = curve_signs.turned(campaign)
+    turned, changed = curve_preparation.turned(campaign)
     assert changed == bool(expected)
     (found,) = elastomer.of_campaign(turned)
     assert not isinstance(found.result, InvalidInput)

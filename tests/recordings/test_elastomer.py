@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from underskin.errors import InvalidInput
-from underskin.recordings.block_modulus import compression_modulus, of_compression
 from underskin.recordings.campaign import CompressionRecording, IndentationRecording
-from underskin.recordings.sphere_modulus import indentation_modulus, of_indentation
+from underskin.recordings.modulus import compression_modulus, indentation_modulus, of_compression, of_indentation
 from underskin.units import Floats
 
 HEIGHT, DIAMETER = 10e-3, 10e-3

@@ -12,7 +12,7 @@ from underskin.inversion import elastomer
 from underskin.inversion.invert import NoD33, invert
 from underskin.recordings import plausibility
 from underskin.recordings.campaign import Campaign, IndentationRecording, parse
-from underskin.recordings.exchanged_columns import look_exchanged
+from underskin.recordings.curve_preparation import look_exchanged
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 

@@ -10,12 +10,11 @@ import pytest
 
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording, parse
-from underskin.recordings.frf import summary
-from underskin.recordings.frf.band_halves import lower_half
-from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone
+from underskin.recordings.frf import flat_zone as summary
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.flat_zone import Condition, FlatZone, band_average, flat_zone, lower_half
 from underskin.recordings.frf.line_choice import usable_lines
-from underskin.recordings.frf.stacks import stacked
+from underskin.recordings.frf.spectra import Frf, stacked
 from underskin.units import Complexes, Floats
 
 LOG_GRID = np.geomspace(1, 1000, 60)

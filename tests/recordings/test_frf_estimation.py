@@ -12,11 +12,9 @@ from bench.soak import SOAK
 from tests.recordings.known_signals import GAIN, RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
 from underskin.errors import InvalidInput
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import Frf, broadband, estimate, lines_of, periodic, stepped_sine
+from underskin.recordings.frf.estimation import broadband, estimate, lines_of, periodic, resonance, stepped_sine
 from underskin.recordings.frf.estimators import Estimator
-from underskin.recordings.frf.periodic import period_of
-from underskin.recordings.frf.resonance import resonance
-from underskin.recordings.frf.stepped_sine import find_steps
+from underskin.recordings.frf.spectra import Frf, find_steps, period_of
 from underskin.units import Floats
 
 

@@ -14,8 +14,7 @@ from tests.recordings.test_recordings_cells import ABOVE
 from underskin.recordings import read_file
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.readers import csv_file, text
-from underskin.recordings.readers.plain_rows import PlainRows, RowStyle
-from underskin.recordings.readers.table_rows import Table
+from underskin.recordings.readers.cells import PlainRows, RowStyle, Table
 
 NUMBERS = ("1", "-2.5", "+.5", "7.", "1e-3", "1E5", "nan", "-inf", "Infinity", "−4", "0.1234567890123456789", "1e999")
 OTHERS = ("", " ", "1 2", "1.2.3", "0x10", "1_0", "n/a", "nan(1)", "1e", "-", "1,5", "٣", "12:30", "#3", '"', "a;b")

@@ -11,9 +11,17 @@ from tests.support.cases import first
 from tests.support.instrument_files import rig, tdms
 from underskin.errors import InvalidInput
 from underskin.recordings import Reading, join, read_file
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, RecordingProblem, parse, to_dict
-from underskin.recordings.conditions import Sensor, SkinDescription
-from underskin.recordings.shown_values import LONGEST_NAME
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    FrfRecording,
+    RecordingProblem,
+    Sensor,
+    SkinDescription,
+    parse,
+    to_dict,
+)
+from underskin.recordings.validation import LONGEST_NAME
 
 SKIN = SkinDescription(poisson_ratio=0.5, thickness_mm=2.5, youngs_modulus_mpa=16.0, sensor_radius_mm=1.5)
 

@@ -13,8 +13,8 @@ from underskin.errors import FileError, InvalidInput
 from underskin.recordings import read_file, reading
 from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.channels import Contents
-from underskin.recordings.readers import csv_file, text_blocks
-from underskin.recordings.readers.text_blocks import BlockText
+from underskin.recordings.readers import cells, csv_file
+from underskin.recordings.readers.cells import BlockText
 
 RANDOM = np.random.default_rng(20251224)
 VALUES = RANDOM.normal(size=(3, 900)).round(9)
@@ -23,7 +23,7 @@ VALUES = RANDOM.normal(size=(3, 900)).round(9)
 @pytest.fixture(autouse=True)
 def small_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A block is a few lines, so that a text of some thousand lines is a long one."""
-    monkeypatch.setattr(text_blocks, "BLOCK_BYTES", 500)
+    monkeypatch.setattr(cells, "BLOCK_BYTES", 500)
     return iter(())
 
 

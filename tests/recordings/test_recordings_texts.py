@@ -8,10 +8,9 @@ import pytest
 from tests.recordings.contents_of_files import contents
 from underskin.errors import FileError
 from underskin.recordings import read_contents
-from underskin.recordings.channel_mapping import Property
 from underskin.recordings.channels import Contents
 from underskin.recordings.readers.sandbox import parse_apart
-from underskin.recordings.stated_values import common_value, spring_constant
+from underskin.recordings.rig_description import Property, common_value, spring_constant
 
 DEPTH = np.concatenate([np.linspace(-0.5, 1.5, 9), np.linspace(1.25, -0.5, 8)])
 FORCE = np.where(DEPTH > 0, 0.25 * np.abs(DEPTH) ** 1.5, 0.0).round(6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.recordings.known_signals import RATE, answer_to, dwelling, known_frf, rms_error, shaken, swept
-from underskin.recordings.frf.estimation import Frf, broadband, stepped_sine
-from underskin.recordings.frf.signal_checks import defects, defects_of_pair
+from underskin.recordings.frf.estimation import broadband, stepped_sine
+from underskin.recordings.frf.spectra import Frf, defects, defects_of_pair
 
 
 def test_overload_is_seen_where_it_is_and_nowhere_else() -> None:

@@ -11,7 +11,7 @@ from underskin.inversion.elastomer import of_campaign
 from underskin.physics.contact_curves import CurveGrid
 from underskin.physics.elastic_layer import Layer
 from underskin.recordings.campaign import Campaign
-from underskin.recordings.sphere_modulus import IndentationModulus
+from underskin.recordings.modulus import IndentationModulus
 from underskin.units import Floats
 
 pytestmark = pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from underskin.recordings.tare import rise
+from underskin.recordings.rig_mapping import rise_of
 
 _NOISE = 0.01
 
@@ -15,12 +15,12 @@ def curve(contact: int) -> np.ndarray:
 
 
 def test_a_level_in_the_air_is_no_rise() -> None:
-    assert rise(curve(contact=80), 80) is None
-    assert rise(curve(contact=80), 8) is None  # too few to tell
+    assert rise_of(curve(contact=80), 80) is None
+    assert rise_of(curve(contact=80), 8) is None  # too few to tell
 
 
 def test_what_is_past_the_contact_is_told_with_where_it_begins() -> None:
-    found = rise(curve(contact=50), 80)
+    found = rise_of(curve(contact=50), 80)
     assert found is not None
     assert 50 < found.start < 60
     assert found.height == pytest.approx(27.0**1.5 / 100, rel=0.1)

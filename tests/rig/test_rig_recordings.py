@@ -22,7 +22,8 @@ from tests.support.rig_experiments import PARAMETERS, described
 from underskin.recordings import campaign as campaigns
 from underskin.recordings import read_file, rig_description
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.estimation import Frf, broadband, estimate
+from underskin.recordings.frf.estimation import broadband, estimate
+from underskin.recordings.frf.spectra import Frf
 
 EXAMPLES = ROOT / "examples" / "rig"
 SOAK = "UNDERSKIN_SOAK" in os.environ

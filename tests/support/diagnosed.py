@@ -14,8 +14,7 @@ from tests.support.lean_reports import BESIDE_SKINS, lean_fleet, lean_together
 from tests.support.store_server import Server
 from underskin import __version__, diagnose
 from underskin.mechanisms import compose
-from underskin.recordings.campaign import Campaign, FrfRecording, parse, to_dict
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription, parse, to_dict
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 
 D33 = 14.0

@@ -7,8 +7,7 @@ import numpy as np
 
 from underskin.mechanisms import compose
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes, Floats
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import dynesty
 import numpy as np
 
+from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.hypothesis import CovarianceParameter, FitPoint
-from underskin.diagnosis.inference.optimizer import Fitter
 from underskin.units import Floats
 
 _NODES = 8001  # of the grid on which a covariance parameter's prior is inverted

@@ -7,8 +7,7 @@ import numpy as np
 from underskin.physics import charge_response
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.pressed_skin import transmission
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor, SkinDescription
 from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
 from underskin.units import Floats

@@ -9,7 +9,7 @@ from underskin.physics.hankel_transform import normal_stress
 from underskin.physics.skin import Indenter, Skin
 from underskin.prediction.forward_model import predict
 from underskin.prediction.pressed_skin import Transmission, frf_gradient, transmission
-from underskin.recordings.conditions import SkinDescription, frf_conditions
+from underskin.recordings.campaign import SkinDescription, frf_conditions
 from underskin.surrogate.contact_table import load_contact
 from underskin.surrogate.sigma_table import load_table
 from underskin.surrogate.solved_contact import linear_contact, solved_contact

@@ -15,9 +15,9 @@ from underskin.array_stress import pressure_map
 from underskin.errors import ErrorCode, InvalidInput, Mention, Requirement
 from underskin.physics.skin import INCOMPRESSIBLE
 from underskin.recordings import validation as field
-from underskin.recordings.conditions import Sensors
+from underskin.recordings.campaign import Sensors
 from underskin.recordings.readers import json_file
-from underskin.recordings.shown_values import shown
+from underskin.recordings.validation import shown
 from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
 

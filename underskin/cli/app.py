@@ -171,7 +171,7 @@ def d33(
 
     defaults: dict[str, float | None] = {"poisson_ratio": 0.5, "frf_uncertainty_pc_per_n": None}
     from underskin.prediction import answers
-    from underskin.prediction.other_contact import other_contact
+    from underskin.prediction.answers import other_contact
     from underskin.surrogate.solved_contact import contact_model
 
     def compute(table: "SigmaTable", columns: "Mapping[str, Floats]") -> "ComputedColumns":

@@ -23,7 +23,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import significant
 from underskin.prediction.columns import statuses, to_csv, told
 from underskin.prediction.csv_columns import CsvError, from_csv
-from underskin.prediction.domain_limits import Words
+from underskin.prediction.pressed_skin import Words
 from underskin.recordings.readers.formats import ZIP
 from underskin.recordings.readers.template_columns import misspelt
 from underskin.recordings.reading import sheet_text

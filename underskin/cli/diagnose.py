@@ -1,4 +1,9 @@
-"""The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would settle it.
+"""The command `diagnose`.
+
+Reports written as files, whole or not at all, each named like its campaign; and what the terminal says of them.
+`diagnose --together` and `--fleet`: files of campaigns of one skin, or of skins of one make, in one report.
+
+The commands `diagnose` and `plan`: what recordings and model disagree about, and which recordings would settle it.
 
 `diagnose` writes one report (`report/1`) a campaign, named like its input; it uses all cores, or a Dask cluster, one
 campaign a process, so that the reports do not depend on how many there are.
@@ -6,18 +11,17 @@ campaign a process, so that the reports do not depend on how many there are.
 
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from underskin.cli.diagnose_several import of_several
-from underskin.cli.reports import in_words, refuse_overwriting, write_page, write_report
 from underskin.cli.rigs import EstimatorOption, RigOption, read_by, reading_notes, rig_description_in
 from underskin.cli.store import LOCAL, KeyOption, Url, connect
 from underskin.errors import UnderskinError
@@ -27,6 +31,130 @@ if TYPE_CHECKING:
     from underskin.client.service_client import Client
     from underskin.recordings.reading import Reading
     from underskin.surrogate.sigma_table import SigmaTable
+
+
+def refuse_overwriting(files: Sequence[Path], campaigns: Sequence[str], output_dir: Path) -> None:
+    """Reports are named like their campaigns: two of one name, or a campaign in the folder, would be lost."""
+    names = [*(file.stem for file in files), *campaigns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        sources = [(file.stem, str(file)) for file in files] + [(name, f"--campaign {name}") for name in campaigns]
+        clashing = " and ".join(source for name, source in sources if name == twice[0])
+        problem = (
+            f"reports are named like their campaigns: {clashing} would all become {twice[0]}.json. "
+            "Rename files, or run once for each, with an --output-dir of its own"
+        )
+        raise typer.BadParameter(problem, param_hint="FILES")
+    lost = [file for file in files if (output_dir / f"{file.stem}.json").resolve() == file.resolve()]
+    if lost:
+        raise typer.BadParameter(f"the report would overwrite {lost[0]}", param_hint="--output-dir")
+
+
+def in_words(document: Mapping[str, Any]) -> str:
+    """A report's verdict and, below it, its statement."""
+    return f"{document['verdict']}\n{document['statement']}"
+
+
+def write_report(document: dict[str, Any], path: Path) -> None:
+    """Write a report as JSON, the same bytes for the same report."""
+    _write(json.dumps(document, ensure_ascii=False, indent=1, allow_nan=False) + "\n", path)
+
+
+def write_page(document: dict[str, Any], path: Path, figures: Mapping[str, Any] | None = None) -> None:
+    """Write a report as a page, with those of its figures that are given."""
+    from underskin.diagnosis.reporting.html_report import page
+
+    _write(page(document, figures), path)
+
+
+def _write(text: str, path: Path) -> None:
+    partial = path.with_name(f".{path.name}.part")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
+
+
+_NAME = re.compile(r"\w[\w .-]*")
+
+
+def of_several(
+    files: Sequence[Path],
+    read: "Callable[[Path], Reading]",
+    without: Sequence[str],
+    output_dir: Path,
+    *,
+    html: bool,
+    together: str | None,
+    fleet: str | None,
+) -> None:
+    """Write NAME.json, and NAME.html with `html`; `read` reads a file."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from underskin.diagnosis.diagnose import diagnose_fleet, diagnose_together
+
+    target = output_dir / f"{_name(together, fleet)}.json"
+    if any(file.resolve() == target.resolve() for file in files):
+        raise typer.BadParameter(f"the report would overwrite {target}", param_hint="--together, --fleet")
+    readings = _read(files, read)
+    known = sorted({reading.campaign.skin.id for reading in readings if reading.campaign.skin.id is not None})
+    if together is not None and len(known) > 1:
+        allowed = f"the campaigns are of several skins (skin.id): {', '.join(known)}"
+        raise typer.BadParameter(allowed, param_hint="--together")
+    console = Console(stderr=True)
+    with Progress(console=console) as progress:
+        bar = progress.add_task("diagnosing", total=1.0)
+
+        def told(share: float) -> None:
+            progress.update(bar, completed=share)
+
+        if together is not None:
+            report = diagnose_together(readings, target.stem, without=without, progress=told)
+        else:
+            report = diagnose_fleet(_by_skin(readings), target.stem, without=without, progress=told)
+        told(1.0)
+    document = dict(report)
+    write_report(document, target)
+    if html:
+        write_page(document, target.with_suffix(".html"))
+    console.print(f"{target.stem}: {in_words(document)}", markup=False, highlight=False, soft_wrap=True)
+    for file, reading in zip(files, readings, strict=True):
+        for note in reading_notes(reading):
+            console.print(f"{file}: {note}", markup=False, highlight=False, soft_wrap=True)
+
+
+def _name(together: str | None, fleet: str | None) -> str:
+    """What the report is called."""
+    name = together if together is not None else fleet
+    if name is None or (together is not None and fleet is not None):
+        raise typer.BadParameter("one of --together and --fleet", param_hint="--fleet")
+    if not _NAME.fullmatch(name):
+        raise typer.BadParameter(
+            f"{name!r}: letters, digits, spaces, points and hyphens", param_hint="--together, --fleet"
+        )
+    return name
+
+
+def _read(files: Sequence[Path], read: "Callable[[Path], Reading]") -> list["Reading"]:
+
+    readings = []
+    for file in files:
+        try:
+            readings.append(read(file))
+        except UnderskinError as error:
+            raise UnderskinError(f"{file}: {error}") from error
+    return readings
+
+
+def _by_skin(readings: Sequence["Reading"]) -> dict[str, list["Reading"]]:
+    """By skin.id, which each must have."""
+    skins: dict[str, list[Reading]] = {}
+    for reading in readings:
+        skin = reading.campaign.skin.id
+        if skin is None:
+            raise typer.BadParameter(f"{reading.campaign.name} names no skin (skin.id)", param_hint="--fleet")
+        skins.setdefault(skin, []).append(reading)
+    return skins
+
 
 FilesArgument = Annotated[
     list[Path] | None, typer.Argument(help="Campaigns (campaign/1, JSON, or any format that is read).")

@@ -1,28 +1,199 @@
-"""`underskin d33 FILE...`: the d33 of an array, and the elastomer's modulus, from files of recordings; no server."""
+"""The command `d33`.
 
+The d33 and the modulus of the elastomer of campaigns, for the command line: as tables, or as CSV. `underskin d33
+FILE...`: the d33 of an array, and the elastomer's modulus, from files of recordings; no server.
+"""
+
+import csv
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
+from rich.text import Text
 
-from underskin.cli.campaign_table import InvertedFile, write_csv, write_tables
-from underskin.cli.rigs import rig_description_in
+from underskin.cli.columns import PIPED_WIDTH
+from underskin.cli.rigs import reading_notes, rig_description_in
 from underskin.errors import FileError, InvalidInput, TableError, UnderskinError, not_unique, wrong_type
+from underskin.findings.alike import recordings_called, told_together
 from underskin.findings.formatting import significant
 from underskin.inversion import elastomer
+from underskin.inversion.elastomer import RecordingModulus
 from underskin.inversion.invert import Inversion, invert
 from underskin.inversion.other_contact import array_d33_by_other
-from underskin.prediction.other_contact import OTHER, WORDS
-from underskin.recordings import Reading, join, read_file, validation
+from underskin.prediction.answers import OTHER, WORDS
+from underskin.recordings import plausibility, validation
 from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.reading import Reading, join, read_file
 from underskin.recordings.rig_description import RigDescription
 from underskin.surrogate.contact_model import ContactName
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.surrogate.solved_contact import contact_model
 from underskin.units import to_lab
+
+_HEADER = (
+    "file", "level", "sensor", "indenter_radius_mm", "preload_n", "recordings",
+    "d33_pc_per_n", "d33_uncertainty_pc_per_n", "d33_low_pc_per_n", "d33_high_pc_per_n", "flags",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class InvertedFile:
+    """An inverted file, or several as one campaign: the reading, its d33 or why there is none, and its moduli."""
+
+    file: str
+    reading: Reading
+    inversion: Inversion | InvalidInput
+    moduli: Sequence[RecordingModulus]
+    by_other_contact: str = ""  # d33 of the array by it, in words, where it differs
+
+    @property
+    def title(self) -> str:
+        """The name of the campaign, and the file that it is in."""
+        name = self.reading.campaign.name
+        return name if name == self.file else f"{name} ({self.file})"
+
+    @property
+    def is_of_use(self) -> bool:
+        """Whether the inversion gave d33 or a modulus."""
+        measured = any(not isinstance(modulus.result, InvalidInput) for modulus in self.moduli)
+        return isinstance(self.inversion, Inversion) or measured
+
+    @property
+    def notes(self) -> list[str]:
+        """What was taken for what, findings in words, and each recording or sensor that is left out."""
+        notes = reading_notes(self.reading)
+        notes += [self.by_other_contact] if self.by_other_contact else []
+        campaign = self.reading.campaign
+        findings = (
+            self.inversion.findings if isinstance(self.inversion, Inversion) else plausibility.at_reading(campaign)
+        )
+        notes += [f"look at: {finding.sentence}" for finding in findings]
+        if not isinstance(self.inversion, Inversion) and not self.moduli:
+            count = 0 if campaign.recordings else len(self.reading.problems)
+            why = f"none of the {count} recordings can be used" if count else self.inversion
+            notes.append(f"no d33: {why}")
+        refused = [(problem.recording, problem.as_error(problem.field)) for problem in self.reading.problems]
+        refused += [(one.recording, one.result) for one in self.moduli if isinstance(one.result, InvalidInput)]
+        for names, why in told_together((recording, str(why)) for recording, why in refused):
+            notes.append(f"left out: {recordings_called(names)}: {why}")
+        if isinstance(self.inversion, Inversion):
+            notes += [f"left out: {left.sentence}" for left in self.inversion.left_out]
+        return notes
+
+
+def write_tables(everything: Iterable[InvertedFile]) -> None:
+    """Each file's array, sensors and elastomer, what was left out, and its findings."""
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else PIPED_WIDTH)
+    for entry in everything:
+        console.print(Text(entry.title, style="bold"))
+        if isinstance(entry.inversion, Inversion):
+            console.print(_array(entry.inversion))
+            console.print(_sensors(entry.inversion))
+        if any(not isinstance(modulus.result, InvalidInput) for modulus in entry.moduli):
+            console.print(_elastomer(entry.moduli))
+        for note in entry.notes:
+            console.print(Text(note), soft_wrap=True)
+        console.print()
+
+
+def write_csv(everything: Iterable[InvertedFile]) -> None:
+    """d33 in rows: of the array, with what the skin may be off as declared and without, of each sensor, and of each
+    sensor × indenter × preload.
+
+    Findings, and what was left out, go to standard error.
+    """
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(_HEADER)
+    for entry in everything:
+        if isinstance(entry.inversion, Inversion):
+            writer.writerows([entry.file, *row] for row in _rows(entry.inversion))
+        for note in entry.notes:
+            print(f"underskin: {entry.file}: {note}", file=sys.stderr)
+
+
+def _rows(inversion: Inversion) -> list[list[str]]:
+    rows, cells = [], inversion.cells
+    for level, d33 in (("array", inversion.absolute_d33), ("array_relative", inversion.campaign_d33)):
+        if d33 is not None:
+            rows.append([level, "", "", "", "", *_full(d33.d33_rows()[0]), ""])
+    for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
+        codes = " ".join(flag.code for flag in inversion.flags if flag.sensor == name)
+        rows.append(["sensor", name, "", "", "", *_full(numbers), codes])
+    radii = to_lab("indenter_radius_mm", cells.indenter_radius).round(9)
+    conditions = zip(cells.sensor, radii.tolist(), cells.preload.tolist(), cells.recordings.tolist(), strict=True)
+    for (sensor, radius, preload, count), numbers in zip(conditions, cells.d33.d33_rows(), strict=True):
+        where = [inversion.sensor_ids[sensor], repr(radius), repr(preload), str(count)]
+        rows.append(["cell", *where, *_full(numbers), ""])
+    return rows
+
+
+def _full(numbers: Sequence[float]) -> list[str]:
+    return ["NaN" if number != number else repr(number) for number in numbers]
+
+
+def _array(inversion: Inversion) -> Table:
+    listed = Table.grid(padding=(0, 2))
+    zone = inversion.zone
+    named = ("d33 of the array", inversion.absolute_d33), ("relative to others", inversion.campaign_d33)
+    for name, d33 in named:
+        if d33 is not None:
+            value, uncertainty, low, high = d33.d33_rows()[0]
+            ends = f"{significant(low, 4)} to {significant(high, 4)}"
+            listed.add_row(name, f"{significant(value, 4)} ± {significant(uncertainty, 2)} pC/N (95 %: {ends})")
+    for name, scatter, factor, unit in (
+        ("spread over sensors", inversion.spread, 100.0, "%"),
+        ("scatter of gain", inversion.gain, 100.0, "%"),
+        ("scatter of position", inversion.position, 1e3, "mm"),
+    ):
+        if scatter is not None:
+            value, low, high = (factor * float(part) for part in (scatter.value, scatter.low, scatter.high))
+            listed.add_row(name, f"± {value:.2g} {unit} (95 %: {low:.2g} to {high:.2g})")
+    listed.add_row("skin as declared", f"± {inversion.declared_percent:.2g} % of all d33, in the array's alone")
+    chosen = f"{zone.low_hz:.4g} to {zone.high_hz:.4g} Hz, as asked"
+    listed.add_row("band", chosen if zone.chosen_by_user else zone.reason)
+    return listed
+
+
+def _sensors(inversion: Inversion) -> Table:
+    table = _table("sensor", "d33\npC/N", "±\npC/N", "95 % from\npC/N", "to\npC/N", remark="stands out")
+    for name, numbers in zip(inversion.sensor_ids, inversion.sensors.d33_rows(), strict=True):
+        reasons = "; ".join(flag.reason for flag in inversion.flags if flag.sensor == name)
+        table.add_row(Text(name), *_short(numbers), Text(reasons))
+    return table
+
+
+def _elastomer(moduli: Sequence[RecordingModulus]) -> Table:
+    table = _table("recording", "E\nMPa", "±\nMPa", remark="from")
+    for modulus in moduli:
+        if not isinstance(modulus.result, InvalidInput):
+            numbers = to_lab("youngs_modulus_mpa", [modulus.result.modulus, modulus.result.uncertainty]).tolist()
+            table.add_row(Text(modulus.recording), *_short(numbers), f"{modulus.kind}: {modulus.result.statement}")
+    return table
+
+
+def _table(first: str, *numbers: str, remark: str) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column(first, overflow="fold")
+    for name in numbers:
+        table.add_column(name, justify="right")
+    table.add_column(remark, overflow="fold")
+    return table
+
+
+def _short(numbers: Sequence[float]) -> list[str]:
+    """Four significant digits of a value and its limits, two of the uncertainty, which comes second."""
+    digits = (4, 2, 4, 4)
+    return [
+        "-" if number != number else significant(number, most) for number, most in zip(numbers, digits, strict=False)
+    ]
+
 
 _BandHz = tuple[float, float]
 

@@ -37,7 +37,7 @@ def sent(
 
 def results_of(client: "Client", files: Sequence[Path], terms: Mapping[str, Any]) -> list["SentFile"]:
     """What the service answers to files, the same however often they are sent; raises UnderskinError, OSError."""
-    from underskin.client.content_key import content_key
+    from underskin.client.campaigns import content_key
 
     return client.campaigns.post_files(files, **terms, idempotency_key=content_key(files, terms))
 

@@ -42,9 +42,7 @@ def watch(
     if rig is not None:
         rig_description_in(rig)  # which refuses one that cannot be used, before every file is refused for it
     from underskin.client.service_client import Client
-    from underskin.client.watch.folder import WatchedFolder
-    from underskin.client.watch.journal import Journal
-    from underskin.client.watch.watcher import Watcher
+    from underskin.client.watch import Journal, WatchedFolder, Watcher
 
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, _end)

@@ -1,9 +1,16 @@
-"""Campaigns and skins through the client: `client.campaigns` and `client.skins`.
+"""Campaigns of the service.
+
+An Idempotency-Key of files by their names and contents: what is sent twice is kept once. A file that says how much of
+it was read, for the progress of what is sent.
+
+Campaigns and skins through the client: `client.campaigns` and `client.skins`.
 
 Answers are the documents of the HTTP interface (docs/store.md, /openapi.json): their fields are attributes with types,
 and as a mapping each is the JSON object itself (`underskin.client.documents`).
 """
 
+import hashlib
+import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -14,8 +21,6 @@ from uuid import uuid4
 
 import orjson
 
-from underskin.client.content_key import label_of
-from underskin.client.counted_file import CountedFile
 from underskin.client.documents.campaign_d33 import D33
 from underskin.client.documents.campaigns import CampaignDetail, CampaignEntry, CampaignResult
 from underskin.client.documents.changes import Change
@@ -27,6 +32,54 @@ from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable, too_few
 from underskin.recordings.campaign import Campaign, parse, to_dict
 from underskin.recordings.frf.estimators import Estimator
+
+
+def content_key(files: Sequence[Path], terms: Mapping[str, Any]) -> str:
+    """A key that is the same for the same files and options; `terms` as `client.campaigns.post_files` takes them.
+
+    Raises OSError where a file cannot be read.
+    """
+    inputs = [*files] if terms.get("rig") is None else [*files, Path(terms["rig"])]
+    digests = [(file.name, content_sha256(file)) for file in inputs]
+    options: list[Any] = [terms.get("skin"), terms.get("all_or_nothing", False), terms.get("together")]
+    options.append(terms.get("rig") is None)
+    # What came later, only where it is said: keys of earlier versions hold.
+    options += [(name, terms[name]) for name in ("corrects", "reason", "estimator") if terms.get(name) is not None]
+    return f"content {hashlib.sha256(repr([options, digests]).encode()).hexdigest()}"
+
+
+def label_of(file: Path) -> str:
+    """The name under which a file is sent; letters that its disk has in no encoding we know become question marks."""
+    return file.name.encode("utf-8", "replace").decode("utf-8")
+
+
+def content_sha256(file: Path) -> str:
+    """The digest of a file's content; raises OSError."""
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
+class CountedFile(io.FileIO):
+    """A file opened to be read; `progress` is called with the bytes of each read, and with less than 0 for a return."""
+
+    def __init__(self, path: Path, progress: Callable[[int], object]) -> None:
+        super().__init__(path)
+        self._progress = progress
+
+    def read(self, size: int | None = -1, /) -> Any:
+        """As any file."""
+        data = super().read(size)
+        self._progress(len(data or b""))
+        return data
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        """As any file: a request that is repeated begins anew."""
+        before = self.tell()
+        place = super().seek(offset, whence)
+        if whence == io.SEEK_SET and place != before:
+            self._progress(place - before)
+        return place
+
 
 ModelName = Literal["paper", "adopted"]
 Progress = Callable[[int], object]  # of bytes

@@ -1,9 +1,21 @@
-"""Diagnoses through the client: `client.diagnoses`.
+"""Diagnoses, fleets and mechanisms of the service.
+
+Diagnoses through the client: `client.diagnoses`.
 
     started = client.diagnoses.start(campaign_id)
     report = client.diagnoses.wait(started.id, progress=print).report
 
 Answers are the documents of the HTTP interface (docs/store.md, /openapi.json); see `underskin.client.documents`.
+
+Several skins of one make through the client: `client.fleets`.
+
+started = client.fleets.diagnose(["palm-1", "palm-2", "palm-3"], "palms of batch 7")
+report = client.diagnoses.wait(started.id).report
+
+The catalogue of mechanisms through the client: `client.mechanisms`.
+
+client.mechanisms.keep_found(diagnosis_id, "warm_skin")
+[entry.name for entry in client.mechanisms.all() if entry.own]
 """
 
 import time
@@ -11,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 from underskin.client.campaigns import pages
 from underskin.client.documents.diagnoses import Asked, Diagnosis, DiagnosisEntry
+from underskin.client.documents.mechanisms import MechanismEntry
 from underskin.client.http_session import Session, path_of
 from underskin.errors import Unreachable
 
@@ -74,3 +87,46 @@ class Diagnoses:
     def cancel(self, diagnosis_id: str) -> DiagnosisEntry:
         """Cancel a diagnosis; raises ServiceError (409) if it is done or has failed."""
         return DiagnosisEntry.of(self._session.json("DELETE", path_of("diagnoses", diagnosis_id)))
+
+
+class Fleets:
+    """Skins of one make, diagnosed together."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def diagnose(self, skins: Sequence[str], name: str, *, without: Sequence[str] = ()) -> Asked:
+        """Start one diagnosis of all campaigns of three or more skins; its `id` and `state`.
+
+        `name` is what the report is called; `without` as in `client.diagnoses.start`. The same request on campaigns
+        that have not changed is answered with the diagnosis that there is.
+        """
+        body = {"skins": list(skins), "name": name, "without": list(without)}
+        return Asked.of(self._session.json("POST", "/v1/fleets/diagnosis", json=body))
+
+
+class Mechanisms:
+    """What diagnoses know by name; the lab's own can be kept and discarded."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def all(self) -> list[MechanismEntry]:
+        """Every mechanism, in the order in which a model composes them."""
+        return [MechanismEntry.of(entry) for entry in self._session.json("GET", "/v1/mechanisms")["mechanisms"]]
+
+    def keep(self, document: str) -> MechanismEntry:
+        """Keep a document (`mechanism/1`, YAML) as one of the lab's own; raises ServiceError (409) for a taken name."""
+        headers = {"Content-Type": "application/yaml"}
+        return MechanismEntry.of(
+            self._session.json("POST", "/v1/mechanisms", content=document.encode(), headers=headers)
+        )
+
+    def keep_found(self, diagnosis_id: str, name: str, description: str | None = None) -> MechanismEntry:
+        """Keep the law that a diagnosis found beside the catalogue; raises ServiceError (422) where it found none."""
+        asked = {"diagnosis_id": diagnosis_id, "name": name, "description": description}
+        return MechanismEntry.of(self._session.json("POST", "/v1/mechanisms", json=asked))
+
+    def discard(self, name: str) -> MechanismEntry:
+        """Take one of the lab's own out of the catalogue; raises ServiceError (409) while a model in force needs it."""
+        return MechanismEntry.of(self._session.json("DELETE", path_of("mechanisms", name)))

@@ -8,7 +8,7 @@ Fields have the names and the lab units of the HTTP interface. A single number h
 equally long. Answers have one entry a row, or shape () where only single numbers were given; a row outside the model's
 domain has the status `out_of_domain` and NaN in all that depends on σ. Campaigns and skins: `client.campaigns` and
 `client.skins` (`underskin.client.campaigns`); diagnoses: `client.diagnoses` (`underskin.client.diagnoses`); several
-skins together: `client.fleets` (`underskin.client.fleets`).
+skins together: `client.fleets` (`underskin.client.diagnoses`).
 """
 
 from collections.abc import Mapping
@@ -23,13 +23,11 @@ from numpy.typing import ArrayLike
 
 from underskin.client import answers
 from underskin.client.campaigns import Campaigns, Skins
-from underskin.client.diagnoses import Diagnoses
+from underskin.client.diagnoses import Diagnoses, Fleets, Mechanisms
 from underskin.client.documents.changes import Change
 from underskin.client.documents.design import DesignAnswer
 from underskin.client.documents.field import FieldAnswer
-from underskin.client.fleets import Fleets
 from underskin.client.http_session import Session, path_of
-from underskin.client.mechanisms import Mechanisms
 from underskin.surrogate.contact_model import ContactName
 from underskin.units import Floats
 

@@ -8,15 +8,11 @@ from typing import Any
 import numpy as np
 import scipy
 
-from underskin.diagnosis.data.curve_samples import curve_lines
-from underskin.diagnosis.data.inspected import Inspected
+from underskin.diagnosis.data.dataset import Inspected, curve_lines
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import residuals, whole_prediction
-from underskin.diagnosis.localisation.effect_size import EffectSize, effect
-from underskin.diagnosis.localisation.permutation_test import SEED, AxisResult, locate
-from underskin.diagnosis.localisation.region import in_region, region
-from underskin.diagnosis.localisation.residual_shape import describe
-from underskin.diagnosis.noise.noise_levels import NoiseLevels
+from underskin.diagnosis.localisation import SEED, AxisResult, EffectSize, describe, effect, in_region, locate, region
+from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.planning.optimal_design import plan
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.report import DiagnosisResult
@@ -24,22 +20,28 @@ from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
-from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.contacts_beyond import within_as_found
-from underskin.diagnosis.selection.kinds_together import Joined, Others, telling_modulus
-from underskin.diagnosis.selection.noise_refinement import frf_problem
+from underskin.diagnosis.selection.answers import Search, within_as_found
 from underskin.diagnosis.selection.other_kinds import Beside
-from underskin.diagnosis.selection.search import search
+from underskin.diagnosis.selection.search import Joined, Others, frf_problem, search, telling_modulus
 from underskin.diagnosis.selection.unnamed_search import with_laws
 from underskin.diagnosis.validation import cross_validation
-from underskin.diagnosis.validation.held_out_laws import held_out, of_nearest_law
-from underskin.diagnosis.validation.hidden_shift import hidden_shifts
-from underskin.diagnosis.validation.identifiability import confounding, left_open
-from underskin.diagnosis.validation.imitation import imitation, unseen
-from underskin.diagnosis.validation.platen_seating import without_seating
-from underskin.diagnosis.validation.power import power
-from underskin.diagnosis.validation.residual_noise import above_noise, keeps_structure, largest_floor_percent
-from underskin.diagnosis.validation.signatures import Signatures
+from underskin.diagnosis.validation.cross_validation import (
+    above_noise,
+    held_out,
+    keeps_structure,
+    largest_floor_percent,
+    of_nearest_law,
+)
+from underskin.diagnosis.validation.signatures import (
+    Signatures,
+    confounding,
+    hidden_shifts,
+    imitation,
+    left_open,
+    power,
+    unseen,
+    without_seating,
+)
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
@@ -70,7 +72,7 @@ def diagnose(
     """What recordings and model disagree about, and what physics was left out.
 
     FRFs are diagnosed where the campaign has any; else its indentation curves, else its compression curves. What the
-    other kinds tell of the same material counts with them (selection/kinds_together.py). From a campaign that holds
+    other kinds tell of the same material counts with them (selection/search.py). From a campaign that holds
     nothing usable nothing is concluded. Deterministic, but for a campaign that states times to come
     (`recordings/plausibility.py`). Mechanisms `without` which it is to be explained are left out of the catalogue.
 

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.diagnosis.reporting.line_styles import PAPER
+from underskin.diagnosis.reporting.page_styles import PAPER
 from underskin.figures.style import COLOURS, INK, MARKERS, SDS_OF_95, as_columns, label, styled
 
 _HOVER_INTERVAL = "%{text}<br>d33 %{y:.5g} pC/N<br>%{customdata[0]:.5g} to %{customdata[1]:.5g} (95 %)<extra></extra>"

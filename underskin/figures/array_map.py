@@ -10,10 +10,10 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 from plotly.colors import sample_colorscale
 
-from underskin.diagnosis.reporting.typeset import with_minus
+from underskin.diagnosis.reporting.page_styles import with_minus
 from underskin.figures.array_discs import AROUND, SHARE, radius_of, ring, smallest_distance
 from underskin.figures.style import COLOURS, INK, SDS_OF_95, as_columns, label, styled
-from underskin.inversion.beyond_chance import differ_from_others, differ_from_zero, threshold
+from underskin.inversion.array_course import differ_from_others, differ_from_zero, threshold
 from underskin.units import Floats, Mask
 
 _WITH_ROOM = 0.3  # of the smallest distance: a disc of such a radius has room for its id

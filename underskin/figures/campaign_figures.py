@@ -4,7 +4,7 @@ import numpy as np
 import plotly.graph_objects as go
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from underskin.diagnosis.reporting.scheme import SCHEME
+from underskin.diagnosis.reporting.page_styles import SCHEME
 from underskin.figures.array import frf_versus_preload, response_per_sensor
 from underskin.figures.array_map import array_map
 from underskin.inversion.invert import Inversion

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.line_styles import BOUND
+from underskin.diagnosis.reporting.page_styles import BOUND
 from underskin.figures.style import COLOURS, styled
 from underskin.prediction.skin_design import Design
 from underskin.units import Floats, to_lab

@@ -8,9 +8,9 @@ import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 from plotly.subplots import make_subplots
 
-from underskin.diagnosis.reporting.line_styles import WHOLE_NUMBERS, decade_ticks, is_logarithmic
+from underskin.diagnosis.reporting.page_styles import WHOLE_NUMBERS, decade_ticks, is_logarithmic
 from underskin.figures.style import ZONE, label, marked, one_of_many, styled
-from underskin.recordings.frf.summary import FrfLines, FrfSpread
+from underskin.recordings.frf.flat_zone import FrfLines, FrfSpread
 from underskin.units import Floats
 
 PlotlyTrace = dict[str, Any]

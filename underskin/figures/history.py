@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import plotly.graph_objects as go
 
-from underskin.diagnosis.reporting.line_styles import LINE_COLOURS
+from underskin.diagnosis.reporting.page_styles import LINE_COLOURS
 from underskin.figures.style import COLOURS, MARKERS, SDS_OF_95, label, styled
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
 

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
 from underskin.array_stress.answer import BaseStress
-from underskin.diagnosis.reporting.line_styles import BOUND
+from underskin.diagnosis.reporting.page_styles import BOUND
 from underskin.figures.array_map import Quantity, array_map
 from underskin.figures.style import COLOURS, styled
 from underskin.units import Floats

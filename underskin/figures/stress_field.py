@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.colors import sample_colorscale
 
-from underskin.diagnosis.reporting.line_styles import BOUND
+from underskin.diagnosis.reporting.page_styles import BOUND
 from underskin.figures.style import COLOURS, styled
 from underskin.prediction.stress_field import StressField
 from underskin.units import Floats, to_lab

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike
 
-from underskin.diagnosis.reporting.line_styles import LINE_COLOURS
+from underskin.diagnosis.reporting.page_styles import LINE_COLOURS
 from underskin.errors import unequal_lengths
 from underskin.units import Floats
 

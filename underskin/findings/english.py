@@ -6,7 +6,8 @@ This table and `sentences` are the one place that knows them; another language i
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from underskin.findings import sensor_sentences, sentences
+from underskin.findings import sentences
+from underskin.findings import sentences as sensor_sentences
 from underskin.findings.codes import Reason
 from underskin.findings.lacking import Lack, Lacking
 

@@ -1,4 +1,8 @@
-"""d33 of an array over several dates: what all sensors share, what each has besides, and how much either changed.
+"""Courses of an array's sensors over dates.
+
+Which of several values differ beyond chance: from the others, or from zero.
+
+d33 of an array over several dates: what all sensors share, what each has besides, and how much either changed.
 
 ln |d33| of sensor s on date c is y_cs = a_c + μ_s + e_cs, e_cs ~ N(0, (f u_cs)²): a is the level that all sensors
 share, u the standard uncertainty, f by how much sensors scatter beyond it from date to date. Sensors that depart from
@@ -18,8 +22,38 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, chdtri, ndtr, ndtri
 
-from underskin.inversion.beyond_chance import BY_CHANCE
 from underskin.units import Floats, Mask
+
+BY_CHANCE = 0.05  # probability that of values that are all alike any one is said to differ
+_OF_MEDIAN = np.pi / 2  # variance of a median of many over that of their mean
+
+
+def threshold(count: int) -> float:
+    """In standard deviations, for each of `count` values: all together exceed it by chance with 5 % at most."""
+    return float(ndtri(1 - BY_CHANCE / (2 * max(count, 1))))
+
+
+def differ_from_zero(values: Floats, uncertainties: Floats) -> Mask:
+    """Of values (n,) with standard uncertainties (n,), in the same unit; False where either is not known."""
+    with np.errstate(invalid="ignore"):
+        return np.abs(values) > threshold(int(np.isfinite(values).sum())) * uncertainties
+
+
+def differ_from_others(values: Floats, uncertainties: Floats) -> Mask:
+    """Each from the median of all, of two from the other: of values (n,) with standard uncertainties (n,), in the same
+    unit; False where either is not known, or where there is no other."""
+    known = np.isfinite(values) & np.isfinite(uncertainties)
+    count = int(known.sum())
+    differs = np.zeros(len(values), dtype=bool)
+    if count == 2:
+        differs[known] = abs(np.diff(values[known])) > threshold(1) * np.linalg.norm(uncertainties[known])
+    elif count > 2:
+        variance = uncertainties[known] ** 2
+        of_median = _OF_MEDIAN * np.mean(variance) / count
+        gap = np.abs(values[known] - np.median(values[known]))
+        differs[known] = gap > threshold(count) * np.sqrt(variance + of_median)
+    return differs
+
 
 FEWEST_DATES = 3  # that tell scatter from change
 _SMOOTHED = 6  # dates: of five the smoothed change is no more than a fourth surer than the difference of the two ends

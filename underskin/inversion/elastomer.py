@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.errors import InvalidInput, unusable
-from underskin.recordings.block_modulus import CompressionModulus, of_compression
 from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.curve_preparation import prepared
-from underskin.recordings.exchanged_columns import require_own_columns
-from underskin.recordings.sphere_modulus import IndentationModulus, of_indentation
+from underskin.recordings.curve_preparation import prepared, require_own_columns
+from underskin.recordings.modulus import CompressionModulus, IndentationModulus, of_compression, of_indentation
 from underskin.surrogate.contact_table import load_contact
 
 

@@ -1,4 +1,16 @@
-"""d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
+"""d33 of the sensors of a campaign, with what stands out among them.
+
+Sensors that stand out of their array, each with the reason: dead, inverted, weak, strong, noisy or bent.
+
+Recordings that are far off the others of their sensor: a slip of units, or a wrong range of an instrument.
+
+One of them would dominate the array's d33, since the mixed model takes recordings to be log-normal about their sensor's
+d33. What a skin may really do is no outlier: an effect of a condition on all sensors, the scatter that the array shows,
+and the effect of a misplaced sphere on a recording beside the centre.
+
+Findings on a campaign's FRF recordings and their d33, which are used all the same.
+
+d33 of an array from a campaign's FRF recordings: per recording, per sensor × indenter × preload, per sensor, and
 for the campaign (Seminara 2018, section 3.2 and equation 15).
 
 Each recording's Re FRF, without the delay that all share and the bias by noise in its channels, is averaged over the
@@ -8,44 +20,291 @@ base model as it stands. `declared_percent` is the standard deviation of all d33
 declared thickness, sensor radius and modulus; `absolute_d33` includes it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import chdtrc, ndtri, stdtr
 
 from underskin.errors import InvalidInput
+from underskin.findings import english
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.inversion import mixed_model
-from underskin.inversion.findings import findings_of, of_roll_off
 from underskin.inversion.mixed_model import Estimate, LevelRows, MixedModel
-from underskin.inversion.outliers import outlying
-from underskin.inversion.sensor_flags import Flag, population_flags, scatter_flags
 from underskin.physics.charge_response import gain
 from underskin.physics.skin import Indenter
-from underskin.prediction import domain_checks
-from underskin.prediction.declared_skin import DECLARED, declared_skin, log_slopes
-from underskin.prediction.domain_checks import usable
+from underskin.prediction import plausibility, pressed_skin
 from underskin.prediction.exchanged_values import exchanged_values
-from underskin.prediction.pressed_skin import transmission
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Tolerances
-from underskin.recordings.frf.band_halves import lower_half
-from underskin.recordings.frf.delay import common_delay, without_delay
-from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.recordings.frf.exchanged_channels import exchanged_channels
-from underskin.recordings.frf.flat_zone import FlatZone, band_average, flat_zone
-from underskin.recordings.frf.line_choice import usable_lines
-from underskin.recordings.frf.roll_off import roll_off
-from underskin.recordings.frf.stacks import stacked
-from underskin.recordings.physical_limits import excesses
+from underskin.prediction.pressed_skin import DECLARED, declared_skin, log_slopes, transmission, usable
+from underskin.recordings.campaign import Campaign, FrfRecording, Tolerances, excesses
+from underskin.recordings.frf.estimation import common_delay, exchanged_channels, lines_of, without_delay
+from underskin.recordings.frf.flat_zone import FlatZone, RollOff, band_average, flat_zone, lower_half, roll_off
+from underskin.recordings.frf.line_choice import noise_findings, usable_lines
+from underskin.recordings.frf.spectra import Frf, mean_of, stacked
 from underskin.recordings.plausibility import at_reading
 from underskin.surrogate.contact_model import ContactModel
 from underskin.surrogate.off_centre_sigma import positioned_sigma
-from underskin.units import Floats, Indices, Mask, to_lab, to_si
+from underskin.units import Floats, Indices, Mask, to_lab, to_si, unusual
+
+_DEAD = 0.05  # of the array's d33
+_LEAST_PILOT = 1e-3  # of the array's d33: a dead sensor may give exact zeros
+_OUTLYING = 5.0  # robust deviations
+_WEAK, _STRONG = 0.6, 1 / 0.6  # of the array's d33, and outlying
+_LEAST_SPREAD = 0.03  # of the array's d33, below which sensors are not distinguished
+_NOISY = 3.0  # times the array's
+_LEAST_BEND = 0.05  # of d33
+_FALSE_ALARMS = 1e-3  # per array
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A sensor that stands out of its array, why, and the values that the sentence states."""
+
+    sensor: str
+    flagged_for: Reason
+    arguments: Mapping[str, float]
+
+    @property
+    def code(self) -> str:
+        """dead, inverted, weak, strong, noisy or bent."""
+        return str(self.flagged_for.code)
+
+    @property
+    def reason(self) -> str:
+        """Why, in words with the numbers."""
+        return english.statement(self.flagged_for, self.arguments)
+
+    @property
+    def sentence(self) -> str:
+        """Sensor and reason in words."""
+        return f"sensor {self.sensor}: {self.reason}"
+
+
+def typical_size(d33: Floats) -> float:
+    """The median magnitude of recordings that show any charge: dead sensors may give exact zeros."""
+    size = np.abs(d33)
+    return float(np.median(size[size >= 1e-9 * size.max()]))
+
+
+def is_alive(value: Floats, deviation: Floats) -> Mask:
+    """Which sensors (sensors,) answer beyond noise, and with more than a twentieth of the others' d33."""
+    size = np.abs(value)
+    return np.asarray(size > np.maximum(_DEAD * _typical(size, deviation), 3 * deviation))
+
+
+def _typical(size: Floats, deviation: Floats) -> float:
+    """The median of those beyond noise; of all where none is, NaN where nothing is known."""
+    beyond = size > 3 * deviation
+    known = size[beyond] if beyond.any() else size[np.isfinite(size)]
+    return float(np.median(known)) if len(known) else float("nan")
+
+
+def population_flags(ids: Sequence[str], sensor: Indices, d33: Floats, noise: Floats) -> tuple[dict[int, Flag], Floats]:
+    """Sensors that do not belong to the array's population, and each sensor's pilot d33.
+
+    Parameters
+    ----------
+    ids : (sensors,) texts
+        The ids of the sensors.
+    sensor : (recordings,) array of int
+        The number of each recording's sensor.
+    d33, noise : (recordings,) arrays
+        d33 of each recording and its standard uncertainty by line noise [C/N].
+
+    Returns
+    -------
+    flags : dict
+        By the number of a sensor that is dead, inverted, weak or strong.
+    pilot : (sensors,) array
+        [C/N]: the array's median for the sensors that belong to it, the sensor's own magnitude for the others.
+    """
+    count = len(ids)
+    typical = typical_size(d33)
+    weight = 1 / (noise**2 + (_LEAST_SPREAD * typical) ** 2)
+    total = np.bincount(sensor, weight, count)
+    with np.errstate(invalid="ignore"):
+        value = np.bincount(sensor, weight * d33, count) / total
+        line = np.sqrt(np.bincount(sensor, (weight * noise) ** 2, count)) / total
+    size = np.abs(value)
+    array = _typical(size, line)
+    alive = is_alive(value, line)
+    sign = 1.0 if np.sum(np.sign(value[alive])) >= 0 else -1.0
+    spread = max(1.4826 * float(np.median(np.abs(size[alive] - array))) if alive.any() else 0.0, _LEAST_SPREAD * array)
+    flags: dict[int, Flag] = {}
+    for number in np.flatnonzero(np.isfinite(value)).tolist():
+        outlying = alive.sum() > 3 and abs(size[number] - array) > _OUTLYING * spread
+        if not alive[number]:
+            reason = Reason.DEAD
+        elif value[number] * sign < 0:
+            reason = Reason.INVERTED
+        elif outlying and size[number] < _WEAK * array:
+            reason = Reason.WEAK
+        elif outlying and size[number] > _STRONG * array:
+            reason = Reason.STRONG
+        else:
+            continue
+        flags[number] = Flag(ids[number], reason, {"percent": float(100 * value[number] * sign / array)})
+    pilot = np.full(count, array)
+    pilot[list(flags)] = np.maximum(size[list(flags)], _LEAST_PILOT * array)
+    return flags, pilot
+
+
+def scatter_flags(
+    ids: tuple[str, ...], sensor: Indices, rows: "RecordingD33", good: Indices, pilot: Floats, expected: Floats
+) -> list[Flag]:
+    """Sensors whose lines or recordings scatter, or whose d33 bends with preload, beyond their array's.
+
+    `good` are the rows looked at; `sensor` and `expected`, the relative scatter that the mixed model gives each
+    recording, are theirs.
+    """
+    numbers, member = np.unique(sensor, return_inverse=True)
+    level = rows.d33[good] / pilot[sensor]
+    lines = rows.line_scatter[good] * np.abs(level)
+    line_of = np.array([np.median(lines[member == index]) for index in range(len(numbers))])
+    usual = float(np.median(line_of))
+    rest = _beyond_common(level, member, rows.condition[good])
+    alarm = _FALSE_ALARMS / len(numbers)
+    flags = []
+    for index, name in enumerate(ids[number] for number in numbers):
+        own = member == index
+        bend, chance, scatter, freedom = _bend(rest[own], rows.preload[good][own], expected[own])
+        if chance < alarm and abs(bend) > _LEAST_BEND:
+            flags.append(Flag(name, Reason.BENT, {"percent": 100 * bend}))
+        if len(numbers) > 2 and line_of[index] > _NOISY * usual:
+            flags.append(Flag(name, Reason.NOISY_LINES, {"times": float(line_of[index] / usual)}))
+        elif scatter > _NOISY and chdtrc(freedom, freedom * scatter**2) < alarm:
+            flags.append(Flag(name, Reason.NOISY_RECORDINGS, {"times": scatter}))
+    return flags
+
+
+def _beyond_common(level: Floats, member: Indices, condition: Indices) -> Floats:
+    """Each recording over its sensor's median, less what its condition does to all sensors (three or more)."""
+    median = np.array([np.median(level[member == index]) for index in range(member.max() + 1)])
+    own = level / median[member]
+    rest = own - 1
+    for number in np.unique(condition):
+        alike = condition == number
+        if len(np.unique(member[alike])) > 2:
+            rest[alike] = own[alike] - np.median(own[alike])
+    return rest
+
+
+def _bend(rest: Floats, preload: Floats, expected: Floats) -> tuple[float, float, float, int]:
+    """Curvature over the range of preloads, the chance of one as large, the scatter about the curve over the one
+    expected, and its degrees of freedom."""
+    if len(rest) < 6 or len(np.unique(preload)) < 3:
+        freedom = max(1, len(rest) - 1)
+        return 0.0, 1.0, float(np.sqrt(np.sum((rest / expected) ** 2) / freedom)), freedom
+    x = (2 * preload - preload.min() - preload.max()) / (preload.max() - preload.min())
+    basis = np.column_stack([np.ones_like(x), x, (3 * x**2 - 1) / 2]) / expected[:, None]
+    coefficients = np.linalg.lstsq(basis, rest / expected, rcond=None)[0]
+    freedom = len(rest) - 3
+    scatter = float(np.sqrt(np.sum((rest / expected - basis @ coefficients) ** 2) / freedom))
+    deviation = max(scatter, 1.0) * float(np.sqrt(np.linalg.pinv(basis.T @ basis)[2, 2]))
+    chance = 2 * stdtr(freedom, -abs(coefficients[2]) / deviation)
+    return 1.5 * float(coefficients[2]), float(chance), scatter, freedom
+
+
+_FAR = 8.0  # deviations
+_LEAST_DEVIATION = 0.1  # of the array's d33: only recordings that are off by 80 % or more are looked at
+_ENOUGH = 3  # recordings for a sensor, sensors for a condition, to have a median that one of them does not rule
+
+
+def outlying(sensor: Indices, condition: Indices, d33: Floats, noise: Floats, position: Floats) -> Mask:
+    """Which recordings lie more than 8 robust deviations from their sensor's d33, less the effect of their condition.
+
+    Where all recordings of a sensor are, the sensor is off and none of its recordings is an outlier.
+
+    Parameters
+    ----------
+    sensor, condition : (recordings,) arrays of int
+        The number of each recording's sensor, and of its condition (indenter and preload).
+    d33, noise : (recordings,) arrays
+        d33 of each recording and its standard uncertainty by line noise [C/N].
+    position : (recordings,) array
+        Relative deviation of each recording where the sphere is misplaced as far as spheres are.
+
+    Returns
+    -------
+    (recordings,) array of bool
+    """
+    array = typical_size(d33)
+    own = _over_usual(sensor, d33, array)
+    rest = own - _common(sensor, condition, own)
+    scatter = 1.4826 * float(np.median(np.abs(rest)))
+    expected = np.hypot(np.hypot(_LEAST_DEVIATION, position), noise / array)
+    far: Mask = np.abs(rest) > _FAR * np.maximum(scatter, expected)
+    for number in np.unique(sensor[far]):
+        if far[sensor == number].all():
+            far[sensor == number] = False
+    return far
+
+
+def _over_usual(sensor: Indices, d33: Floats, array: float) -> Floats:
+    """Each recording over what is usual with its sensor, or with the array where the sensor has few recordings.
+
+    A dead sensor's recordings are 1 + their distance from its own, in units of the array's.
+    """
+    over = d33 / array
+    for number in np.unique(sensor):
+        same = sensor == number
+        if same.sum() >= _ENOUGH:
+            middle = float(np.median(d33[same]))
+            over[same] = 1 + (d33[same] - middle) / (middle if abs(middle) > _LEAST_DEVIATION * array else array)
+    return over
+
+
+def _common(sensor: Indices, condition: Indices, own: Floats) -> Floats:
+    """What the condition of each recording makes of all sensors'; their overall median where few saw it."""
+    common = np.full(len(own), float(np.median(own)))
+    for number in np.unique(condition):
+        alike = condition == number
+        if len(np.unique(sensor[alike])) >= _ENOUGH:
+            common[alike] = np.median(own[alike])
+    return common
+
+
+_CONTRADICTS = 3.0  # times
+
+
+def findings_of(
+    recorded: Sequence[FrfRecording], measured: Sequence[Frf], level: Floats, array: Estimate | None
+) -> tuple[Finding, ...]:
+    """Of time series: defects, noise that biases them, and a mean force that contradicts the preload; of the level
+    [C/N] and of the array's d33 errors of units and sign."""
+    defects = [
+        Finding(Reason.DEFECT, item.id, defect.channel, asdict(defect))
+        for item, frf in zip(recorded, measured, strict=True)
+        for defect in frf.defects
+    ]
+    typical = to_lab("frf_pc_per_n", np.nanmedian(np.abs(level)))
+    unit_errors = [replace(finding, reason=Reason.UNUSUAL_MEDIAN_FRF) for finding in unusual("frf_pc_per_n", typical)]
+    implausible = [] if array is None else plausibility.of_array(float(to_lab("d33_pc_per_n", array.value)))
+    return (*defects, *noise_findings(measured), *_preloads(recorded), *unit_errors, *implausible)
+
+
+def of_roll_off(behind: RollOff | None, zone: FlatZone) -> list[Finding]:
+    """That the band of d33 lies behind a filter."""
+    if behind is None:
+        return []
+    arguments = {**asdict(behind), "percent": 100 * behind.share, "low_hz": zone.low_hz, "high_hz": zone.high_hz}
+    arguments.pop("share")
+    return [Finding(Reason.BEHIND_FILTER, "", "d33_pc_per_n", arguments)]
+
+
+def _preloads(recorded: Sequence[FrfRecording]) -> list[Finding]:
+    """The recordings whose force has a mean that contradicts the preload."""
+    findings = []
+    for recording in recorded:
+        mean = None if recording.force_n is None else mean_of(recording.force_n)
+        if mean is not None and not 1 / _CONTRADICTS <= abs(mean) / recording.preload_n <= _CONTRADICTS:
+            arguments = {"mean_n": mean, "preload_n": recording.preload_n}
+            findings.append(Finding(Reason.FORCE_CONTRADICTS_PRELOAD, recording.id, "force_n", arguments))
+    return findings
+
 
 _LEAST_CHARGE = 1e-24  # FRF [C/N] that can be a measured one
 _MOST_REASONS = 3  # quoted where no recording can be used
@@ -175,7 +434,7 @@ def invert(campaign: Campaign, contact_model: ContactModel, band_hz: tuple[float
         raise NoD33("preload_n", campaign.name, exchanged[0].statement)
     contact = _Contact(campaign, recorded, contact_model)
     inside = usable(level, noise, contact.positioned.sigma, contact.transmitted)
-    reasons = domain_checks.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
+    reasons = pressed_skin.reasons(recorded, campaign.skin, contact.transmitted, level, contact_model)
     left_out += [reason for reason, good in zip(reasons, inside, strict=True) if not good]
     if not inside.any():
         raise _none_usable(campaign, left_out)

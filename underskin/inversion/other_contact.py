@@ -3,7 +3,7 @@
 from underskin.errors import InvalidInput
 from underskin.inversion.invert import Inversion, invert
 from underskin.inversion.mixed_model import Estimate
-from underskin.prediction.other_contact import OTHER, STATED
+from underskin.prediction.answers import OTHER, STATED
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.contact_model import ContactName
 from underskin.surrogate.sigma_table import SigmaTable

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 from underskin.autodiff import Differentiated, log
 from underskin.errors import UnderskinError
 from underskin.mechanisms.parameter import Parameter
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 from underskin.units import Array, Floats
 
 if TYPE_CHECKING:
     from underskin.mechanisms.models.contact_state import Contacts
     from underskin.mechanisms.models.curve_state import Curve
-    from underskin.mechanisms.models.frf_design import FrfDesign
-    from underskin.mechanisms.models.pickup import Pickup
+    from underskin.mechanisms.models.frf_design import FrfDesign, Pickup
     from underskin.surrogate.sigma_table import SigmaTable
 
 Kind = Literal["frf", "indentation", "compression"]

@@ -14,11 +14,11 @@ from underskin.errors import InvalidInput, not_finite, not_unique, required
 from underskin.extensions import described
 from underskin.mechanisms import base
 from underskin.mechanisms.base import Kind, Mechanism, Stage
-from underskin.mechanisms.models.compression import CompressionModel
+from underskin.mechanisms.models.composition import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
+from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.models.frf_design import joined
 from underskin.mechanisms.models.indentation import IndentationModel
-from underskin.mechanisms.models.nuisances import D33, STRAIN_SHARE, THICKNESS, YOUNGS_MODULUS
-from underskin.mechanisms.models.response import joined
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
 from underskin.mechanisms.reference_campaigns import reference_campaign
 from underskin.recordings.campaign import Campaign

@@ -3,8 +3,14 @@
 import numpy as np
 
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, IndentationRecording
-from underskin.recordings.conditions import Sensor, SkinDescription
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    FrfRecording,
+    IndentationRecording,
+    Sensor,
+    SkinDescription,
+)
 
 _FREQUENCY_HZ = np.array([1.0, 3.0, 10.0, 30.0, 47.0, 49.0, 50.0, 51.0, 60.0, 100.0, 150.0, 400.0, 1000.0])
 _SENSORS = (Sensor("s1", 0.0, 0.0), Sensor("s2", 4.0, 0.0), Sensor("s3", 0.0, 4.0))

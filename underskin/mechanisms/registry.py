@@ -23,7 +23,7 @@ from underskin.mechanisms import laws
 from underskin.mechanisms.base import Kind, Mechanism
 
 if TYPE_CHECKING:
-    from underskin.recordings.conditions import Conditions
+    from underskin.recordings.campaign import Conditions
     from underskin.surrogate.sigma_table import SigmaTable
 
 GROUP = "underskin.mechanisms"

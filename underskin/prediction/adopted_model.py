@@ -19,13 +19,11 @@ from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
-from underskin.mechanisms.unnamed.binding import OF_ONE_CAMPAIGN, bound_to
-from underskin.mechanisms.unnamed.grammar import Grammar
+from underskin.mechanisms.unnamed.grammar import OF_ONE_CAMPAIGN, Grammar, bound_to
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
-from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
-from underskin.recordings.conditions import Conditions, SkinDescription, frf_of
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription, frf_of, frf_recordings
 from underskin.recordings.frf.estimation import lines_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Complexes, Indices, Mask, to_si

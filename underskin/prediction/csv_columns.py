@@ -9,8 +9,10 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from underskin.errors import FileError, InvalidInput, wrong_type
-from underskin.recordings.readers import polar_columns, template_columns, template_lines, text
-from underskin.recordings.readers.polar_columns import MAGNITUDE, PHASE
+from underskin.recordings.readers import template_columns, text
+from underskin.recordings.readers import template_columns as polar_columns
+from underskin.recordings.readers import template_columns as template_lines
+from underskin.recordings.readers.template_columns import MAGNITUDE, PHASE
 
 REAL = "frf_pc_per_n"  # which has no imaginary part
 _SAYS_NOTHING = re.compile(r'\s*(#|"?sep=.?"?\s*$)', re.IGNORECASE)

@@ -12,8 +12,7 @@ import numpy as np
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.physics import hertz
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import FrfRecording, SkinDescription
 from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, Mask, to_si
 

@@ -17,7 +17,7 @@ from underskin.mechanisms.models.composed import Model, forward_model
 from underskin.mechanisms.models.composition import chosen, kind_of, parameters_together
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.conditions import Conditions, FrfConditions
+from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Indices, Mask, to_lab
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from underskin.findings.arguments import ImplausibleD33
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.findings.sentences import ImplausibleD33
 from underskin.units import LAB, Floats, Mask, unusual
 
 _LEAST_D33, _MOST_D33 = 0.05, 1000.0  # pC/N: beyond these no skin's sensors have been

@@ -1,17 +1,28 @@
-"""The skin pressed by a sphere: contact radius, a/h, L, σ, stress on the sensor and FRF; and d33 from a measured FRF.
+"""A skin pressed by a sphere, and the limits of what is computed.
+
+The skin pressed by a sphere: contact radius, a/h, L, σ, stress on the sensor and FRF; and d33 from a measured FRF.
 
 Columns in SI that broadcast. In the base model the contact edge stands still; the contact is one of two models:
 `paper`, the σ table: Hertz' radius on a half space, σ of the bonded finite-strain layer under Hertz' pressure as a dead
 load (Seminara 2018, equations 7 to 16); and `solved`: a sphere in frictionless contact with that layer itself.
+
+Which limit a row exceeds that is out of the domain, in words: `L = 1.17 exceeds 0.1: at most 25.6 N`. Why the base
+model says nothing of a recording, in words that name what exceeds which limit. A skin as its campaign declares it, and
+how the base model's FRF follows from what is declared.
 """
 
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.physics import charge_response, hertz
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
+from underskin.recordings.campaign import FrfRecording, SkinDescription
 from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, Mask
 
@@ -120,3 +131,189 @@ def frf_gradient(
         "preload": (in_force + in_load) / np.asarray(preload, dtype=float),
         "d33": charge_response.gain(reached.sigma, rho),
     }
+
+
+OTHER_MODULUS = "Poisson's ratio = {:g}: the table is of incompressible elastomer, 0.5"
+NOT_FINITE = "the result is too large a number"
+SYMBOLS = {"load_parameter": "L", "a_over_h": "a/h", "rt_over_h": "rT/h"}
+Domain = Mapping[str, tuple[float, float]]
+Words = Sequence[str | None]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A quantity by its symbol, its values of each row, its lowest and highest; and of a force that it grows with the
+    highest [N] of each row."""
+
+    symbol: str
+    values: Floats
+    low: float
+    high: float
+    most_n: Floats | None = None
+
+
+def of_numbers(numbers: Mapping[str, Floats], domain: Domain) -> list[Limit]:
+    """The limits of dimensionless numbers by their names."""
+    return [Limit(SYMBOLS[name], numbers[name], *domain[name]) for name in SYMBOLS if name in domain]
+
+
+def of_pressed(reached: Transmission, preload_n: Floats, contact_model: ContactModel) -> list[Limit]:
+    """The limits of a skin under a sphere, with the preload at which each is reached."""
+    domain, alpha = contact_model.domain, reached.small_strain_a_over_h
+    load, over_h = (domain[name][1] for name in ("load_parameter", "a_over_h"))
+    with np.errstate(all="ignore"):
+        at_limit, _ = contact_model.load_over_cube(np.array(over_h))
+        at_rows, _ = contact_model.load_over_cube(alpha)
+        most = {
+            "load_parameter": preload_n * (load / reached.load_parameter),
+            "a_over_h": preload_n * (over_h / alpha) ** 3 * (at_limit / at_rows),
+        }
+    values = {"load_parameter": reached.load_parameter, "a_over_h": alpha, "rt_over_h": reached.rt_over_h}
+    return [Limit(SYMBOLS[name], values[name], *domain[name], most_n=most.get(name)) for name in SYMBOLS]
+
+
+def in_words(
+    inside: Mask, count: int, limits: Sequence[Limit], poisson_ratio: Floats | float = INCOMPRESSIBLE
+) -> Words | None:
+    """Of each row that is not inside what it exceeds, and where a force would be inside the highest; None where all
+    are inside."""
+    rows = np.flatnonzero(~np.broadcast_to(inside, (count,)))
+    if not rows.size:
+        return None
+    words: list[str | None] = [None] * count
+    ratio = _at(np.asarray(poisson_ratio), rows, count)
+    values = [_at(limit.values, rows, count) for limit in limits]
+    most = [[math.inf] * len(rows) if limit.most_n is None else _at(limit.most_n, rows, count) for limit in limits]
+    for place, row in enumerate(rows.tolist()):
+        if ratio[place] != INCOMPRESSIBLE:
+            words[row] = OTHER_MODULUS.format(ratio[place])
+            continue
+        beyond = [
+            (told, most[number][place])
+            for number, limit in enumerate(limits)
+            for told in _told(limit, values[number][place])
+        ]
+        forces = [force for _, force in beyond]
+        # No force brings a row back that exceeds another limit as well.
+        at_most = f": at most {_rounded_down(min(forces))} N" if forces and all(map(math.isfinite, forces)) else ""
+        words[row] = (", ".join(told for told, _ in beyond) or NOT_FINITE) + at_most
+    return words
+
+
+def _at(values: Floats, rows: np.ndarray[tuple[int], np.dtype[np.intp]], count: int) -> list[float]:
+    return np.broadcast_to(values, (count,))[rows].tolist()
+
+
+def _told(limit: Limit, value: float) -> Iterator[str]:
+    if value > limit.high:
+        yield f"{limit.symbol} = {_beside(value, limit.high)} exceeds {limit.high:g}"
+    elif value < limit.low:
+        yield f"{limit.symbol} = {_beside(value, limit.low)} is below {limit.low:g}"
+
+
+def _beside(value: float, limit: float) -> str:
+    """A number with three digits, or as many as tell it from a limit."""
+    return next((text for digits in (3, 6, 9) if float(text := f"{value:.{digits}g}") != limit), repr(value))
+
+
+def _rounded_down(force: float) -> str:
+    """A force with three digits that is not greater, but for the rounding of floats."""
+    if not force > 0:
+        return "0"
+    step = 10.0 ** (math.floor(math.log10(force)) - 2)
+    return f"{math.floor(force / step * (1 + 1e-12)) * step:.3g}"
+
+
+_MOST_CHARGE = 1.0  # C/N
+_LIKE_MILLI = 100.0  # N: from here on a preload that fits as 1/1000 may be in mN
+
+
+@dataclass(frozen=True)
+class RowConditions:
+    """A row's force, sphere and elastomer, as a lab writes them."""
+
+    preload_n: float
+    indenter_radius_mm: float
+    youngs_modulus_mpa: float
+    poisson_ratio: float
+
+
+def usable(level: Floats, noise: Floats, sigma: Floats, transmitted: Transmission) -> Mask:
+    """The rows inside the table's domain, at an offset that it reaches, with a line in the band and below 1 C/N."""
+    return transmitted.inside & np.isfinite(sigma) & (np.hypot(level, noise) < _MOST_CHARGE)
+
+
+def reasons(
+    recorded: Sequence[FrfRecording],
+    skin: SkinDescription,
+    transmitted: Transmission,
+    level: Floats,
+    contact_model: ContactModel,
+) -> Iterator[Finding]:
+    """Of each recording that is not `usable` why; `level` is its averaged FRF [C/N], NaN without a line in the band."""
+    for row, recording in enumerate(recorded):
+        if skin.poisson_ratio != INCOMPRESSIBLE or not transmitted.inside[row]:
+            assert skin.youngs_modulus_mpa is not None
+            pressed = RowConditions(
+                recording.preload_n, recording.indenter_radius_mm, skin.youngs_modulus_mpa, skin.poisson_ratio
+            )
+            limit = beyond(pressed, [float(part[row]) for part in _numbers(transmitted)], contact_model)
+            yield Finding(Reason.BEYOND_TABLE, recording.id, "preload_n", {"limit": limit})
+        elif not np.isfinite(level[row]):
+            yield Finding(Reason.NO_LINE_IN_BAND, recording.id, "frequency_hz")
+        elif not abs(level[row]) < _MOST_CHARGE:
+            arguments = {"frf_pc_per_n": float(1e12 * level[row])}
+            yield Finding(Reason.IMPOSSIBLE_FRF, recording.id, "frf_pc_per_n", arguments)
+        else:
+            yield Finding(Reason.PLACE_BEYOND_TABLE, recording.id, "position_mm")
+
+
+def _numbers(transmitted: Transmission) -> tuple[Floats, Floats, Floats]:
+    return (
+        transmitted.small_strain_a_over_h,
+        np.broadcast_to(transmitted.rt_over_h, transmitted.a_over_h.shape),
+        transmitted.load_parameter,
+    )
+
+
+def beyond(pressed: RowConditions, numbers: Sequence[float], contact_model: ContactModel) -> str:
+    """What of ν, or of `numbers`, a/h, rT/h and L, is outside the table's domain, with F, R and E."""
+    if pressed.poisson_ratio != INCOMPRESSIBLE:
+        return f"Poisson's ratio = {pressed.poisson_ratio:g}: the table is of incompressible elastomer, 0.5"
+    over_h, rt_over_h, load = numbers
+    force, radius, modulus = pressed.preload_n, pressed.indenter_radius_mm, pressed.youngs_modulus_mpa
+    most_a, most_rt, most_load = (contact_model.domain[name][1] for name in ("a_over_h", "rt_over_h", "load_parameter"))
+    row = f"F = {force:g} N, R = {radius:g} mm, E = {modulus:g} MPa, L = {load:.3g}, a/h = {over_h:.3g}"
+    if rt_over_h > most_rt:  # first, since no force changes it
+        return f"{row}: rT/h = {rt_over_h:.3g} exceeds {most_rt:g}: the sensor is too large for this thickness"
+    if load > most_load:
+        most = most_load * radius**2 * modulus
+        slip = "; is the preload in mN?" if force >= _LIKE_MILLI and force / 1000 <= most else ""
+        return f"{row}: L = {load:.3g} exceeds {most_load:g}: at most {most:.3g} N with this sphere{slip}"
+    at_most, at_row = contact_model.load_over_cube(np.array([most_a, over_h]))[0].tolist()
+    most = force * (most_a / over_h) ** 3 * (at_most / at_row)
+    return f"{row}: a/h = {over_h:.3g} exceeds {most_a:g}: at most {most:.3g} N with this sphere"
+
+
+DECLARED = ("thickness", "sensor_radius", "youngs_modulus")
+
+
+def declared_skin(described: SkinDescription) -> Skin:
+    """In SI; the campaign's reader has checked that it is whole, as FRFs need it, and its units."""
+    assert described.thickness_mm is not None
+    assert described.youngs_modulus_mpa is not None
+    assert described.sensor_radius_mm is not None
+    return Skin.from_lab(
+        thickness_mm=described.thickness_mm,
+        youngs_modulus_mpa=described.youngs_modulus_mpa,
+        sensor_radius_mm=described.sensor_radius_mm,
+        poisson_ratio=described.poisson_ratio,
+        units_checked=True,
+    )
+
+
+def log_slopes(contact_model: ContactModel, skin: Skin, indenter: Indenter, preload: Floats) -> dict[str, Floats]:
+    """∂ ln FRF/∂ ln of each of `DECLARED` (rows,); NaN where the row is outside the domain."""
+    slopes = frf_gradient(contact_model, skin, indenter, preload, 1.0)
+    size = transmission(contact_model, skin, indenter, preload).frf(1.0)
+    return {name: np.asarray(slopes[name] * getattr(skin, name) / size) for name in DECLARED}

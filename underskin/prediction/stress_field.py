@@ -24,8 +24,7 @@ from underskin.physics.contact_pressure import SpherePressure
 from underskin.physics.elastic_layer import Layer
 from underskin.physics.layer_stress import layer_stress
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
-from underskin.prediction.domain_limits import in_words, of_pressed
-from underskin.prediction.pressed_skin import Transmission, transmission
+from underskin.prediction.pressed_skin import Transmission, in_words, of_pressed, transmission
 from underskin.surrogate.contact_model import ContactModel
 from underskin.units import Floats, checked
 

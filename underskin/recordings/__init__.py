@@ -5,7 +5,6 @@ reading.campaign.recordings
 day = join("Monday", [("1.tdms", first), ("2.tdms", second)])  # files of one rig as one campaign
 """
 
-from underskin.recordings.joining import join
-from underskin.recordings.reading import Reading, read_contents, read_file
+from underskin.recordings.reading import Reading, join, read_contents, read_file
 
 __all__ = ["Reading", "join", "read_contents", "read_file"]

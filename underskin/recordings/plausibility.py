@@ -14,9 +14,8 @@ from scipy.spatial import KDTree
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.recordings import curve_magnitudes
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import Sensor
+from underskin.recordings import curve_course
+from underskin.recordings.campaign import Campaign, FrfRecording, Sensor
 from underskin.recordings.curve_preparation import prepared
 from underskin.units import Floats
 
@@ -34,7 +33,7 @@ def implausible(campaign: Campaign) -> list[Finding]:
 def at_reading(campaign: Campaign) -> list[Finding]:
     """The same, with slips of units that a diagnosis would find: in curves, and in the dynamic force of all FRFs."""
     frfs = [entry for entry in campaign.recordings if isinstance(entry, FrfRecording)]
-    return [*implausible(campaign), *curve_magnitudes.implausible(campaign), *loose_sphere(frfs)]
+    return [*implausible(campaign), *curve_course.implausible(campaign), *loose_sphere(frfs)]
 
 
 def loose_sphere(entries: Sequence[FrfRecording]) -> list[Finding]:

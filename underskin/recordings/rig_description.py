@@ -1,4 +1,6 @@
-"""The rig description (`rig/1`): what a lab's instrument files do not say, written once by the user as YAML or JSON.
+"""Which channel of a file a field's values are in, and what turns them into the field (`channels` of `rig/1`).
+
+The rig description (`rig/1`): what a lab's instrument files do not say, written once by the user as YAML or JSON.
 
     schema: rig/1
     kind: indentation
@@ -13,6 +15,8 @@ file, or the block, says about itself. `channels` says for each campaign field w
 several curves in one file are told apart, `estimator` how FRFs are estimated from time series (H1, H2 or Hv).
 `derived` makes channels of others by formulas (`depth: Piezo - Deflection`), `trim` says which samples of each curve
 are used.
+
+Values that a file states about itself, and units, in a campaign field's own.
 """
 
 import dataclasses
@@ -20,9 +24,10 @@ import tempfile
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from underskin.errors import (
+    ErrorCode,
     FileError,
     InvalidInput,
     Mention,
@@ -34,16 +39,94 @@ from underskin.errors import (
     too_few,
 )
 from underskin.recordings import validation as field
-from underskin.recordings.campaign import COLUMNS, KINDS
-from underskin.recordings.channel_mapping import AUTOMATIC, ChannelMapping, Property, SignalMapping
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import COLUMNS, KINDS, SkinDescription
 from underskin.recordings.frf.estimators import Estimator, checked_estimator
-from underskin.recordings.readers import channel_arithmetic, json_file
+from underskin.recordings.readers import channel_arithmetic, json_file, text
+from underskin.recordings.readers.calendar_times import time_zone, with_zone
 from underskin.recordings.readers.channel_arithmetic import Formula
 from underskin.recordings.readers.sandbox import call_apart
-from underskin.recordings.shown_values import named, shown
-from underskin.recordings.validation import mapping
+from underskin.recordings.readers.unit_labels import field_unit, labelled_unit, unit
+from underskin.recordings.validation import mapping, named, shown
 from underskin.several_errors import SeveralInvalid, all_of, noting
+from underskin.units import LAB
+
+_WHOLE = 100.0  # %
+
+
+@dataclass(frozen=True)
+class Property:
+    """A field's value that the file itself states under the name `property`."""
+
+    property: field.Name
+
+
+AUTOMATIC: Literal["auto"] = "auto"  # a sign that is told from how a curve goes as it is pressed
+Sign = Literal[1, -1, "auto"]
+
+
+def _sign(name: str, value: Any, units_checked: bool) -> Sign:
+    if value == AUTOMATIC:
+        return AUTOMATIC
+    if isinstance(value, str) or field.number(name, value, units_checked) not in (1, -1):
+        raise InvalidInput(name, shown(value), "must be 1, -1 or auto", code=ErrorCode.NOT_ONE_OF)
+    return 1 if value == 1 else -1
+
+
+def _percent(name: str, value: Any, units_checked: bool) -> float:
+    result = field.positive(name, value, units_checked)
+    if result > _WHOLE:
+        raise out_of_range(name, result, "must be a part of the curve, greater than 0 and up to 100 (%)")
+    return result
+
+
+@dataclass(frozen=True)
+class SignalMapping:
+    """A channel and what its numbers mean.
+
+    `channel` is the name in the file. `unit` is its true unit, which the file's own label must not contradict;
+    `labelled` repeats a label that is known to be wrong, and no other is accepted. `sign` -1 turns the values round,
+    `auto` does where they fall as a curve is pressed. `sensitivity` leads from a signal to a quantity: in signal over
+    quantity (mV/N) it divides the signal, in quantity over signal (nm/V) it multiplies it.
+    """
+
+    channel: field.Name
+    unit: field.Name | None = None
+    labelled: field.Name | None = None
+    sign: Annotated[Sign, _sign] | None = None
+    sensitivity: field.Positive | None = None
+    sensitivity_unit: field.Name | None = None
+
+
+def _signal(name: str, value: Any, units_checked: bool) -> SignalMapping:
+    return field.build(SignalMapping, name, value, units_checked)
+
+
+def _spring_constant(name: str, value: Any, units_checked: bool) -> float | Property:
+    if isinstance(value, Mapping):
+        return field.build(Property, name, value, units_checked)
+    return field.positive(name, value, units_checked)
+
+
+@dataclass(frozen=True)
+class ChannelMapping(SignalMapping):
+    """Where a field's values are.
+
+    Of `displacement_mm`: `stiffness_n_per_mm`, over which force is the instrument's own give; or `deflection`, the
+    channel that has it. Either is subtracted. Of `force_n`: `spring_constant_n_per_m`, by which a channel that is a
+    deflection is multiplied, or the property of the file that states it. `tare_percent` is the part of each curve, from
+    its start, over which the mean of the field becomes 0.
+    """
+
+    stiffness_n_per_mm: field.Positive | None = None
+    deflection: Annotated[SignalMapping, _signal] | None = None
+    spring_constant_n_per_m: Annotated[float | Property, _spring_constant] | None = None
+    tare_percent: Annotated[float, _percent] | None = None
+
+    @property
+    def signals(self) -> tuple[SignalMapping, ...]:
+        """All channels that the field is made of."""
+        return (self,) if self.deflection is None else (self, self.deflection)
+
 
 SCHEMA = "rig/1"
 LARGEST_BYTES = 64_000
@@ -298,3 +381,70 @@ def _require_of_its_field(name: str, entry: ChannelMapping, fields_given: Collec
 
 def _is_for(name: str) -> Requirement:
     return Requirement("is for ", Mention(name))
+
+
+Stated = Mapping[str, str | float]
+_TEXTS = ("id", "sensor")
+_STIFFNESS = "force/length"
+
+
+def common_value(name: str, value: Any | Property, stated: Stated, file: str) -> Any:
+    """A field that the rig says, or that the file says under the rig's name for it, in the field's unit."""
+    if not isinstance(value, Property):
+        return value
+    given = _said(value, stated, file)
+    if name == "recorded_at":
+        return _in_zone(given)
+    number = _number(given)
+    if number is None or name in _TEXTS:
+        return given
+    if name not in LAB:
+        return number
+    label = labelled_unit(value.property)
+    return number * factor(label, name, file, f"property {value.property!r}") if label else number
+
+
+def _in_zone(given: str | float) -> str | float:
+    """A time that an instrument wrote, in the lab's zone where it states none; what is no time as it is, to be
+    refused."""
+    try:
+        return with_zone(str(given), time_zone())
+    except ValueError:
+        return given
+
+
+def spring_constant(value: float | Property, stated: Stated, file: str) -> float:
+    """A spring constant [N/m] that the rig says, or that the file says, in N/m where no other unit is in its name."""
+    if not isinstance(value, Property):
+        return value
+    place, given = f"property {value.property!r}", _said(value, stated, file)
+    number = _number(given)
+    if number is None or not 0 < number < float("inf"):
+        raise FileError(file, place, f"is {given!r}: must be a number greater than 0, a spring constant")
+    label = labelled_unit(value.property)
+    known = unit(label or "N/m")
+    if known is None or known.dimension != _STIFFNESS:
+        raise FileError(file, place, f"its unit {label!r} is not one of {_STIFFNESS}, such as N/m")
+    return number * known.to_si
+
+
+def _number(given: str | float) -> float | None:
+    """As a file writes it, with a point or a comma; None where a comma may part thousands."""
+    return text.number(given, text.decimal_mark(lambda _: [[given]], "\t")) if isinstance(given, str) else given
+
+
+def _said(value: Property, stated: Stated, file: str) -> str | float:
+    if value.property not in stated:
+        known = ", ".join(list(stated)[:20])
+        raise FileError(file, f"property {value.property!r}", f"is not in the file, which states {known}")
+    return stated[value.property]
+
+
+def factor(label: str, field: str, file: str, place: str, hint: str = "") -> float:
+    """From a unit to the field's; `hint` goes into the error."""
+    known, wanted = unit(label), field_unit(field)
+    if known is None or known.dimension != wanted.dimension:
+        what = "is not known here" if known is None else f"is one of {known.dimension}"
+        needs = f" needs one of {wanted.dimension}, such as {LAB[field].unit}{hint}"
+        raise FileError(file, place, Requirement(f"its unit {label!r} {what}; ", Mention(field), needs))
+    return known.to_si / LAB[field].to_si

@@ -1,20 +1,557 @@
-"""From an instrument's channels to a campaign, by a rig description."""
+"""Values of a campaign's columns in sentences, in the units in which they read well.
 
-from collections.abc import Sequence
+The sample rate that a column of times tells. The part of a curve over which its force is taken for 0: whether it is one
+level, as in the air. The fields of one recording, out of the channels of one block, as a rig description has them.
+Channels that a file says were started at different times, brought to the samples that they have in common.
+
+The curves of a file, where a rig description says what one is: all of the file, a group of rows, or what a channel
+tells apart.
+
+From an instrument's channels to a campaign, by a rig description.
+"""
+
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime, timedelta
 from pathlib import PurePath
 from typing import Any
 
-from underskin.errors import FileError
-from underskin.recordings import common_start
+import numpy as np
+
+from underskin.errors import FileError, Mention, Requirement
 from underskin.recordings.campaign import SCHEMA
-from underskin.recordings.channels import Block, Contents
-from underskin.recordings.curve_parts import curve_parts, doubts
-from underskin.recordings.mapped_block import MappedBlock
-from underskin.recordings.readers import derived_channels
-from underskin.recordings.rig_description import BLOCK_NAME, CurveChannel, RigDescription, Trim
-from underskin.recordings.shown_values import LONGEST_NAME
-from underskin.recordings.stated_values import common_value
+from underskin.recordings.channels import Block, Channel, Contents, Values
+from underskin.recordings.curve_preparation import falling
+from underskin.recordings.readers import channel_arithmetic
+from underskin.recordings.readers.channel_arithmetic import FIELD
+from underskin.recordings.readers.unit_labels import (
+    DECIBEL,
+    contradicts,
+    exponents,
+    field_unit,
+    meanings,
+    ratio_of,
+    unit,
+)
+from underskin.recordings.rig_description import (
+    AUTOMATIC,
+    BLOCK_NAME,
+    COMPLEX_FRF,
+    MAGNITUDE,
+    PHASE,
+    ChannelMapping,
+    CurveChannel,
+    RigDescription,
+    SignalMapping,
+    Stated,
+    Trim,
+    common_value,
+    factor,
+    spring_constant,
+)
+from underskin.recordings.validation import LONGEST_NAME, shown
+from underskin.units import LAB, Floats, readable_unit
+
+_SCALED = ("force_n", "displacement_mm")  # which are small under a small sphere
+
+
+def readable(field: str, *values: float) -> str:
+    """Values of a field in one unit: `0 to 1.787 µN`."""
+    largest = max(map(abs, values))
+    unit, count = readable_unit(field, largest) if field in _SCALED else (LAB[field].unit, 1.0)
+    return f"{' to '.join(f'{count * value + 0.0:.4g}' for value in values)} {unit}"  # 0 instead of -0
+
+
+def range_of(field: str, column: Floats) -> str:
+    """The lowest and the highest of the finite values of a column that has any."""
+    finite = column[np.isfinite(column)]
+    return readable(field, float(finite.min()), float(finite.max()))
+
+
+_JITTER = 0.01  # of a sample: more is not evenly sampled
+
+
+def mean_step(time: Floats) -> float:
+    """From one sample to the next, on average, in the unit of the times."""
+    with np.errstate(all="ignore"):
+        return float((time[-1] - time[0]) / max(len(time) - 1, 1))
+
+
+def even_rate(time: Floats) -> float | None:
+    """Samples in a unit of the times; None where they are not evenly spaced and rising."""
+    step = mean_step(time)
+    with np.errstate(all="ignore"):
+        jitter = np.abs(time - (time[0] + step * np.arange(len(time)))).max()
+    return 1 / step if step > 0 and jitter <= _JITTER * step else None
+
+
+_LEAST_TARED = 16  # samples of which a level and its noise are told
+_NOISES = 8.0  # standard deviations of a sample's noise: more is a rise
+_LEAST_RISE = 3e-3  # of the range of the whole curve: less does not matter
+
+
+@dataclass(frozen=True)
+class Rise:
+    """Where the samples leave their first `level`: from the sample `start` on, counted from 0, by `height` at the
+    tared part's end, both in the column's unit."""
+
+    start: int
+    height: float
+    level: float
+
+
+def rise_of(column: Floats, count: int) -> Rise | None:
+    """How the first `count` samples of a column leave the level of their first quarter; None where they do not, or
+    are too few to tell."""
+    tared = column[:count]
+    if count < _LEAST_TARED or not np.isfinite(column).all():
+        return None
+    level = float(tared[: count // 4].mean())
+    height = float(tared[-max(1, count // 16) :].mean()) - level
+    noise = float(np.median(np.abs(np.diff(tared)))) / (0.6745 * np.sqrt(2))  # of white noise; a rise is rare in it
+    limit = max(_NOISES * noise, _LEAST_RISE * float(np.ptp(column)))
+    if abs(height) <= limit:
+        return None
+    within = np.flatnonzero(np.abs(tared - level) <= max(4 * noise, _LEAST_RISE * float(np.ptp(column))))
+    return Rise(int(within[-1]) + 1 if len(within) else 0, height, level)
+
+
+_PERCENT = 100.0
+_OF_UNIT = re.compile(r"unit|einheit|scale|skala|format|amplitude", re.IGNORECASE)
+_SAME_RATE = 1e-3  # relative
+_NO_DECIBELS = "decibels are a logarithm: state the ratio itself, 10^(dB/20) times its reference"
+_LEAST_SAMPLES, _STILL = 16, 1e-9  # of a force that is measured, and of its largest value: less is rounding
+
+
+class MappedBlock:
+    """The fields of one recording, out of one block, what was `taken` for each, in words, and the `warnings` on them;
+    `stated` is what the file says about itself."""
+
+    def __init__(self, rig: RigDescription, block: Block, stated: Stated, file: str) -> None:
+        self.rig = rig
+        self.block = block
+        self.stated = stated
+        self.file = file
+        self.warnings: list[str] = []
+        self.taken: dict[str, str] = {}
+
+    def fields(self) -> dict[str, Any]:
+        """The columns."""
+        values = {field: self._values(field, mapping) for field, mapping in self.rig.channels.items()}
+        if COMPLEX_FRF in values:
+            frf = values.pop(COMPLEX_FRF)
+            values |= {"frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+        values = self._with_parts(values)
+        if any(np.iscomplexobj(column) for column in values.values()):
+            only = Requirement("a channel of complex numbers can only be ", Mention(COMPLEX_FRF))
+            raise self._error("", only)
+        columns: dict[str, Any] = {field: np.asarray(column, dtype=float) for field, column in values.items()}
+        columns = {field: self._tared(field, column) for field, column in columns.items()}
+        columns = self._without_instrument(columns)
+        self._say_ranges(columns)
+        self._require_known_sign(columns)
+        if self.rig.kind == "frf":
+            return self._frf(columns)
+        rate = self.block.sample_rate_hz
+        if rate is not None and "time_s" not in columns:
+            columns["time_s"] = np.arange(len(columns[next(iter(columns))])) / rate
+        return columns
+
+    def _with_parts(self, values: Mapping[str, Values]) -> dict[str, Values]:
+        """The columns, real and imaginary part in the place of magnitude and phase."""
+        rest = {field: column for field, column in values.items() if field not in (MAGNITUDE, PHASE)}
+        if MAGNITUDE not in values:
+            return rest
+        self._refuse_stated_decibels()
+        magnitude, phase = values[MAGNITUDE], values[PHASE]
+        if (magnitude < 0).any():
+            raise self._error("", Requirement(Mention(MAGNITUDE), f" is below 0, as no magnitude is: {_NO_DECIBELS}"))
+        if len(magnitude) != len(phase):
+            raise self._error("", Requirement(Mention(MAGNITUDE), " and ", Mention(PHASE), " differ in length"))
+        frf = magnitude * np.exp(1j * np.radians(phase))
+        return {**rest, "frf_re_pc_per_n": frf.real, "frf_im_pc_per_n": frf.imag}
+
+    def _refuse_stated_decibels(self) -> None:
+        """Refuses a magnitude where a line of the file, such as `Y-axis unit: dB`, says that its unit is a decibel."""
+        for name, value in self.stated.items():
+            known = unit(value) if isinstance(value, str) and _OF_UNIT.search(name) else None
+            if known is not None and known.dimension == DECIBEL:
+                raise self._error(f"property {name!r}", f"is {value!r}: {_NO_DECIBELS}")
+
+    def spring(self) -> dict[str, float]:
+        """The stiffness of the spring whose deflection was subtracted: a contact that sticks comes off by it."""
+        force = self.rig.channels.get("force_n", ChannelMapping(""))
+        displacement = self.rig.channels.get("displacement_mm", ChannelMapping(""))
+        spring = force.spring_constant_n_per_m
+        if self.rig.kind != "indentation" or displacement.deflection is None or spring is None:
+            return {}
+        return {"stage_stiffness_n_per_mm": 1e-3 * spring_constant(spring, self.stated, self.file)}
+
+    def _values(self, field: str, mapping: ChannelMapping) -> Values:
+        spring = mapping.spring_constant_n_per_m
+        if spring is not None:
+            constant = spring_constant(spring, self.stated, self.file)
+            deflection, how = self._signal("displacement_mm", mapping)
+            self.taken[field] = f"{how}, a deflection, times {constant:g} N/m"
+            return deflection * 1e-3 * constant
+        values, self.taken[field] = self._signal(field, mapping)
+        if mapping.deflection is None:
+            return values
+        deflection, how = self._signal(field, mapping.deflection)
+        if len(deflection) != len(values):
+            channels = f"{mapping.channel!r} and {mapping.deflection.channel!r}"
+            raise self._error("", f"{channels} differ in length: no deflection can be subtracted")
+        self.taken[field] += f", less the deflection {how}"
+        return values - deflection
+
+    def _signal(self, field: str, mapping: SignalMapping) -> tuple[Values, str]:
+        """A channel's values in the unit of a field, and in words what was taken."""
+        channel = self.block.headed(mapping.channel)
+        assert channel is not None
+        place = f"channel {channel.name!r}"
+        if len(channel.values) == 0:
+            raise self._error(place, "holds no values")
+        if field == "coherence":
+            in_percent = (mapping.unit or channel.label) == "%"
+            return channel.values / (_PERCENT if in_percent else 1.0), repr(channel.name)
+        target = "frf_re_pc_per_n" if field in (COMPLEX_FRF, MAGNITUDE) else field
+        label = self._true_unit(channel, mapping, "angle" if field == PHASE else field_unit(target).dimension)
+        scale = self._degrees(label, place) if field == PHASE else self._scale(target, label, mapping, place)
+        through = f" through {mapping.sensitivity:g} {mapping.sensitivity_unit}" if mapping.sensitivity else ""
+        sign = self._automatic_sign(mapping) if mapping.sign == AUTOMATIC else int(mapping.sign or 1)
+        turned = ", turned round" if sign == -1 else ""
+        with np.errstate(all="ignore"):
+            return channel.values * sign * scale, f"{channel.name!r} in {label}{through}{turned}"
+
+    def _automatic_sign(self, mapping: SignalMapping) -> int:
+        """-1 where a channel falls as the curve is pressed: told from the channels as they came, so that a travel less
+        a deflection has both right."""
+        travel = self.block.headed(self.rig.channels["displacement_mm"].channel)
+        is_travel = mapping is self.rig.channels["displacement_mm"]
+        force = self.block.headed((self.rig.channels["force_n"] if is_travel else mapping).channel)
+        assert travel is not None
+        assert force is not None
+        falls = falling(force.values.real, travel.values.real, sphere=self.rig.kind == "indentation")
+        if ("displacement_mm" if is_travel else "force_n") not in falls:
+            return 1
+        self.warnings.append(f"channel {mapping.channel!r} falls as it is pressed, and was turned round")
+        return -1
+
+    def _tared(self, field: str, column: Floats) -> Floats:
+        """A column less its mean over the part of the curve that the rig description says."""
+        percent = self.rig.channels[field].tare_percent if field in self.rig.channels else None
+        if percent is None:
+            return column
+        tared = column[: max(1, round(percent / _PERCENT * len(column)))]
+        zero = float(tared.mean())
+        part = f"the first {percent:g} % of all samples"
+        self.taken[field] += f", less {readable(field, zero)}, its mean over {part}"
+        words = field.rpartition("_")[0]
+        self.warnings.append(f"the {words} is 0 on average over {part} of each curve: it was tared so")
+        rise = rise_of(column, len(tared)) if field == "force_n" and self.rig.kind != "frf" else None
+        if rise is not None:
+            shown_in, count = readable_unit(field, abs(rise.height))
+            self.warnings.append(
+                f"{part} of {self.block.name or 'the curve'} are not in the air alone: from about "
+                f"{_PERCENT * rise.start / len(column):.2g} % of all samples, loading and way back together, the force "
+                f"leaves its level by {rise.height * count:.3g} {shown_in}; tare over fewer: the zero is off by about "
+                f"{abs(zero - rise.level) * count:.2g} {shown_in}"
+            )
+        return column - zero
+
+    def _true_unit(self, channel: Channel, mapping: SignalMapping, dimension: str) -> str:
+        """The rig's unit, else the file's label, which must not contradict it unless the rig says that it is wrong."""
+        label, place = channel.label, f"channel {channel.name!r}"
+        if mapping.labelled is not None:
+            if mapping.labelled != label:
+                raise self._error(place, f"is labelled {label!r}, not {mapping.labelled!r} as the rig says")
+            self.warnings.append(f"{place} is labelled {label!r}; the rig description says {mapping.unit!r}")
+            return mapping.unit or ""
+        if mapping.unit and contradicts(label, mapping.unit, channel.name, dimension):
+            reason = f"is labelled {label!r}, but the rig description says {mapping.unit!r}"
+            raise self._error(
+                place, f"{reason}: correct the one that is wrong; if it is the label, add labelled: {label}"
+            )
+        if not mapping.unit and len(meanings(label)) > 1:
+            raise self._error(
+                place, f"its unit {label!r} has several meanings: say it, as `unit` of the rig description"
+            )
+        if not (mapping.unit or label):
+            raise self._error(
+                place, "has no unit in the file: say it, as `unit` of the rig description or as its true unit"
+            )
+        return mapping.unit or label
+
+    def _degrees(self, label: str, place: str) -> float:
+        """From the unit of a phase to degrees."""
+        known = unit(label)
+        if known is None or known.dimension != "angle":
+            raise self._error(place, f"its unit {label!r} is none of an angle: a phase is in deg or rad")
+        return math.degrees(known.to_si)
+
+    def _scale(self, field: str, label: str, mapping: SignalMapping, place: str) -> float:
+        """From the channel's unit to the field's, through the sensitivity where there is one."""
+        known = unit(label)
+        if known is not None and known.dimension == DECIBEL:
+            raise self._error(place, _NO_DECIBELS)
+        if mapping.sensitivity is None or mapping.sensitivity_unit is None:
+            return factor(label, field, self.file, place, "; a signal in volts needs its sensitivity")
+        above, _, below = mapping.sensitivity_unit.rpartition("/")
+        given = unit(label)
+        for signal, quantity, sensitivity in (
+            (above, below, 1 / mapping.sensitivity),
+            (below, above, mapping.sensitivity),  # nm/V, as those of cantilevers are stated
+        ):
+            divided, measured = unit(signal), unit(quantity)
+            if given is None or divided is None:
+                continue
+            if given.dimension == divided.dimension:
+                return given.to_si / divided.to_si * sensitivity * factor(quantity, field, self.file, place)
+            if measured is not None and ratio_of(label, signal, quantity) == exponents(LAB[field].unit):  # V/N by mV/pC
+                return given.to_si / divided.to_si * measured.to_si * sensitivity / LAB[field].to_si
+        raise self._error(place, f"its unit {label!r} is not of the sensitivity's {mapping.sensitivity_unit!r}")
+
+    def _without_instrument(self, columns: Mapping[str, Any]) -> dict[str, Any]:
+        """The columns, their displacement without the instrument's own give, force over its stiffness."""
+        stiffness = self.rig.channels.get("displacement_mm", ChannelMapping("")).stiffness_n_per_mm
+        if stiffness is None:
+            return dict(columns)
+        if len(columns["displacement_mm"]) != len(columns["force_n"]):
+            both = (Mention("displacement_mm"), " and ", Mention("force_n"))
+            reason = Requirement(*both, " differ in length: no stiffness can be applied")
+            raise self._error("", reason)
+        self.taken["displacement_mm"] += f", less the force over {stiffness:g} N/mm"
+        return {**columns, "displacement_mm": columns["displacement_mm"] - columns["force_n"] / stiffness}
+
+    def _say_ranges(self, columns: Mapping[str, Any]) -> None:
+        for field, column in columns.items():
+            if field in LAB and field in self.taken and np.isfinite(column).any():
+                self.taken[field] += f": {range_of(field, column)}"
+
+    def _require_known_sign(self, columns: Mapping[str, Any]) -> None:
+        """Force must rise with displacement, unless the rig says a sign for both."""
+        signs = [self.rig.channels[name].sign for name in ("displacement_mm", "force_n") if name in self.rig.channels]
+        if len(signs) < 2 or None not in signs or len(columns["displacement_mm"]) != len(columns["force_n"]):
+            return
+        with np.errstate(all="ignore"):
+            together = np.mean(_centred(columns["displacement_mm"]) * _centred(columns["force_n"]))
+        if together < 0:
+            reason = "force falls as the displacement grows, and compression is positive here"
+            signs_said = Mention("sign", "sign: 1, -1 or auto")
+            how = (signs_said, " for ", Mention("displacement_mm"), " and ", Mention("force_n"))
+            doubt = ""
+            depth = self.rig.channels["displacement_mm"].channel
+            formula = self.rig.derived.get(depth)
+            if formula is not None and formula.is_sum:
+                turn = f"turn the terms of {formula.text} that fall as it is pressed"
+                raise self._error(f"{FIELD}.{depth}", f"{reason}: {turn}{self._also_used(depth)}")
+            if self.rig.channels["displacement_mm"].deflection is not None:
+                doubt = "; or a unit is another than its heading says: a travel less a deflection needs both right"
+            raise self._error("channels", Requirement(f"{reason}: say ", *how, doubt))
+
+    def _also_used(self, derived: str) -> str:
+        """In words, each channel of a formula that others use too, and these."""
+        rest = {name: formula for name, formula in self.rig.derived.items() if name != derived}
+        told = ""
+        for name in filter(self.block.headed, self.rig.derived[derived].names):
+            others = [one for one, formula in rest.items() if name in formula.names]
+            if others:
+                of = " and of ".join(others)
+                told += f"; if it is {name!r} that is reversed, turn it in the formula of {of} too"
+        return told
+
+    def _frf(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """Without the line at 0 Hz; time series with their sample rate."""
+        time = given.get("time_s")
+        columns = {name: column for name, column in given.items() if name != "time_s"}
+        frequency = columns.get("frequency_hz")
+        if frequency is not None and len(frequency) > 1 and frequency[0] == 0:
+            self.warnings.append("the line at 0 Hz is left out")
+            return {name: column[1:] for name, column in columns.items()}
+        rate = self.block.sample_rate_hz if time is None else None
+        stated = self.rig.recording.get("sample_rate_hz")
+        if "force_n" in columns and stated is None:
+            rate = rate if time is None else self._rate(time)
+            columns |= {} if rate is None else {"sample_rate_hz": rate}
+        elif (
+            rate is not None and isinstance(stated, int | float) and not math.isclose(rate, stated, rel_tol=_SAME_RATE)
+        ):
+            self.warnings.append(
+                f"the file states {rate:g} samples a second; the rig description {stated:g}, which counts"
+            )
+        return {**columns, **self._measured_force(columns)}
+
+    def _measured_force(self, columns: Mapping[str, Any]) -> dict[str, float]:
+        """The dynamic force of a time series whose rig description tells none: the amplitude of the sine that shakes as
+        strongly as the recorded force does about its drift."""
+        force = columns.get("force_n", np.zeros(0))
+        if "dynamic_force_n" in self.rig.recording or len(force) < _LEAST_SAMPLES or not np.isfinite(force).all():
+            return {}
+        place = np.linspace(-1.0, 1.0, len(force))
+        shaken = force - force.mean() - place * (place @ force) / (place @ place)
+        amplitude = float(np.sqrt(2) * shaken.std())
+        if amplitude <= _STILL * float(np.abs(force).max()):
+            return {}
+        self.taken["dynamic_force_n"] = f"measured: √2 times the rms of the force about its drift, {amplitude:.4g} N"
+        return {"dynamic_force_n": amplitude}
+
+    def _rate(self, time: Floats) -> float:
+        rate = even_rate(time)
+        if rate is None:
+            raise self._error("time_s", f"samples are not evenly spaced (step {shown(mean_step(time))} s)")
+        return rate
+
+    def _error(self, place: str, reason: str | Requirement) -> FileError:
+        return FileError(self.file, place, reason)
+
+
+def _centred(column: Floats) -> Floats:
+    return column - column.mean()
+
+
+_OFF_SAMPLE = 0.05  # of a step: at half the rate a phase of 9°, and Re FRF 1.2 % too small
+_LEAST_COMMON = 2  # samples in common
+
+
+def aligned(contents: Contents, names: Collection[str], file: str) -> Contents:
+    """The contents with the channels of some names cut to their common samples in every block, as the file states their
+    starts; a warning says so.
+
+    Raises FileError that names both channels where their rates differ, or their starts do so by parts of a sample.
+    """
+    blocks, warnings = [], list(contents.warnings)
+    for block in contents.blocks:
+        used = {one.name: one for name in names if (one := block.headed(name)) is not None}
+        rate = _common_rate(list(used.values()), file)
+        with_rate = block if rate is None else replace(block, sample_rate_hz=rate)
+        if len({one.starts_s for one in used.values()}) < 2:
+            blocks.append(with_rate)
+            continue
+        cut, told = _cut_to_common(with_rate, used, file)
+        blocks.append(cut)
+        warnings += told
+    return replace(contents, blocks=tuple(blocks), warnings=tuple(dict.fromkeys(warnings)))
+
+
+def _common_rate(used: list[Channel], file: str) -> float | None:
+    sampled = {one.sample_rate_hz: one for one in used if one.sample_rate_hz is not None}
+    if len(sampled) > 1:
+        (first, one), (second, other), *_ = sampled.items()
+        reason = f"{one.name!r} has {first:g} samples a second, {other.name!r} {second:g}: they must have one rate"
+        raise FileError(file, "", reason)
+    return next(iter(sampled), None)
+
+
+def _cut_to_common(block: Block, used: dict[str, Channel], file: str) -> tuple[Block, list[str]]:
+    """The block with the used channels cut, and in words how; as it is where they start within one sample."""
+    first, last = min(used.values(), key=_starts_s), max(used.values(), key=_starts_s)
+    apart = f"{first.name!r} starts at {_time(block, first)}, {last.name!r} at {_time(block, last)}"
+    if block.sample_rate_hz is None:
+        raise FileError(file, "", f"{apart}, and no sample rate is stated by which to align them")
+    late = {name: (last.starts_s - one.starts_s) * block.sample_rate_hz for name, one in used.items()}
+    skipped = {name: round(samples) for name, samples in late.items()}
+    odd = next((name for name in used if abs(late[name] - skipped[name]) > _OFF_SAMPLE), None)
+    if odd is not None:
+        reason = f"that is {late[odd]:.4g} samples: they can be aligned by whole samples alone"
+        raise FileError(file, "", f"{apart}: {reason}; resample one of them, or correct the times")
+    if not any(skipped.values()):
+        return block, []
+    count = min(len(one.values) - skipped[name] for name, one in used.items())
+    if count < _LEAST_COMMON:
+        raise FileError(file, "", f"{apart}: they have no samples in common")
+    channels = tuple(
+        replace(one, values=one.values[skipped[one.name] : skipped[one.name] + count]) if one.name in used else one
+        for one in block.channels
+    )
+    told = f"{apart}: they were aligned, with {count} samples in common"
+    return replace(block, channels=channels), [told]
+
+
+def _starts_s(channel: Channel) -> float:
+    return channel.starts_s
+
+
+def _time(block: Block, channel: Channel) -> str:
+    """When a channel starts, or how long after the first where the file does not say when that was."""
+    if block.recorded_at is None:
+        return f"{channel.starts_s:g} s"
+    try:
+        moment = datetime.fromisoformat(block.recorded_at) + timedelta(seconds=channel.starts_s)
+    except OverflowError:
+        return f"{channel.starts_s:g} s after {block.recorded_at}"
+    return moment.isoformat().replace("+00:00", "Z")
+
+
+_MOST_CURVES = 1000  # of a block
+_LEAST_OF_CURVE = 2  # of a curve
+
+
+def curve_parts(blocks: Sequence[Block], curves: str | CurveChannel | None, file: str) -> list[tuple[Block, str]]:
+    """The curves of the blocks that hold a rig's channels, as `curves` of the rig description has it, each with the
+    name of the block that it was in.
+
+    Raises FileError where a channel changes too often to tell curves apart.
+    """
+    if curves == "file":
+        return [(_joined(blocks), blocks[0].name)]
+    return [(part, block.name) for block in blocks for part in _parts(block, curves, file)]
+
+
+def _parts(block: Block, curves: str | CurveChannel | None, file: str) -> list[Block]:
+    if curves is None:
+        return [block]
+    if isinstance(curves, str):
+        return list(_cut(block, block.group_starts or (0,), []))
+    name = curves.channel or curves.segments or ""
+    channel = block.headed(name)
+    assert channel is not None
+    values = channel.values.real
+    changed = np.diff(values) < 0 if curves.channel is None else np.diff(values) != 0
+    starts = (0, *(np.flatnonzero(changed) + 1).tolist())
+    ends = (*starts[1:], len(values))
+    short = min(end - start for start, end in zip(starts, ends, strict=True)) < _LEAST_OF_CURVE
+    if short or len(starts) > _MOST_CURVES:
+        reason = (
+            f"changes {len(starts) - 1} times in {len(values)} samples: it must tell up to {_MOST_CURVES} curves of at "
+            f"least {_LEAST_OF_CURVE} samples apart"
+        )
+        raise FileError(file, f"channel {name!r}", reason)
+    names = [f"{values[start]:g}" for start in starts] if curves.channel is not None else []
+    return list(_cut(block, starts, names if len(set(names)) == len(names) else []))
+
+
+def _cut(block: Block, starts: Sequence[int], names: Sequence[str]) -> Iterator[Block]:
+    """The block from each start to the next; named, or else numbered."""
+    for number, start in enumerate(starts):
+        end = starts[number + 1] if number + 1 < len(starts) else None
+        own = names[number] if names else str(number + 1)
+        name = f"{block.name} {own}".strip() if len(starts) > 1 else block.name
+        channels = tuple(replace(channel, values=channel.values[start:end]) for channel in block.channels)
+        yield Block(name, channels, block.sample_rate_hz, block.recorded_at)
+
+
+def _joined(blocks: Sequence[Block]) -> Block:
+    """One block of all, with the channels that every one has in one unit, in their order."""
+    first = blocks[0]
+    channels = []
+    for channel in first.channels:
+        alike = [block.channel(channel.name) for block in blocks]
+        whole = [one for one in alike if one is not None and one.unit == channel.unit]
+        if len(whole) == len(blocks):
+            values = np.concatenate([one.values for one in whole])
+            channels.append(replace(channel, values=values))
+    return Block(first.name, tuple(channels), first.sample_rate_hz, first.recorded_at)
+
+
+def doubts(contents: Contents, curves: str | CurveChannel | None) -> list[str]:
+    """What the user should know of groups of rows that are read as one curve although nobody said so."""
+    most = max((len(block.group_starts) for block in contents.blocks), default=0)
+    if curves is not None or most < 2:
+        return []
+    question = "say curves: groups if each is one, or curves: file"
+    return [f"{most} groups of rows, which blank or comment lines part, are read as one curve: {question}"]
 
 
 @dataclass(frozen=True)
@@ -33,8 +570,10 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
     Raises FileError that names the channel or property that is missing or whose unit does not fit.
     """
     in_formulas = [name for formula in rig.derived.values() for name in formula.names]
-    contents = common_start.aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
-    contents = derived_channels.with_derived(contents, rig.derived, lambda one: _stated(contents, one, one.name), file)
+    contents = aligned(contents, dict.fromkeys([*_channel_names(rig), *in_formulas]), file)
+    contents = channel_arithmetic.with_derived(
+        contents, rig.derived, lambda one: _stated(contents, one, one.name), file
+    )
     blocks = _with_channels(rig, contents, file)
     warnings = [*contents.warnings, *doubts(contents, rig.curves)]
     if len(blocks) < len(contents.blocks):
@@ -64,7 +603,9 @@ def apply(rig: RigDescription, contents: Contents, file: str) -> MappedFile:
 def has_channels(rig: RigDescription, contents: Contents) -> bool:
     """Whether a part of a file holds every channel that the rig names, or can derive."""
     try:
-        derived = derived_channels.with_derived(contents, rig.derived, lambda one: _stated(contents, one, one.name), "")
+        derived = channel_arithmetic.with_derived(
+            contents, rig.derived, lambda one: _stated(contents, one, one.name), ""
+        )
         return bool(_with_channels(rig, derived, ""))
     except FileError:
         return False

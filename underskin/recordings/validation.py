@@ -1,24 +1,74 @@
-"""Checks of single campaign fields: each takes the field's name and value and returns what the model keeps.
+"""Values of documents checked, and shown where they are wrong.
+
+Values and names as an error may show them.
+
+Checks of single campaign fields: each takes the field's name and value and returns what the model keeps.
 
 Every check raises InvalidInput that names the field, the value and what is allowed. A model names the check of each
 field in its annotation, by one of the types at the end.
+
+What else a lab noted of a recording: columns of its own, by names that no field or axis has.
 """
 
 import math
+import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, fields
 from datetime import datetime
 from functools import cache
 from itertools import islice
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Self, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from underskin import errors
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.physics.skin import INCOMPRESSIBLE
-from underskin.recordings.shown_values import LONGEST_NAME, CellText, named, shown
 from underskin.units import Floats, checked
+
+LONGEST_NAME = 200  # characters
+
+
+class CellText(str):
+    """A cell of a text that is not what its field needs, and its `place`, such as "line 3, column 2"."""
+
+    place: str
+
+    def __new__(cls, cell: str, place: str) -> Self:
+        """Of a cell at a place."""
+        made = super().__new__(cls, cell)
+        made.place = place
+        return made
+
+
+def shown(value: Any) -> Any:
+    """A value as an error may show it: short, and plain JSON."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int | float | np.integer | np.floating):
+        return _shown_number(value)
+    if isinstance(value, str):
+        short = value if len(value) <= LONGEST_NAME else value[:LONGEST_NAME] + "…"
+        return short.encode("utf-8", "replace").decode("utf-8")
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return f"a value of type {type(value).__name__}"
+
+
+def named(name: Any) -> str:
+    """A field's name as an error may show it, an empty one too."""
+    return str(shown(name)) or '""'
+
+
+def _shown_number(value: Any) -> Any:
+    try:
+        as_float = float(value)
+    except OverflowError:
+        return "a whole number beyond the range of floats"
+    if not math.isfinite(as_float):
+        return str(as_float)
+    return int(value) if as_float.is_integer() and abs(as_float) < 2**53 else as_float
+
 
 BuiltModel = TypeVar("BuiltModel")
 Check = Callable[[str, Any, bool], Any]  # name, value, units_checked
@@ -281,3 +331,38 @@ Rows = Annotated[Floats, rows]
 Frequencies = Annotated[Floats, frequencies]
 Times = Annotated[Floats, not_falling]
 Coherence = Annotated[Floats, coherence]
+
+
+CONDITION = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+MOST_CONDITIONS = 100
+BUILT_IN_AXES = frozenset(  # that no column of `conditions` may be called
+    (
+        *("id", "kind", "sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "recorded_at", "load_cycles"),
+        *("dwell_s", "position_mm", "frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n", "coherence", "conditions"),
+        *("sample_rate_hz", "force_n", "charge_pc", "displacement_mm", "time_s", "stage_stiffness_n_per_mm"),
+        *("sample_height_mm", "sample_diameter_mm", "order", "time_of_day", "previous_preload_n", "x_mm", "y_mm"),
+        *("phase", "day"),
+    )
+)
+
+
+def further(field: str, value: Any, units_checked: bool) -> dict[str, float | str]:
+    """What else a lab noted, by names of its own: numbers or short words; null where it was not noted."""
+    document = mapping(field, value)
+    noted: dict[str, float | str] = {}
+    if len(document) > MOST_CONDITIONS:
+        raise errors.out_of_range(field, len(document), f"must be at most {MOST_CONDITIONS} columns")
+    for key, entry in document.items():
+        place = f"{field}.{named(key)}"
+        if not isinstance(key, str) or not CONDITION.fullmatch(key):
+            raise InvalidInput(place, shown(key), "must be a name of letters, digits and underscores")
+        if key in BUILT_IN_AXES:
+            raise InvalidInput(place, shown(key), "is the name of a field or an axis of its own; choose another")
+        if isinstance(entry, str):
+            noted[key] = name(place, entry, units_checked)
+        elif entry is not None:
+            noted[key] = number(place, entry)
+    return noted
+
+
+Further = Annotated[dict[str, float | str], further]

@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms import Kind, Mechanism, Normal, Parameter, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 
 
 class SampleAveraging(Mechanism):

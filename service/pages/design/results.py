@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from service.pages.design.sliders import SLIDERS
 from service.pages.shared.formats import change_in_percent, short_and_exact
 from service.schemas.design import DesignAnswer
-from underskin.prediction.other_contact import OTHER, WORDS
+from underskin.prediction.answers import OTHER, WORDS
 
 BLIND_PERCENT = 10.0  # of the response above a sensor: what lies below goes unseen
 

@@ -20,8 +20,7 @@ from service.pages.shared.wrong_fields import NOTHING_WRONG, WrongFields, quanti
 from underskin.errors import TableError, UnderskinError
 from underskin.physics.hertz import peak_pressure
 from underskin.physics.skin import INCOMPRESSIBLE, Indenter, Skin
-from underskin.prediction.answers import pressed
-from underskin.prediction.other_contact import STATED
+from underskin.prediction.answers import STATED, pressed
 from underskin.prediction.stress_field import StressField, stress_field
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.surrogate.solved_contact import contact_model

@@ -22,8 +22,8 @@ from service.schemas.pressed_skin import D33Columns
 from service.store import Database
 from service.usecases.pressed_skin import d33
 from underskin.errors import InvalidInput, TableError, UnderskinError, conflicting, required, wrong_type
-from underskin.prediction.domain_checks import RowConditions, beyond
-from underskin.prediction.other_contact import other_contact
+from underskin.prediction.answers import other_contact
+from underskin.prediction.pressed_skin import RowConditions, beyond
 from underskin.recordings.validation import Check, declared, not_negative
 from underskin.recordings.validation import number as finite
 from underskin.several_errors import noting

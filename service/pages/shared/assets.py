@@ -14,7 +14,7 @@ import plotly
 from fastapi import APIRouter, Header, Response
 
 from service.problems import Refusal
-from underskin.diagnosis.reporting.scheme import SCHEME
+from underskin.diagnosis.reporting.page_styles import SCHEME
 
 router = APIRouter()
 

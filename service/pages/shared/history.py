@@ -5,7 +5,7 @@ from urllib.parse import quote
 
 from service.pages.shared.figures import Drawn, drawn
 from service.schemas.skins import History, SensorDeparture, SensorHistory
-from underskin.diagnosis.reporting.typeset import with_minus
+from underskin.diagnosis.reporting.page_styles import with_minus
 
 By = Literal["paper", "adopted"]
 RESTS = {"adopted": "by the adopted model", "paper": "by the paper's model"}

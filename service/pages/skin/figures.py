@@ -12,7 +12,7 @@ from service.pages.shared.history import RESTS, By
 from service.schemas.skins import History, SensorHistory, TrendAnswer
 from service.store import AnyRow
 from underskin.inversion.trend import interval
-from underskin.recordings.time_zone import in_lab
+from underskin.recordings.readers.calendar_times import in_lab
 
 _MOST_NAMED = 5  # sensors, in a sentence
 

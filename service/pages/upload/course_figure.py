@@ -11,7 +11,7 @@ from service.pages.shared.figures import Drawn, drawn
 from service.pages.upload import turned_curves
 from service.pages.upload.file_summary import FileSummary
 from service.pages.upload.mapping import mapped_file, rig_of
-from underskin.diagnosis.reporting.line_styles import BOUND, SHOWN
+from underskin.diagnosis.reporting.page_styles import BOUND, SHOWN
 from underskin.recordings.rig_description import RigDescription, Trim
 from underskin.units import LAB, Floats, Indices, Mask, readable_unit
 

@@ -90,13 +90,13 @@ def _traces(look: InspectedFile, place: str) -> list[Drawn]:
 
 def _frf(campaigns: list[Campaign], place: str) -> list[Drawn]:
     from underskin.figures.frf import frf_recordings
-    from underskin.recordings.frf import summary
+    from underskin.recordings.frf import flat_zone
 
     measured_frfs = [entry for campaign in campaigns for entry in measured(campaign)]
     if not measured_frfs:
         return []
     lines = [
-        summary.lines_of(f"{one.id}: {one.sensor}, R {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
+        flat_zone.lines_of(f"{one.id}: {one.sensor}, R {one.indenter_radius_mm:g} mm, {one.preload_n:g} N", frf)
         for one, frf in measured_frfs[:_MOST_FRF]
     ]
     some = (

@@ -11,11 +11,10 @@ from service.ingest.uploads import Upload
 from service.pages.upload import stated_preload
 from service.store.codec import recorded_at
 from underskin import InvalidInput
-from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording
+from underskin.recordings.campaign import Campaign, CompressionRecording, FrfRecording, Recording, SkinDescription
 from underskin.recordings.channels import Channel, Contents
-from underskin.recordings.conditions import SkinDescription
 from underskin.recordings.readers.unit_labels import unit
-from underskin.recordings.sampling import even_rate
+from underskin.recordings.rig_mapping import even_rate
 from underskin.units import to_lab
 
 MOST_LISTED = 60

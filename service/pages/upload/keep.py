@@ -22,7 +22,7 @@ from service.problems import Refusal
 from service.store import Conflict, Database, Missing, campaigns, skins
 from service.usecases import d33_cache
 from underskin.errors import ErrorCode, FileError, InvalidInput
-from underskin.recordings import curve_signs
+from underskin.recordings import curve_preparation
 from underskin.several_errors import errors_of
 
 SKIN_FIELD, CORRECTS = "skin", "corrects"
@@ -138,4 +138,4 @@ def worth_knowing(request: Request, look: InspectedFile, skin_id: str | None, co
 def counts_pressing_negative(looked: InspectedFile) -> bool:
     """Whether curves of a file do."""
     held = [one.campaign for one in map(checked, looked.campaigns) if one.campaign is not None]
-    return any(curve_signs.findings(campaign) for campaign in held)
+    return any(curve_preparation.findings(campaign) for campaign in held)

@@ -4,7 +4,7 @@ import numpy as np
 
 from underskin.findings.sentences import more_alike
 from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf.signal_checks import mean_of
+from underskin.recordings.frf.spectra import mean_of
 from underskin.units import readable_unit
 
 _ALIKE = 0.2  # of the stated preload: what a measured one may differ by

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from underskin.recordings.curve_signs import falling
-from underskin.recordings.readable_values import range_of
-from underskin.recordings.rig_mapping import MappedFile
+from underskin.recordings.curve_preparation import falling
+from underskin.recordings.rig_mapping import MappedFile, range_of
 
 
 def counted_negative(recording: Mapping[str, Any]) -> Sequence[str]:

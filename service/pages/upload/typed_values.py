@@ -7,8 +7,7 @@ from typing import Any
 from service.ingest.field_words import RECORDING, SKIN
 from service.pages.upload import recorded_time
 from underskin.errors import InvalidInput
-from underskin.recordings.campaign import KINDS
-from underskin.recordings.conditions import SkinDescription
+from underskin.recordings.campaign import KINDS, SkinDescription
 from underskin.recordings.validation import check_fields
 
 _OF_SKIN = {name for name, *_ in SKIN}

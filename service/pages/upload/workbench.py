@@ -8,10 +8,10 @@ from typing import Any
 from service.pages.shared.forms import number_or_text
 from service.pages.upload.file_summary import ChannelSummary, FileSummary
 from underskin.errors import InvalidInput, not_unique, required
-from underskin.recordings.channel_mapping import AUTOMATIC
 from underskin.recordings.readers import channel_arithmetic
-from underskin.recordings.readers.derived_channels import FIELD
+from underskin.recordings.readers.channel_arithmetic import FIELD
 from underskin.recordings.readers.unit_labels import in_brackets
+from underskin.recordings.rig_description import AUTOMATIC
 
 SIGNS = {"": "as it is", "1": "+", "-1": "−", AUTOMATIC: "automatic"}
 TARES = {

@@ -16,7 +16,7 @@ from tests.service.routes.test_mechanisms import WARM
 from tests.support.power.disk import Disk, powered
 from tests.support.store_server import Place, campaign, running
 from tests.support.streams import all_campaigns
-from underskin.client.watch.journal import Journal, Target
+from underskin.client.watch import Journal, Target
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ ADDS = """
 import sys
 from itertools import count
 from pathlib import Path
-from underskin.client.watch.journal import Journal, Target
+from underskin.client.watch import Journal, Target
 journal = Journal(Path(sys.argv[1]))
 for number in count():
     journal.add(Target(*sys.argv[2:]), str(number), f"{number}.csv", ["c-1"])

@@ -1,4 +1,13 @@
-"""The evidence of one hypothesis: Laplace's method, and integrals over parameters whose posterior is not Gaussian.
+"""The evidence of hypotheses, and posteriors that no quadratic describes.
+
+The evidence of one hypothesis by Laplace's method, with care for parameters at their bounds.
+
+log Z = −cost* + (n/2) log 2π − ½ log|H| + log P(box). The cost is that of the quadratic's own minimum (which may lie
+outside the bounds), H the information on the mean parameters and the Hessian in the covariance's, P(box) the
+probability that a normal with this mean and H⁻¹ gives to the bounds: one bound after another, each with the moments
+left by the ones before (exact for one bound; Mendell and Elston 1974).
+
+The evidence of one hypothesis: Laplace's method, and integrals over parameters whose posterior is not Gaussian.
 
 A parameter on a logarithmic scale that the lines hardly determine (the time of a small step, the onset of a small loss)
 is one: the others follow it along a curve, and where the effect is small it is free. There Z is the integral over that
@@ -9,20 +18,264 @@ the gain scatter's posterior is then not Gaussian either. There Z is the integra
 most probable prediction, from which the quadratic of the mean parameters leads on.
 
 Integrals are sums at equal strides, as good as exact for what falls to nothing both ways.
+
+Posteriors that the bounds of one parameter end, and not the recordings: integrated over that parameter.
+
+Indentations tell E/(1 − ν²), so that E and ν trade along a ridge, which ν between its bounds cuts short. A quadratic
+knows no bounds, and would leave E as unknown as the ridge is long.
+
+A parameter's posterior over all values of the sensors' spread, which two sensors leave open by a factor.
+
+At its most probable value the spread is too small: that is where the sensors that were recorded differ least from their
+mean. At each of a grid of values the mean parameters are normal, at most a Newton step away.
+
+Where a parameter's 95 % interval ends by the profile of the posterior, which need not be Gaussian.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.special import log_ndtr
 
-from underskin.diagnosis.inference.laplace import Evidence, around, around_levels, around_mean, log_volume
-from underskin.diagnosis.inference.objective import GAIN, POSITION
-from underskin.diagnosis.inference.optimizer import Fitter
-from underskin.diagnosis.inference.points import Evaluated, Points
-from underskin.units import Floats
+from underskin.diagnosis.inference.fit import GAIN, POSITION, Fitter
+from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
+from underskin.diagnosis.noise import NoiseLevels
+from underskin.mechanisms.models.composed import Prediction
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.parameter import Uniform
+from underskin.units import Floats, Indices
 
-__all__ = ["Evidence", "around", "held_points", "integrated", "laplace"]
+_NEAR = 4.0  # standard deviations from a bound within which it counts
+_POLISHING, _POLISHING_CURVES, _POLISHED = (
+    4,
+    12,
+    0.05,
+)  # steps at most, of curves as well, and the gain in log posterior below which it stops
+_LEAST_COVARIANCE_CURVATURE = 0.3  # of logarithms of noise levels: their priors are not wider
+_POLISHED_GAIN = 1.0  # gain in log posterior that polishing may leave
+_ASTRAY = -50.0  # nats: bounds take less from an integral around a point within them, and add nothing
+_LEAST_EIGENVALUE = 1e-11  # of the correlations' information
+_FLAT = 1e-3  # least standard deviations of the quadratic within a parameter's bounds: keeps H invertible
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """log Z up to what all hypotheses share, the most probable point, and the parameters' covariance there."""
+
+    log_evidence: float
+    hypothesis: Hypothesis
+    point: FitPoint
+    cost: float
+    covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
+    growth: Floats | None = None  # (1, recordings, parameters), see Evaluated
+
+    @cached_property
+    def fitter(self) -> Fitter:
+        """What evaluates points of this hypothesis."""
+        return Fitter([self.hypothesis])
+
+    @cached_property
+    def at(self) -> Evaluated:
+        """The most probable point, evaluated."""
+        return replace(self.fitter.evaluate(self.fitter.at(self.point)), growth=self.growth)
+
+    @cached_property
+    def marginal(self) -> Likelihoods:
+        """The likelihood there."""
+        return self.fitter.marginal(self.at)
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """The model's prediction there, on the rows of the hypothesis: of FRFs without derivatives, of curves with what
+        the cell adds."""
+        model = self.hypothesis.model
+        if isinstance(model, FrfModel):
+            return model.predict(self.point.fit, slopes=False, place=False)
+        prediction = model.predict(self.point.fit)
+        added = cell_response(self.hypothesis.lines, self.levels, prediction.value.real).offset
+        return replace(prediction, value=prediction.value + added)
+
+    @cached_property
+    def relative_place_slopes(self) -> Floats:
+        """∇m/m of each recording over its contact's place [1/m] (2, recordings); 0 of curves."""
+        model = self.hypothesis.model
+        if isinstance(model, FrfModel):
+            return model.relative_place_slopes(self.point.fit)
+        return np.zeros((2, self.hypothesis.lines.recordings))
+
+    @cached_property
+    def levels(self) -> NoiseLevels:
+        """The noise levels there, as numbers."""
+        return self.fitter.levels(self.point.covariance).first
+
+    @property
+    def sensor_gains(self) -> Floats:
+        """The most probable log gain of each sensor (sensors,)."""
+        return self.marginal.sensor_gains[0]
+
+    @property
+    def pickup_variance(self) -> Floats:
+        """Of real and of imaginary part of each row [(C/N)²]."""
+        pickup, found = self.hypothesis.model.pickup, self.levels.pickup
+        on_rows = None if pickup is None or found is None else pickup.on_rows(found)
+        return replace(self.prediction, pickup=on_rows).pickup_variance
+
+
+def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
+    """By the quadratics around most probable points, which are first brought to where their whole gradients vanish."""
+    unknown = np.flatnonzero(~fitter.grown(at))
+    if len(unknown):
+        at = fitter.replaced(at, unknown, fitter.with_growth(at[unknown]))
+    moving = np.arange(len(at))
+    for _ in range(_POLISHING_CURVES if fitter.lines.curves else _POLISHING):
+        moving, at = _polish(fitter, at, moving)
+        if not len(moving):
+            break
+    values, covariances = around_mean(fitter, at)
+    volumes = around_levels(fitter, at)
+    evidence = []
+    for number, (value, covariance) in enumerate(zip(values + volumes, covariances, strict=True)):
+        hypothesis = fitter.hypotheses[at.points.owner[number]]
+        count = len(hypothesis.model.parameters)
+        point = FitPoint(at.points.fit[number, :count], at.points.covariance[number], at.points.bend[number])
+        growth = None if at.growth is None else at.growth[number : number + 1, :, :count]
+        evidence.append(Evidence(float(value), hypothesis, point, float(at.cost[number]), covariance, growth))
+    return evidence
+
+
+def around_mean(fitter: Fitter, at: Evaluated) -> tuple[Floats, list[Floats]]:
+    """The logs of the integrals over the mean parameters, the covariance's held, and the quadratics' covariances."""
+    values, covariances = [], []
+    for number, (information, gradient) in enumerate(zip(*_equations(fitter, at), strict=True)):
+        owner = at.points.owner[number]
+        places = np.flatnonzero(fitter.free[owner])
+        fit, low, high = at.points.fit[number, places], fitter.low[owner, places], fitter.high[owner, places]
+        information, gradient = _definite(information[np.ix_(places, places)]), gradient[places]
+        # Towards a bound the gradient stays; elsewhere, where polishing left much of it, the fit hangs at a kink, and
+        # what a smooth cost would still gain there is not to be had.
+        free = ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
+        if 0.5 * gradient[free] @ np.linalg.solve(information[np.ix_(free, free)], gradient[free]) > _POLISHED_GAIN:
+            gradient = np.where(free, 0.0, gradient)
+        covariance: Floats = np.linalg.inv(information).astype(np.float64)
+        gain = 0.5 * gradient @ covariance @ gradient
+        volume = 0.5 * len(fit) * np.log(2 * np.pi) - 0.5 * np.linalg.slogdet(information)[1]
+        mean = (fit - covariance @ gradient).astype(np.float64)
+        beyond = gain + log_box(mean, covariance, low, high)
+        if not _ASTRAY < beyond < 2 * _POLISHED_GAIN:
+            # Truncating one bound after another fails where a quadratic leads far out of several.
+            deviation = np.where(free, 0.0, np.diag(information) ** -0.5)
+            beyond = log_box(fit, covariance, low, high) - float(np.log1p(np.abs(gradient) * deviation).sum())
+        values.append(float(-at.cost[number] + volume + beyond))
+        covariances.append(covariance)
+    return np.array(values), covariances
+
+
+def _definite(information: Floats) -> Floats:
+    """With eigenvalues above 0, which rounding may have taken from nearly singular ones."""
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    if values[0] > _LEAST_EIGENVALUE:
+        return information
+    return np.asarray((vectors * np.maximum(values, _LEAST_EIGENVALUE)) @ vectors.T * np.outer(scale, scale))
+
+
+def around_levels(fitter: Fitter, at: Evaluated) -> Floats:
+    """What the integrals over the covariance's parameters add to the logs at their modes (points,)."""
+    return log_volume(fitter.covariance_equations(at)[1])
+
+
+def log_volume(hessian: Floats) -> Floats:
+    """The log volume of normal approximations in the logarithms of the noise levels (…, levels, levels)."""
+    eigenvalues = np.maximum(np.linalg.eigvalsh(hessian), _LEAST_COVARIANCE_CURVATURE)
+    return np.asarray(0.5 * hessian.shape[-1] * np.log(2 * np.pi) - 0.5 * np.log(eigenvalues).sum(axis=-1))
+
+
+def levels_covariance(hessian: Floats) -> Floats:
+    """The covariance of the logarithms of the noise levels, with the same least curvature.
+
+    At a bound the Hessian may be negative, and an interval read from it would have no width.
+    """
+    eigenvalues, vectors = np.linalg.eigh(hessian)
+    return np.asarray(vectors / np.maximum(eigenvalues, _LEAST_COVARIANCE_CURVATURE) @ vectors.T)
+
+
+def _equations(fitter: Fitter, at: Evaluated) -> tuple[Floats, Floats]:
+    """Information on the mean parameters and the gradient of the cost."""
+    information, ascent = fitter.posterior_equations(at)
+    owner = at.points.owner
+    span, every = (fitter.high - fitter.low)[owner], np.arange(fitter.low.shape[1])
+    information[:, every, every] += np.where(span > 0, _FLAT / np.where(span > 0, span, 1.0), 0.0) ** 2
+    return information, -ascent
+
+
+def _polish(fitter: Fitter, at: Evaluated, moving: Indices) -> tuple[Indices, Evaluated]:
+    """Newton steps of some points with the whole gradient, within the bounds; and which of them gained."""
+    part = at[moving]
+    information, gradient = _equations(fitter, part)
+    owner, fit = part.points.owner, part.points.fit
+    low, high = fitter.low[owner], fitter.high[owner]
+    free = fitter.free[owner] & ~(((fit <= low) & (gradient > 0)) | ((fit >= high) & (gradient < 0)))
+    both = free[:, :, None] & free[:, None, :]
+    matrix = np.where(both, information, 0.0)
+    every = np.arange(fit.shape[1])
+    matrix[:, every, every] = np.where(free, matrix[:, every, every], 1.0)
+    step = -np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
+    trying = np.flatnonzero(-0.5 * (gradient * step).sum(axis=1) >= _POLISHED)
+    gained: list[Indices] = []
+    for _ in range(5):
+        if not len(trying):
+            break
+        moved = np.clip(fit[trying] + step[trying], low[trying], high[trying])
+        tried = fitter.settle(fitter.evaluate(replace(part.points[trying], fit=moved)), 1)
+        better = tried.cost < part.cost[trying] - 0.2 * _POLISHED
+        growth = None if part.growth is None else part.growth[trying]
+        at = fitter.replaced(at, moving[trying[better]], replace(tried, growth=growth)[better])
+        gained.append(moving[trying[better]])
+        trying = trying[~better]
+        step = step / 3
+    return np.sort(np.concatenate([*gained, np.zeros(0, dtype=np.intp)])), at
+
+
+def log_box(mean: Floats, covariance: Floats, low: Floats, high: Floats) -> float:
+    """The logarithm of the probability of low < x < high for x ~ N(mean, covariance).
+
+    The bound that the mean is farthest beyond comes first: what goes with it beyond others comes back within them.
+    """
+    mean, covariance = mean.copy(), covariance.copy()
+    total, left = 0.0, np.ones(len(mean), dtype=bool)
+    while left.any():
+        deviation = np.sqrt(np.diag(covariance))
+        beyond = np.where(left, np.maximum(low - mean, mean - high) / deviation, -np.inf)
+        place = int(np.argmax(beyond))
+        if beyond[place] < -_NEAR:
+            break
+        left[place] = False
+        sd = float(deviation[place])
+        a, b = (low[place] - mean[place]) / sd, (high[place] - mean[place]) / sd
+        if a > 0:  # the far tail is computed on the side where it is small
+            a, b, sign = -b, -a, -1.0
+        else:
+            sign = 1.0
+        log_mass = _log_between(a, b)
+        total += log_mass
+        # Mean and variance of the truncated normal, and what they do to the others
+        density_a, density_b = (np.exp(-0.5 * x * x - 0.5 * np.log(2 * np.pi) - log_mass) for x in (a, b))
+        first = density_a - density_b
+        tail = (a * density_a if np.isfinite(a) else 0.0) - (b * density_b if np.isfinite(b) else 0.0)
+        variance = float(np.clip(1 + tail - first**2, 1e-6, 1.0))
+        gain = covariance[:, place] / sd
+        mean = mean + gain * sign * first
+        covariance = covariance - np.outer(gain, gain) * (1 - variance)
+    return total
+
+
+def _log_between(a: float, b: float) -> float:
+    """log(Φ(b) − Φ(a)), a < b and a ≤ 0."""
+    upper, lower = log_ndtr(b), log_ndtr(a)
+    return float(upper + np.log1p(-np.exp(min(lower - upper, -1e-15))))
+
 
 _TRUSTED = 1.0  # gain in log posterior within which an integral was begun at the most probable point
 _LOOSE = 0.3  # standard deviation beyond which a logarithmic parameter is integrated over: a factor of 1.35
@@ -247,3 +500,177 @@ def _over_gain(fitter: Fitter, at: Evaluated) -> Floats:
 def _stride(curvature: Floats) -> Floats:
     """One standard deviation, or what resolves how the priors of scatter fall off."""
     return np.asarray(np.maximum(curvature, _LONGEST_STRIDE**-2) ** -0.5)
+
+
+_OPEN = 0.3  # of the range between bounds: a uniform distribution has 0.29
+_TRADED = 0.9  # correlation of two parameters that trade against each other
+_CELLS = 5  # of the range, at whose middles the parameter is held
+
+
+@dataclass(frozen=True)
+class Part:
+    """Of a posterior: its probability, and the normal distribution of the fit coordinates there."""
+
+    share: float
+    fit: Floats  # (parameters,)
+    covariance: Floats  # (mean parameters, mean parameters)
+
+
+def parts(evidence: Evidence, place: int) -> list[Part]:
+    """The posterior of a parameter, by its place, and of all others.
+
+    In one part, as the quadratic has it; or in as many as the range of the parameter that it trades against is divided
+    into, where the recordings leave that parameter open between its bounds.
+    """
+    open_place = _traded(evidence, place)
+    if open_place is None:
+        return [Part(1.0, evidence.point.fit, evidence.covariance)]
+    low, high = evidence.hypothesis.model.parameters[open_place].bounds
+    values = low + (high - low) * (np.arange(_CELLS) + 0.5) / _CELLS
+    found = _along(evidence, open_place, values)
+    logs = np.array([entry.log_evidence for entry in found])
+    shares = np.exp(logs - np.logaddexp.reduce(logs))
+    mean_places = np.array(evidence.hypothesis.mean_places)
+    free, cell = np.flatnonzero(mean_places != open_place), int(np.flatnonzero(mean_places == open_place)[0])
+    each = []
+    for share, entry in zip(shares.tolist(), found, strict=True):
+        covariance = np.zeros_like(evidence.covariance)
+        covariance[np.ix_(free, free)] = entry.covariance
+        covariance[cell, cell] = ((high - low) / _CELLS) ** 2 / 12  # anywhere in its cell
+        each.append(Part(share, entry.point.fit, covariance))
+    return each
+
+
+def _along(evidence: Evidence, place: int, values: Floats) -> list[Evidence]:
+    """The evidence with a parameter held at each of these values, all others fitted again.
+
+    From one value to the next, away from the most probable one: along a straight line, samples lose their contact.
+    """
+    held = Fitter([evidence.hypothesis], held=[(place,)])
+    middle = float(evidence.point.fit[place])
+    reached: dict[float, FitPoint] = {middle: evidence.point}
+    found: dict[float, Evidence] = {}
+    for value in sorted(values.tolist(), key=lambda value: abs(value - middle)):
+        begin = held_points(held, [evidence], [place], [0], np.array([value]))
+        if len(reached) > 1:
+            near, far = sorted(reached, key=lambda other: abs(other - value))[:2]
+            step = (reached[near].fit - reached[far].fit) * (value - near) / (near - far)
+            begin = held.at(replace(reached[near], fit=np.clip(reached[near].fit + step, held.low[0], held.high[0])))
+        (found[value],) = around(held, held.descend(held.settle(held.evaluate(begin), 1), 1))
+        reached[value] = found[value].point
+    return [found[value] for value in values.tolist()]
+
+
+def _traded(evidence: Evidence, place: int) -> int | None:
+    """The place of the mechanisms' parameter between bounds alone that a parameter trades against; None for none."""
+    hypothesis = evidence.hypothesis
+    deviations = np.sqrt(np.diag(evidence.covariance))
+    row = hypothesis.mean_places.index(place)
+    correlations = np.abs(evidence.covariance[row]) / (deviations[row] * deviations)
+    for index, other in enumerate(hypothesis.mean_places):
+        entry = hypothesis.model.parameters[other]
+        low, high = entry.bounds
+        between = other < hypothesis.own_parameters and isinstance(entry.prior, Uniform) and entry.scale == "linear"
+        if between and correlations[index] > _TRADED and deviations[index] > _OPEN * (high - low):
+            return other
+    return None
+
+
+_PLACES = 24
+
+
+@dataclass(frozen=True)
+class Normals:
+    """A mixture of normal distributions of one fit coordinate; `share` (normals,) need not sum to 1."""
+
+    share: Floats
+    mean: Floats
+    deviation: Floats
+
+    def times(self, factor: float) -> "Normals":
+        """With every share so many times as large."""
+        return Normals(factor * self.share, self.mean, self.deviation)
+
+    def moved(self, by: float) -> "Normals":
+        """With every mean so much larger."""
+        return Normals(self.share, self.mean + by, self.deviation)
+
+
+def together(several: Sequence[Normals]) -> Normals:
+    """All normals of several mixtures."""
+    return Normals(
+        *(np.concatenate([getattr(one, name) for one in several]) for name in ("share", "mean", "deviation"))
+    )
+
+
+def over_spread(fitter: Fitter, at: Evaluated, place: int) -> list[Normals] | None:
+    """The parameter at a place among the model's, around each of several points of one hypothesis; None where that has
+    no free spread.
+
+    The shares of each sum to 1.
+    """
+    hypothesis = fitter.hypotheses[0]
+    spreads = [entry for entry in hypothesis.model.parameters if entry.acts_on == "gain_spread"]
+    if not spreads:
+        return None
+    column = [entry.name for entry in hypothesis.covariance].index(spreads[0].name)
+    low, high = spreads[0].bounds
+    several = at[np.repeat(np.arange(len(at)), _PLACES)]
+    covariance = several.points.covariance.copy()
+    covariance[:, column] = np.tile(low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES, len(at))
+    moved = fitter.weighed(fitter.with_covariance(several.points, covariance), several.products)
+    moved = replace(moved, growth=several.growth)
+    values, covariances = around_mean(fitter, moved)
+    free = np.flatnonzero(fitter.free[0])
+    index = int(np.searchsorted(free, place))
+    information, gradient = fitter.posterior_equations(moved)
+    step = np.linalg.solve(information[:, free[:, None], free], gradient[:, free, None])[:, index, 0]
+    mean = moved.points.fit[:, place] + step
+    deviation = np.sqrt([covariance[index, index] for covariance in covariances])
+    return [
+        Normals(_shares(values[own]), mean[own], deviation[own])
+        for own in (slice(first, first + _PLACES) for first in range(0, len(values), _PLACES))
+    ]
+
+
+def _shares(values: Floats) -> Floats:
+    share = np.exp(values - values.max())
+    return np.asarray(share / share.sum())
+
+
+_FALL = 1.92  # of the log posterior density at the ends: half of the 95 % quantile of χ² with one degree of freedom
+_STRIDES = 8
+
+
+def profile_end(evidence: Evidence, place: int, limit: float) -> float | None:
+    """Where between a limit and the most probable value the log posterior density has fallen by 1.92.
+
+    Parameters
+    ----------
+    evidence
+        The fit.
+    place
+        Of the parameter among the model's; the others are fitted anew at each of its values.
+    limit
+        Fit coordinate.
+
+    Returns
+    -------
+    float or None
+        Fit coordinate; None where the density has not fallen that far at the limit: the interval goes beyond it.
+    """
+    entry = evidence.hypothesis.model.parameters[place]
+    middle = float(evidence.point.fit[place])
+    values = np.linspace(np.clip(limit, *entry.bounds), middle, _STRIDES, endpoint=False)
+    held = Fitter([evidence.hypothesis], held=[(place,)])
+    begun = held.evaluate(held_points(held, [evidence], [place], [0] * _STRIDES, values))
+    fitted = held.descend(held.settle(begun, 1), 1)
+    priors = np.array([entry.log_prior(value) for value in values.tolist()])
+    fallen = np.append(fitted.cost - priors - evidence.cost, 0.0)
+    beyond = np.flatnonzero(fallen > _FALL)
+    if not len(beyond):
+        return None
+    values = np.append(values, middle)
+    last = int(beyond[-1])
+    share = (fallen[last] - _FALL) / (fallen[last] - fallen[last + 1])
+    return float(values[last] + share * (values[last + 1] - values[last]))

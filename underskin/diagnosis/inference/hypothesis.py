@@ -1,25 +1,375 @@
-"""One hypothesis: a model, the lines it is to explain, and the coordinates in which it is fitted."""
+"""One hypothesis: a model, its priors, the points at which it is looked at, and the likelihood of its predictions.
+
+How probable the recordings are under predictions, with all of their noise marginalised exactly.
+
+Recording i of sensor s, rows j:  y_ij = m_ij (1 + g_i) e^(b_s) + ∂m_ij·δ_i + n_ij, with
+    n ~ N(0, κ² d_ij² + q_ij²) in real and imaginary part, g ~ N(0, s²), δ ~ N(0, p² I), b ~ N(0, τ²);
+q is mains pick-up, 0 on most rows.
+The contact's place scales a recording by a real factor, so m = L u and ∂m = t u have one direction u in each recording.
+C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², with m = a u; sensors add τ² m mᵀ over their
+recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and in
+recordings. The covariance follows the model, so log|C| stays.
+
+e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
+extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above, with H of
+the base model.
+
+What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording. How σ bends
+around each contact's commanded place, in the base model: positioning scatter in second order. Points of several
+hypotheses, one after another, and what was worked out there. What other recordings say of a model's parameters:
+Laplace's approximation of their likelihood, a quadratic. One hypothesis: a model, the lines it is to explain, and the
+coordinates in which it is fitted.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
+from underskin.autodiff import contiguous
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.curve_products import CurveLines, CurveProducts
-from underskin.diagnosis.inference.frf_products import FrfLines, frf_lines
-from underskin.diagnosis.inference.knowledge import Knowledge
-from underskin.diagnosis.inference.likelihood import Curvature
-from underskin.diagnosis.inference.pickup_rows import PickupRows, pickup_rows
-from underskin.diagnosis.noise.correlated_error import USUAL
-from underskin.diagnosis.noise.noise_priors import GAIN_PRIOR, POSITION_PRIOR, Plateau, level_prior
-from underskin.mechanisms.models.composed import Model
+from underskin.diagnosis.inference.products import (
+    CurveLines,
+    CurveProducts,
+    FrfLines,
+    PickupRows,
+    Products,
+    frf_lines,
+    pickup_rows,
+)
+from underskin.diagnosis.noise import (
+    GAIN_PRIOR,
+    POSITION_PRIOR,
+    USUAL,
+    NoiseLevels,
+    Plateau,
+    SeveralLevels,
+    level_prior,
+)
+from underskin.mechanisms.models.composed import Model, compose
 from underskin.mechanisms.models.composition import parameters_together
 from underskin.mechanisms.models.curves import CurveModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.units import Floats
+from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats, Indices, Mask
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """Of σ over the contact's place, relative to σ (recordings,) [1/m²] and [1/m⁴]: ∇²σ/σ and tr(H²)/σ²."""
+
+    laplacian: Floats
+    square: Floats
+
+
+def log_likelihoods(
+    lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
+) -> Floats:
+    """Of predictions at several points, each at some sets of noise levels (points, sets, 1): (points, sets).
+
+    `bend` (points, sensors).
+    """
+    from underskin.diagnosis.inference.kernels import log_likelihoods as add
+
+    sums = products.summed(levels)
+    about_means, numbers = lines.about_means
+    further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
+    each = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
+    slopes = products.place_slopes
+    place = np.zeros((len(bend), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
+    yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
+    arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, place))
+    add(*arrays, lines.sensor, contiguous(bend), curvature.laplacian, curvature.square, noise, each)
+    return each
+
+
+def normal_equations(
+    lines: Lines,
+    curvature: Curvature,
+    products: Products,
+    levels: SeveralLevels,
+    bend: Floats,
+    growth: Floats | None = None,
+) -> tuple[Floats, Floats]:
+    """Jᵀ C⁻¹ J (points, P, P), the information on the parameters, and the gradient of the log likelihood (points, P),
+    at the first set of noise levels.
+
+    The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r). How the
+    position's slopes t change is told by their `growth` ∂ log |t|²/∂θ (points, recordings, P), finite where known;
+    else they are taken to change as L does, or where they lead, not at all.
+    """
+    from underskin.diagnosis.inference.kernels import normal_equations as fill
+
+    sums, slope_sums = products.summed(levels), products.slope_sums(levels)
+    points, recordings = products.level.shape
+    uu, uy = (np.broadcast_to(x[:, 0], (points, recordings)) for x in (sums.uu, sums.uy))
+    none = np.zeros((points, recordings, 0))
+    by_level = none if products.level_slopes is None else products.level_slopes
+    turned = (none, none, none[..., None]) if slope_sums is None else (slope_sums.uv, slope_sums.vy, slope_sums.vv)
+    slopes = products.place_slopes if np.any(levels.position) else None
+    place = np.zeros((points, 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
+    count = max(by_level.shape[-1], turned[0].shape[-1])
+    information, gradient = np.empty((points, count, count)), np.empty((points, count))
+    arrays = products.level, by_level, uu, uy, *turned, place, none if growth is None else growth
+    of_place = curvature.laplacian, curvature.square
+    fill(*map(contiguous, arrays), lines.sensor, contiguous(bend), *of_place, contiguous(noise), information, gradient)
+    return information, gradient
+
+
+class Likelihoods:
+    """Of predictions at several points, each at some sets of noise levels."""
+
+    def __init__(
+        self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
+    ) -> None:
+        """Levels are (points, sets, 1), `bend` (points, sensors)."""
+        self.levels, self._products, self._curvature = levels, products, curvature
+        self._sensors = lines.sensors
+        self._bend = own = bend[:, None, lines.sensor]
+        k2, p2 = levels.level**2, levels.position**2
+        sums = products.summed(levels)
+        self._factor = factor = np.exp(own + 0.5 * p2 * curvature.laplacian)
+        a = products.level[:, None] * factor
+        uu, ur = sums.uu / k2, (sums.uy - a * (1 - own) * sums.uu) / k2
+        variance = (levels.gain**2 + 0.5 * p2**2 * curvature.square) * a**2
+        if products.place_slopes is not None:
+            variance = variance + p2 * (products.place_slopes**2).sum(axis=0)[:, None] * factor**2
+        reduced = 1 / (1 + variance * uu)  # 1 − (share of u taken out)
+        self._shrink, self._weight = variance * reduced, a * reduced
+        tau2 = levels.spread**2
+        self._sensor_mr = (a * ur * reduced) @ self._sensors
+        self._sensor_shrink = tau2 / (1 + tau2 * ((a**2 * uu * reduced) @ self._sensors))
+
+    @property
+    def sensor_gains(self) -> Floats:
+        """The most probable b of each sensor (points, sensors), at the first set of noise levels."""
+        return np.asarray((self._sensor_shrink * self._sensor_mr)[:, 0])
+
+    def along(self, position: float) -> tuple[Floats, Floats, Floats]:
+        """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
+        weights that leave out κ."""
+        sums = self._products.summed(self.levels)
+        bend, level = self._bend[0, 0], self._products.level[0]
+        uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
+        a = level * np.exp(bend + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - bend) * uu, uu
+
+    @property
+    def slopes_along(self) -> Floats:
+        """Re u*J of the first point's recordings (recordings, P), with the same weights."""
+        uu, factor = self._products.summed(self.levels).uu[0, 0], self._factor[0, 0]
+        by_level, sums = self._products.level_slopes, self._products.slope_sums(self.levels)
+        along = 0.0 if by_level is None else by_level[0] * (factor * uu)[:, None]
+        return np.asarray(along if sums is None else along + sums.uv[0] * (factor * self._products.level[0])[:, None])
+
+    def information(self, uj: Floats, square: Floats) -> Floats:
+        """Jᵀ C⁻¹ J (points, P, P) of any J at the first set of noise levels, from Re u*J of the recordings (points,
+        recordings, P) and Re JᵀJ (points, P, P), both over κ²."""
+        by_sensor = np.swapaxes(np.swapaxes(uj * self._weight[:, 0, :, None], 1, 2) @ self._sensors, 1, 2)
+        shared = by_sensor.transpose(0, 2, 1) @ (by_sensor * self._sensor_shrink[:, 0, :, None])
+        return np.asarray(square - np.einsum("nrp,nr,nrq->npq", uj, self._shrink[:, 0], uj, optimize=True) - shared)
+
+
+@dataclass(frozen=True)
+class CellResponse:
+    """The most probable zero and drift (rows,) [N], gain (recordings,) relative, and the variance (rows,) [N²] that
+    not knowing them leaves."""
+
+    offset: Floats
+    gain: Floats
+    variance: Floats
+
+    def reading(self, lines: Lines, force: Floats) -> Floats:
+        """What the cells show of a force (rows,) [N]."""
+        return force * (1 + self.gain[lines.recording]) + self.offset
+
+
+def cell_response(lines: Lines, levels: NoiseLevels, force: Floats, known: Mask | None = None) -> CellResponse:
+    """From the rows that are `known` (default: all): y = F (1 + g) + P c + ε, with the priors of g and c.
+
+    `force` (rows,) is what is predicted without them.
+    """
+    assert lines.smooth is not None
+    known = np.ones(len(force), dtype=bool) if known is None else known
+    offset, variance, gain = np.zeros(len(force)), np.zeros(len(force)), []
+    for own in lines.spans:
+        design = np.column_stack([levels.gain * force[own], lines.smooth.columns[own]])
+        rows = np.flatnonzero(known[own])
+        of_known = lines.smooth.part(own.start + rows)
+        noise = of_known.covariance(levels.smooth) + np.diag((levels.level * lines.deviation[own][rows]) ** 2)
+        weighed = np.linalg.solve(noise, design[rows])
+        information = np.eye(design.shape[1]) + design[rows].T @ weighed
+        coefficients = np.linalg.solve(information, weighed.T @ (lines.value.real[own] - force[own])[rows])
+        offset[own] = design[:, 1:] @ coefficients[1:]
+        gain.append(levels.gain * coefficients[0])
+        variance[own] = np.einsum("ri,ij,rj->r", design, np.linalg.inv(information), design)
+    return CellResponse(offset, np.array(gain), variance)
+
+
+_STEP = 0.05  # of the finite difference, in h; σ turns over lengths of 0.3 h and more
+_DIGITS = 9  # of a place beside its sensor [mm]
+_LEAST = 0.2  # of the largest σ: nearer to where σ crosses zero, its first derivative says what scatter does
+
+
+def curvature(lines: Lines, table: SigmaTable) -> Curvature:
+    """∇²σ/σ and tr(H²)/σ² of each recording's contact, at the declared E and h; `lines` are collapsed."""
+    campaign = lines.campaign
+    assert campaign.skin.thickness_mm is not None
+    step = _STEP * campaign.skin.thickness_mm
+    sensors = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    contacts: dict[tuple[float, ...], tuple[int, FrfConditions]] = {}  # alike in the base model: a place among them
+    alike = []
+    for entry in frf_of(campaign):
+        x, y = entry.position_mm or sensors[entry.sensor]
+        own_x, own_y = sensors[entry.sensor]
+        key = entry.preload_n, entry.indenter_radius_mm, round(x - own_x, _DIGITS), round(y - own_y, _DIGITS)
+        alike.append(contacts.setdefault(key, (len(contacts), entry))[0])
+    moved = []
+    for number, (x, y) in enumerate(((0.0, 0.0), (step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step))):
+        for _, entry in contacts.values():
+            place = entry.position_mm or sensors[entry.sensor]
+            here = (place[0] + x, place[1] + y)
+            moved.append(entry.without_measurements(id=f"{number} {entry.id}", position_mm=here))
+    model = compose((), Conditions(campaign.name, campaign.skin, tuple(moved)), table, "frf")
+    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
+    assert prediction.position_slopes is not None
+    value, *_ = np.split(prediction.value.real, 5)
+    _, right, left, up, down = np.split(prediction.position_slopes.real, 5, axis=1)
+    hessian_x, hessian_y = (right - left) / (2e-3 * step), (up - down) / (2e-3 * step)
+    scale = np.where(np.abs(value) > _LEAST * np.abs(value).max(), value, np.inf)
+    square = (hessian_x**2).sum(axis=0) + (hessian_y**2).sum(axis=0)
+    return Curvature(((hessian_x[0] + hessian_y[1]) / scale)[alike], (square / scale**2)[alike])
+
+
+@dataclass(frozen=True)
+class Points:
+    """Where fits stand: coordinates of the models (points, parameters), of the covariance, and the sensors' log gains.
+
+    `owner` says which hypothesis each point is of, in rising order; models with fewer parameters than others have
+    zeros behind their own.
+    """
+
+    owner: Indices
+    fit: Floats
+    covariance: Floats
+    bend: Floats
+
+    def __len__(self) -> int:
+        return len(self.owner)
+
+    def __getitem__(self, points: Indices | Mask | slice) -> "Points":
+        return Points(self.owner[points], self.fit[points], self.covariance[points], self.bend[points])
+
+
+def together(one: Points, other: Points) -> Points:
+    """The points of both, which are of one hypothesis."""
+    names = "owner", "fit", "covariance", "bend"
+    return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
+
+
+def alone(points: Points, owner: int, count: int) -> Points:
+    """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
+    own = points[points.owner == owner]
+    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.bend)
+
+
+def stacked(points: Sequence[Points]) -> Points:
+    """Points of several hypotheses, of the first, the second and so on, in this order."""
+    owner = np.repeat(np.arange(len(points)), [len(entry) for entry in points])
+    fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
+    for number, entry in enumerate(points):
+        fit[owner == number, : entry.fit.shape[1]] = entry.fit
+    covariance, bend = (np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "bend"))
+    return Points(owner, fit, covariance, bend)
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
+
+    `growth` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a fit has not
+    needed it yet.
+    """
+
+    points: Points
+    products: Products
+    cost: Floats
+    growth: Floats | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def some(self, points: Indices) -> "Evaluated":
+        """At some of the points, in their order: itself where that is all of them."""
+        return self if len(points) == len(self) else self[points]
+
+    def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
+        if isinstance(points, np.ndarray) and points.dtype == bool and points.all():
+            return self
+        growth = None if self.growth is None else self.growth[points]
+        return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
+
+    def best(self) -> Indices:
+        """The point of least cost of each hypothesis that has one."""
+        order = np.lexsort((self.cost, self.points.owner))
+        owner = self.points.owner[order]
+        return order[np.append(True, owner[1:] != owner[:-1])] if len(order) else order
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """ln L(x) = height + linear·x − ½ xᵀ precision x, in a model's fit coordinates x (parameters,)."""
+
+    precision: Floats  # (parameters, parameters)
+    linear: Floats  # (parameters,)
+    height: float
+
+    @classmethod
+    def of(cls, matrix: Floats, offset: Floats, mean: Floats, precision: Floats, height: float) -> Self:
+        """From a normal likelihood of quantities q = matrix x + offset: height − ½ (q − mean)ᵀ precision (q − mean)."""
+        away = offset - mean
+        return cls(
+            matrix.T @ precision @ matrix, -matrix.T @ precision @ away, float(height - 0.5 * away @ precision @ away)
+        )
+
+    def __add__(self, other: "Knowledge") -> "Knowledge":
+        return Knowledge(self.precision + other.precision, self.linear + other.linear, self.height + other.height)
+
+    def log_density(self, fit: Floats) -> float:
+        """ln L at one point (parameters,)."""
+        return float(self.height + self.linear @ fit - 0.5 * fit @ self.precision @ fit)
+
+
+class KnowledgeOfSeveral:
+    """That of several hypotheses, whose parameters are padded to equally many."""
+
+    def __init__(self, each: Sequence[Knowledge | None], most: int) -> None:
+        """None where nothing is known beside the recordings themselves."""
+        self._precision, self._linear = np.zeros((len(each), most, most)), np.zeros((len(each), most))
+        self._height = np.zeros(len(each))
+        for number, one in enumerate(each):
+            if one is not None:
+                count = len(one.linear)
+                self._precision[number, :count, :count] = one.precision
+                self._linear[number, :count], self._height[number] = one.linear, one.height
+
+    def log_densities(self, points: Points) -> Floats:
+        """ln L at points (points,)."""
+        owner, fit = points.owner, points.fit
+        bent = np.einsum("np,npq,nq->n", fit, self._precision[owner], fit)
+        return np.asarray(self._height[owner] + (self._linear[owner] * fit).sum(axis=1) - 0.5 * bent)
+
+    def equations(self, points: Points) -> tuple[Floats, Floats]:
+        """Information (points, parameters, parameters) and gradient (points, parameters) of ln L."""
+        precision = self._precision[points.owner]
+        return precision, self._linear[points.owner] - np.einsum("npq,nq->np", precision, points.fit)
+
 
 _LEVELS = (0.1, 100.0)  # bounds of the lines' level
 _CURVE_LEVELS = (0.3, 5.0)  # no cell is more accurate, however smooth; rougher than its neighbours differ is no noise

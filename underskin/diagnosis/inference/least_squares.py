@@ -15,11 +15,9 @@ from scipy.optimize import least_squares
 
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.hypothesis import Hypothesis, curvature_of_prior
-from underskin.diagnosis.noise.correlated_error import USUAL_DRIFT
-from underskin.diagnosis.noise.noise_priors import START_GAIN
+from underskin.diagnosis.noise import START_GAIN, USUAL_DRIFT
 from underskin.mechanisms.models.curves import CurveModel
-from underskin.recordings.campaign import CurveRecording
-from underskin.recordings.conditions import CurveConditions, curves_of
+from underskin.recordings.campaign import CurveConditions, CurveRecording, curves_of
 from underskin.recordings.curve_course import course, touch
 from underskin.units import Floats, Mask
 

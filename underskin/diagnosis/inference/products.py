@@ -3,15 +3,485 @@
 A prediction is m = L u in each recording: of FRFs L is the level, which is real, and u the dynamics' factor line by
 line, 1 where there are none; of curves L = 1 and u is the force, turned such that samples are independent. With 1/d² as
 the weight of rows (of curves what whitening makes of it), the sums of each recording are Re u*u, Re u*y and |y|², and
-with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …).
+with the derivatives v of u, Re u*v, Re v*y and Re v*v. Arrays are (points, recordings, …). Rows that mains pick-up
+reaches weigh less, the more of it there is, and sums over rows lose as much.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Self
 
 import numpy as np
+from scipy.sparse import csr_array
 
-from underskin.diagnosis.inference.curve_products import CurveProducts
-from underskin.diagnosis.inference.frf_products import FrfProducts
+from underskin.autodiff import Differentiated, contiguous
+from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.noise import SeveralLevels
+from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, Response
+from underskin.units import Array, Floats, Indices
+from underskin.weak_cache import cached_while_alive
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Re u*u, Re u*y and |y|² of each recording, and what the noise levels add to the log of the determinant.
+
+    Of FRFs |y|² is that of each recording's mean: the rest is the same in all models (`Lines.about_means`).
+    """
+
+    uu: Floats
+    uy: Floats
+    yy: Floats
+    log_determinant: Floats | float
+
+
+@dataclass(frozen=True)
+class SlopeSums:
+    """Re u*v and Re v*y (points, recordings, parameters), and Re v*v (points, recordings, parameters, parameters)."""
+
+    uv: Floats
+    vy: Floats
+    vv: Floats
+
+    def __getitem__(self, points: Array | slice) -> "SlopeSums":
+        """At some of the points."""
+        return SlopeSums(self.uv[points], self.vy[points], self.vv[points])
+
+    @classmethod
+    def joined(cls, parts: Sequence["SlopeSums"]) -> Self:
+        """At the points of several, one after another."""
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("uv", "vy", "vv")))
+
+
+class PickupRows:
+    """Of all rows of the lines, those that pick-up reaches, in order of recordings.
+
+    Attributes: `lines`, which of a model's distinct lines they are on; `line`, which of these each row is on; `every`,
+    the rows themselves.
+    """
+
+    def __init__(self, lines: Lines, pickup: Pickup, design: FrfDesign) -> None:
+        """The design says which distinct line each row of all is."""
+        rows = pickup.rows
+        self._precision = lines.deviation[rows] ** -2.0
+        self._value = contiguous(lines.value[rows])
+        self._recordings = lines.recordings
+        self._recording = lines.recording[rows]
+        self._alike = np.arange(len(rows)) if pickup.alike is None else pickup.alike
+        self.lines, line = np.unique(design.line[rows], return_inverse=True)
+        self.line: Indices = line.reshape(-1)
+        self.every: Indices = np.arange(len(rows))
+
+    def less(self, sums: Sums, line: Indices, u: Array, pickup: Floats, level: Floats) -> Sums:
+        """The sums less what rows lose to pick-up of these distinct deviations (points, sets, distinct), at the
+        directions u (points, lines) of the rows on these lines (rows,)."""
+        from underskin.diagnosis.kernels import lost
+
+        shape = *level.shape[:2], self._recordings
+        uu, uy, yy = (np.broadcast_to(x, shape).copy() for x in (sums.uu, sums.uy, sums.yy))
+        log_determinant = np.zeros(shape[:2])
+        square = np.ascontiguousarray(np.swapaxes((pickup / level) ** 2, 1, 2))
+        of_rows = self._alike, self._precision, self._recording, self._value, line
+        lost(square, *of_rows, contiguous(u.astype(complex, copy=False)), uu, uy, yy, log_determinant)
+        return Sums(uu, uy, yy, log_determinant[..., None])
+
+    def slopes_less(
+        self, sums: SlopeSums, line: Indices, u: Array, v: Array, pickup: Floats, level: Floats
+    ) -> SlopeSums:
+        """The sums with derivatives v (points, parameters, lines) less what rows lose, likewise; deviations are
+        (points, distinct), levels (points,)."""
+        from underskin.diagnosis.kernels import slopes_lost
+
+        square = contiguous((pickup / level[:, None]) ** 2)
+        of_rows = self._alike, self._precision, self._recording, self._value, line
+        directions = (contiguous(x.astype(complex, copy=False)) for x in (u, v))
+        uv, vy, vv = (np.array(x) for x in (sums.uv, sums.vy, sums.vv))
+        slopes_lost(square, *of_rows, *directions, uv, vy, vv)
+        return SlopeSums(uv, vy, vv)
+
+
+@cached_while_alive  # a diagnosis weighs dozens of models of one design
+def pickup_rows(lines: Lines, pickup: Pickup, design: FrfDesign) -> PickupRows:
+    """Those of these lines that a pick-up reaches, for models of this design."""
+    return PickupRows(lines, pickup, design)
+
+
+class CurveLines:
+    """The measured samples of curves, turned to where their covariance is diagonal."""
+
+    def __init__(self, lines: Lines) -> None:
+        """Turn them; needs the lines' smooth error."""
+        assert lines.whitening is not None
+        self.whitening = lines.whitening
+        self.first = lines.first
+        self.measured = self.whitening.turned(lines.value.real)
+        self.columns = self.whitening.columns
+
+    def sums(self, products: Floats) -> Floats:
+        """Over the samples of each recording (…, samples) to (…, recordings)."""
+        return np.add.reduceat(products, self.first, axis=-1)
+
+
+@dataclass(frozen=True)
+class CurveProducts:
+    """Of curves: forces (points, samples) and derivatives (points, parameters, samples) on turned samples."""
+
+    lines: CurveLines
+    force: Floats
+    force_slopes: Floats | None
+    level_slopes = None
+    place_slopes = None
+
+    @classmethod
+    def of(cls, lines: CurveLines, force: Floats, slopes: Floats | None) -> Self:
+        """Of a model's predictions (points, samples), and of their derivatives."""
+        turned = lines.whitening.turned
+        return cls(lines, turned(force), None if slopes is None else turned(slopes))
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        slopes = None if self.force_slopes is None else self.force_slopes[points]
+        return replace(self, force=self.force[points], force_slopes=slopes)
+
+    @property
+    def values(self) -> Self:
+        """Without derivatives by the parameters."""
+        return replace(self, force_slopes=None)
+
+    @property
+    def level(self) -> Floats:
+        """1: the force is the direction."""
+        return np.ones((len(self.force), len(self.lines.first)))
+
+    def summed(self, levels: SeveralLevels) -> Sums:
+        """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
+        taken = _Taken(self.lines, levels)
+        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
+        by_force, by_measured = taken.along(force), taken.along(measured)
+        uu = taken.products(force, force, by_force, by_force)
+        uy = taken.products(force, measured, by_force, by_measured)
+        yy = taken.products(measured, measured, by_measured, by_measured)
+        return Sums(uu, uy, yy, taken.log_determinant)
+
+    def slope_sums(self, levels: SeveralLevels) -> SlopeSums:
+        """The sums with derivatives, at the first of the sets of noise levels."""
+        slopes = self.force_slopes
+        assert slopes is not None
+        taken = _Taken(self.lines, levels.at_first)
+        force, measured = self.force[:, None], np.broadcast_to(self.lines.measured, (1, 1, self.force.shape[-1]))
+        by_slopes = taken.along(slopes)  # (points, parameters, recordings, columns)
+        uv = taken.products(slopes, force, by_slopes, taken.along(force))
+        vy = taken.products(slopes, measured, by_slopes, taken.along(measured))
+        return SlopeSums(np.moveaxis(uv, 1, -1), np.moveaxis(vy, 1, -1), taken.squares(slopes, by_slopes))
+
+    def of_rows(self, rows: Floats, levels: SeveralLevels) -> tuple[Floats, Floats]:
+        """Re u*J (recordings, P) and Re JᵀJ (P, P) of changes of the force J (P, samples), at the first point and set
+        of noise levels."""
+        taken = _Taken(self.lines, levels.at_first)
+        turned, force = self.lines.whitening.turned(rows)[None], self.force[:1, None]
+        by_rows = taken.along(turned)
+        along = taken.products(turned, force, by_rows, taken.along(force))
+        return along[0].T, taken.squares(turned, by_rows)[0].sum(axis=0)
+
+
+class _Taken:
+    """Products under the covariance κ² D + η² B + P Pᵀ, by Woodbury's identity; what P takes out of them."""
+
+    def __init__(self, lines: CurveLines, levels: SeveralLevels) -> None:
+        """At noise levels (points, sets, 1)."""
+        ratio = levels.smooth / levels.level
+        self._lines = lines
+        self.weight = lines.whitening.weight(ratio)  # (points, sets, rows)
+        count = len(lines.columns)
+        one, other = np.triu_indices(count)
+        square = lines.sums(self.weight[..., None, :] * (lines.columns[one] * lines.columns[other]))
+        matrix = np.empty((*square.shape[:-2], square.shape[-1], count, count))
+        matrix[..., one, other] = matrix[..., other, one] = np.moveaxis(square, -2, -1)
+        level = levels.level[..., None, None] ** 2
+        whole = matrix + level * np.eye(count)
+        self.inverse = np.linalg.inv(whole)  # (points, sets, recordings, columns, columns)
+        _, log = np.linalg.slogdet(whole / level)
+        self.log_determinant = lines.whitening.log_determinant(ratio) + log.sum(axis=-1, keepdims=True)
+
+    def along(self, rows: Floats) -> Floats:
+        """Pᵀ times turned rows (points, sets, rows): (points, sets, recordings, columns)."""
+        weighed = (self.weight * rows)[..., None, :] * self._lines.columns
+        return np.moveaxis(self._lines.sums(weighed), -2, -1)
+
+    def squares(self, rows: Floats, by_rows: Floats) -> Floats:
+        """Of turned rows (points, P, samples) with each other (points, recordings, P, P), at the first set."""
+        edges = [*self._lines.first, rows.shape[-1]]
+        weighed = self.weight * rows
+        whole = [weighed[..., low:high] @ rows[..., low:high].transpose(0, 2, 1) for low, high in pairwise(edges)]
+        columns = np.moveaxis(by_rows, 1, 2)  # (points, recordings, P, columns)
+        return np.asarray(np.stack(whole, axis=1) - columns @ self.inverse[:, 0] @ columns.swapaxes(-1, -2))
+
+    def products(self, rows: Floats, others: Floats, by_rows: Floats, by_others: Floats) -> Floats:
+        """Of turned rows (points, sets, rows) of each recording."""
+        whole = self._lines.sums(self.weight * rows * others)
+        less = ((by_rows[..., None, :] @ self.inverse)[..., 0, :] * by_others).sum(axis=-1)
+        return np.asarray(whole - less)
+
+
+_LARGE, _FULL = 2000, 0.7  # rows for each contact, and their share of a block, from which on a block is dense
+
+
+class FrfLines:
+    """The measured lines of FRFs as sums of what a model's distinct lines have over the rows of each recording.
+
+    `weight` are those with 1/d², `real` and `imag` with the parts of y/d²; `uu`, `uy` and `yy` are sums for u = 1.
+    """
+
+    def __init__(self, lines: Lines, design: FrfDesign) -> None:
+        """Place the weights; the design says which distinct line each row is."""
+        weight = lines.deviation**-2.0
+        rows = weight, weight * lines.value.real, weight * lines.value.imag
+        self.weight, self.real, self.imag = (RowSums(values, lines, design) for values in rows)
+        self.uu, self.uy = (np.add.reduceat(values, lines.first) for values in rows[:2])
+        self.yy = np.abs(np.add.reduceat(weight * lines.value, lines.first)) ** 2 / self.uu
+
+
+class RowSums:
+    """Sums over the rows of each recording, each row with a weight: of values on distinct lines (…, lines), (…,
+    recordings).
+
+    A contact's distinct lines stand together, so its recordings are a block of one matrix. Where blocks are large and
+    full they are dense.
+    """
+
+    def __init__(self, weight: Floats, lines: Lines, design: FrfDesign) -> None:
+        """`weight` (rows,)."""
+        shape = lines.recordings, len(design.line_frequency)
+        by_recording = np.append(lines.first, len(weight))
+        sparse = csr_array((weight, design.line, by_recording), shape=shape)
+        self._sparse: csr_array | None = None
+        self._recordings = lines.recordings
+        self._blocks: list[tuple[Indices, slice, Floats]] = []
+        contact = design.line_contact[design.line[lines.first]]
+        own = [np.flatnonzero(contact == number) for number in np.unique(contact)]
+        edges = np.searchsorted(design.line_contact, [*np.unique(contact), contact.max() + 1])
+        spans = [slice(low, high) for low, high in pairwise(edges.tolist())]
+        numbers = sum(len(some) * (span.stop - span.start) for some, span in zip(own, spans, strict=True))
+        if len(weight) > max(_LARGE * len(own), _FULL * numbers):
+            self._blocks = [(some, span, _block(sparse, some, span)) for some, span in zip(own, spans, strict=True)]
+        else:
+            self._sparse = sparse
+
+    def __call__(self, values: Floats) -> Floats:
+        """Of values on distinct lines."""
+        flat = values.reshape(-1, values.shape[-1])
+        if self._sparse is not None:
+            return np.asarray((self._sparse @ flat.T).T.reshape(*values.shape[:-1], -1))
+        total = np.empty((len(flat), self._recordings))
+        for recordings, span, block in self._blocks:
+            total[:, recordings] = flat[:, span] @ block.T
+        return total.reshape(*values.shape[:-1], -1)
+
+
+def _block(sparse: csr_array, recordings: Indices, span: slice) -> Floats:
+    """(recordings, lines) of one contact."""
+    return np.ascontiguousarray(sparse[recordings][:, span].toarray())
+
+
+@cached_while_alive  # a diagnosis weighs dozens of models of one design
+def frf_lines(lines: Lines, design: FrfDesign) -> FrfLines:
+    """The matrices of these lines for models of this design."""
+    return FrfLines(lines, design)
+
+
+@dataclass(frozen=True)
+class FrfProducts:
+    """Of FRFs; `turning` is None where u is 1, or where no derivatives were asked for."""
+
+    yy: Floats  # (recordings,)
+    uu: Floats  # (points, recordings)
+    uy: Floats
+    level: Floats
+    level_slopes: Floats | None  # (points, recordings, parameters)
+    place_slopes: Floats | None  # (2, points, recordings)
+    turning: SlopeSums | None
+    pickup: "PickupProducts | None" = None
+
+    @classmethod
+    def of(cls, lines: FrfLines, pickup: PickupRows | None, response: Response) -> Self:
+        """Of a model's response at several points, and the rows that its pick-up reaches."""
+        level, factor = response.level, response.lines
+        slopes = level.slopes.transpose(1, 2, 0) if len(level.slopes) else None
+        uu, uy = np.broadcast_to(lines.uu, level.value.shape), np.broadcast_to(lines.uy, level.value.shape)
+        turning = None
+        if factor is not None:
+            uu, uy, turning = _turned(lines, factor.value, factor.slopes.transpose(1, 0, 2))
+            turning = None if slopes is None else turning
+        of_pickup = None if pickup is None else PickupProducts.of(pickup, len(level.value), factor)
+        return cls(lines.yy, uu, uy, level.value, slopes, response.place_slopes, turning, of_pickup)
+
+    def __len__(self) -> int:
+        return len(self.level)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        place, slopes = self.place_slopes, self.level_slopes
+        return replace(
+            self,
+            uu=self.uu[points],
+            uy=self.uy[points],
+            level=self.level[points],
+            level_slopes=None if slopes is None else slopes[points],
+            place_slopes=None if place is None else place[:, points],
+            turning=None if self.turning is None else self.turning[points],
+            pickup=None if self.pickup is None else self.pickup[points],
+        )
+
+    @property
+    def values(self) -> Self:
+        """Without derivatives by the parameters."""
+        pickup = None if self.pickup is None else replace(self.pickup, v=None)
+        return replace(self, level_slopes=None, turning=None, pickup=pickup)
+
+    @classmethod
+    def joined(cls, parts: Sequence["FrfProducts"], parameters: int) -> Self:
+        """At the points of several, one after another, with so many parameters in all."""
+        filled = [part.filled(parameters, turning=any(one.turning for one in parts)) for part in parts]
+
+        def of(name: str, axis: int = 0) -> Any:
+            values = [getattr(part, name) for part in filled]
+            return None if values[0] is None else np.concatenate(values, axis=axis)
+
+        level = of("level"), of("level_slopes"), of("place_slopes", axis=1)
+        turning = [part.turning for part in filled if part.turning is not None]
+        pickup = [part.pickup for part in filled if part.pickup is not None]
+        return cls(
+            parts[0].yy,
+            of("uu"),
+            of("uy"),
+            *level,
+            SlopeSums.joined(turning) if turning else None,
+            PickupProducts.joined(pickup) if pickup else None,
+        )
+
+    def filled(self, parameters: int, *, turning: bool) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all, also those of u where it has none."""
+        slopes = self.level_slopes
+        if slopes is None:
+            return self
+        further = parameters - slopes.shape[-1]
+        slopes = np.pad(slopes, ((0, 0), (0, 0), (0, further))) if further else slopes
+        own = self.turning
+        if own is None:
+            none = np.zeros_like(slopes)
+            own = (
+                SlopeSums(none, none, np.broadcast_to(none[..., None], (*none.shape, parameters))) if turning else None
+            )
+        elif further:
+            uv, vy = (np.pad(values, ((0, 0), (0, 0), (0, further))) for values in (own.uv, own.vy))
+            own = SlopeSums(uv, vy, np.pad(own.vv, ((0, 0), (0, 0), (0, further), (0, further))))
+        pickup = None if self.pickup is None else self.pickup.filled(parameters)
+        return replace(self, level_slopes=slopes, turning=own, pickup=pickup)
+
+    def scaled(self, factor: Floats) -> Self:
+        """Of levels so many times as large (points,)."""
+        by = factor[:, None]
+        slopes = None if self.level_slopes is None else self.level_slopes * by[..., None]
+        place = None if self.place_slopes is None else self.place_slopes * by
+        return replace(self, level=self.level * by, level_slopes=slopes, place_slopes=place)
+
+    def summed(self, levels: SeveralLevels) -> Sums:
+        """The sums at noise levels (points, sets, 1), as (points, sets, recordings)."""
+        sums = Sums(self.uu[:, None], self.uy[:, None], self.yy, 0.0)
+        return sums if self.pickup is None else self.pickup.less(sums, levels)
+
+    def slope_sums(self, levels: SeveralLevels) -> SlopeSums | None:
+        """The sums with derivatives, at the first of the sets of noise levels; None where u is 1."""
+        if self.pickup is None or self.turning is None:
+            return self.turning
+        return self.pickup.slopes_less(self.turning, levels)
+
+
+@dataclass(frozen=True)
+class PickupProducts:
+    """On the distinct lines of the rows that pick-up reaches u (points, lines) and v (points, parameters, lines), None
+    where it is 0; `line` says which of them each row is on."""
+
+    rows: PickupRows
+    line: Indices
+    u: Array
+    v: Array | None
+
+    @classmethod
+    def of(cls, rows: PickupRows, points: int, factor: Differentiated | None) -> Self:
+        """Of the dynamics' factor on a model's distinct lines."""
+        if factor is None:
+            return cls(rows, rows.line, np.ones((points, len(rows.lines)), dtype=complex), None)
+        slopes = factor.slopes.transpose(1, 0, 2)[..., rows.lines] if len(factor.slopes) else None
+        return cls(rows, rows.line, factor.value[:, rows.lines], slopes)
+
+    def __getitem__(self, points: Array | slice) -> Self:
+        """At some of the points."""
+        return replace(self, u=self.u[points], v=None if self.v is None else self.v[points])
+
+    @classmethod
+    def joined(cls, parts: Sequence["PickupProducts"]) -> Self:
+        """At the points of several, one after another; on the rows themselves where models' distinct lines differ."""
+        first = parts[0]
+        if any(part.line is not first.line for part in parts):
+            parts = [part._on_rows() for part in parts]
+        slopes = [part.v for part in parts if part.v is not None]
+        return cls(
+            first.rows,
+            parts[0].line,
+            np.concatenate([part.u for part in parts]),
+            np.concatenate(slopes) if slopes else None,
+        )
+
+    def _on_rows(self) -> Self:
+        return replace(
+            self,
+            line=self.rows.every,
+            u=self.u[:, self.line],
+            v=None if self.v is None else self.v[..., self.line],
+        )
+
+    def filled(self, parameters: int) -> Self:
+        """With derivatives that are 0 by further parameters, so many in all."""
+        v = np.zeros((*self.u.shape[:1], 0, self.u.shape[1]), dtype=complex) if self.v is None else self.v
+        return replace(self, v=np.pad(v, ((0, 0), (0, parameters - v.shape[1]), (0, 0))))
+
+    def less(self, sums: Sums, levels: SeveralLevels) -> Sums:
+        """The sums less what rows lose to pick-up."""
+        assert levels.pickup is not None
+        return self.rows.less(sums, self.line, self.u, levels.pickup, levels.level)
+
+    def slopes_less(self, sums: SlopeSums, levels: SeveralLevels) -> SlopeSums:
+        """The sums with derivatives less what rows lose, at the first of the sets of noise levels."""
+        assert levels.pickup is not None
+        if self.v is None:
+            return sums
+        return self.rows.slopes_less(sums, self.line, self.u, self.v, levels.pickup[:, 0], levels.level[:, 0, 0])
+
+
+def _turned(lines: FrfLines, u: Array, slopes: Array) -> tuple[Floats, Floats, SlopeSums]:
+    """Re u*u, Re u*y and the sums with the derivatives v of u (points, parameters, lines)."""
+    from underskin.diagnosis.kernels import line_products, spread_sums
+
+    moving, count = np.flatnonzero(slopes.any(axis=(0, 2))), slopes.shape[1]
+    points, several = len(u), 1 + len(moving)
+    each = np.empty((points, several, u.shape[1]), dtype=complex)
+    each[:, 0], each[:, 1:] = u, slopes[:, moving]
+    products = np.empty((points, several * (several + 1) // 2, u.shape[1]))
+    real, imag = np.empty(each.shape), np.empty(each.shape)
+    line_products(each, products, real, imag)
+    both = np.ascontiguousarray(lines.weight(products))
+    with_y = np.ascontiguousarray(lines.real(real) + lines.imag(imag))
+    recordings = both.shape[-1]
+    uv, vy = (np.zeros((points, recordings, count)) for _ in range(2))
+    vv = np.zeros((points, recordings, count, count))
+    spread_sums(both, with_y, moving, uv, vy, vv)
+    return both[:, 0], with_y[:, 0], SlopeSums(uv, vy, vv)
+
 
 Products = FrfProducts | CurveProducts
 

@@ -1,16 +1,40 @@
-"""Measured against the base model: each recording's gain residual, each line's residual, and how uncertain they are.
+"""What an explanation leaves, what its parameters take up, and what could hide behind it.
+
+Measured against the base model: each recording's gain residual, each line's residual, and how uncertain they are.
 
 The residual of a recording is what it lies above its model, relative; that of a line is what it lies above its own
 recording's best real multiple of the model: a recording's lines share one gain error, so their mean and their shape are
 kept apart.
+
+What a fit to curves takes up of changes of the force: their χ², and what is left beside the parameters.
+
+What a parameter would be if one more mechanism were there that the recordings hardly tell from it.
+
+A glue line that slips by the same share under every sphere only changes d33: it does not show, and a fit without it is
+as good. At places spread evenly over such a mechanism's prior all else is fitted again, the noise levels as well; each
+counts by the evidence that it leaves. Where the sensors' spread is free, the parameter is averaged over it at each.
+
+What the declared values of a skin may be off by, in d33.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import qmc
 
+from underskin.diagnosis.inference.evidence import Normals, around_levels, around_mean, over_spread, together
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.units import Array, Floats
+from underskin.diagnosis.inference.fit import Fitter
+from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, own_places
+from underskin.diagnosis.inference.products import CurveProducts
+from underskin.errors import InvalidInput
+from underskin.mechanisms.base import Unsupported
+from underskin.mechanisms.models.curves import CurveModel
+from underskin.mechanisms.parameter import Normal
+from underskin.physics.skin import INCOMPRESSIBLE, Indenter
+from underskin.prediction.pressed_skin import declared_skin, log_slopes
+from underskin.recordings.campaign import Tolerances, frf_of
+from underskin.units import Array, Floats, Indices, to_si
 
 
 @dataclass(frozen=True)
@@ -56,3 +80,143 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     placed = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
     line, weight = line_residuals(problem, explanation)
     return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)
+
+
+_FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
+
+
+def force_and_slopes(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
+    """The force (samples,), its derivatives by the parameters (parameters, samples) and by the travel (samples,)."""
+    model, fit = explanation.best.hypothesis.model, explanation.point.fit
+    assert isinstance(model, CurveModel)
+    force, slopes = (values[0] for values in model.forces_and_slopes(fit[None]))
+    return force, slopes, -slopes[model.contact_points].sum(axis=0)
+
+
+def precision_of(hypothesis: Hypothesis) -> Floats:
+    """Of the parameters' priors (parameters,)."""
+    return np.asarray(hypothesis.priors[0] + (_FLAT / np.ptp(hypothesis.bounds, axis=0)) ** 2)
+
+
+def information(explanation: Explanation, rows: Floats, noise: Explanation | None = None) -> Floats:
+    """Jᵀ C⁻¹ J of changes of the force J (changes, samples) under the noise that the explanation, or another, found."""
+    fitter = Fitter([explanation.best.hypothesis])
+    covariance = (noise or explanation).point.covariance
+    at = fitter.evaluate(fitter.at(replace(explanation.point, covariance=covariance)))
+    levels = fitter.levels(at.points.covariance[:, None])
+    assert isinstance(at.products, CurveProducts)
+    along, square = at.products.of_rows(rows, levels)
+    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.bend)
+    level2 = float(levels.level.flat[0]) ** 2
+    return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
+
+
+def beside(whole: Floats, places: Indices, precision: Floats) -> Floats:
+    """Of the `information` of parameters and further changes that of these changes (changes, changes), less what the
+    parameters at `places` take up; `precision` of all parameters (parameters,)."""
+    first = len(precision)
+    own = whole[np.ix_(places, places)] + np.diag(precision[places])
+    shared = whole[first:, places]
+    return np.asarray(whole[first:, first:] - shared @ np.linalg.solve(own, shared.T))
+
+
+_PLACES = {0: 1, 1: 12, 2: 24}  # for so many parameters
+_MOST_PLACES = 48
+_MOST = 600.0  # nats that shares tell: e to the power of 710 is more than a float holds
+_COUNTS = 6.0  # nats behind the fit without the mechanism within which a place counts
+
+
+def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> Normals | None:
+    """A parameter of the model with one more mechanism, each share relative to the explanation without it, e^600 at
+    most.
+
+    None where the recordings do not support the mechanism, or it moves no prediction.
+    """
+    best, known = explanation.best, problem.lines.mechanisms
+    names = tuple(entry for entry in known if entry in {*explanation.names, name})
+    if not known[name].moves_predictions:
+        return None
+    try:
+        hypothesis = problem.hypothesis(names, best.hypothesis.placed)
+    except (Unsupported, InvalidInput):
+        return None
+    places = own_places(names, hypothesis.lines)
+    new = range(places[name].start, places[name].stop)
+    if any(len(explanation.own(one)) != places[one].stop - places[one].start for one in explanation.names):
+        return None  # beside it another mechanism has other parameters
+    entries = [hypothesis.model.parameters[place] for place in new]
+    levels = _evenly(len(entries))
+    fit = np.zeros((len(levels), len(hypothesis.model.parameters)))
+    fit[:, hypothesis.own_parameters :] = best.point.fit[best.hypothesis.own_parameters :]
+    for one in explanation.names:
+        fit[:, places[one]] = explanation.own(one)
+    for column, entry in zip(new, entries, strict=True):
+        fit[:, column] = [entry.quantile(level) for level in levels[:, column - new.start].tolist()]
+    held = Fitter([hypothesis], held=[new])
+    at = _fitted(held, fit, explanation)
+    if not len(at):
+        return None
+    values, covariances = around_mean(held, at)
+    whole = values + around_levels(held, at)
+    without = around_mean(best.fitter, best.at)[0] + around_levels(best.fitter, best.at)
+    gained = whole - without
+    shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
+    place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
+    spread = over_spread(held, at, place)
+    if spread is not None:
+        return together([normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)])
+    index = int(np.searchsorted(np.flatnonzero(held.free[0]), place))
+    deviation = np.sqrt([covariance[index, index] for covariance in covariances])
+    return Normals(shares, at.points.fit[:, place], deviation)
+
+
+def _evenly(parameters: int) -> Floats:
+    """Probabilities between 0 and 1, spread evenly over so many parameters (places, parameters)."""
+    count = _PLACES.get(parameters, _MOST_PLACES)
+    places = (np.arange(count) + 0.5) / count
+    if parameters < 2:
+        return np.asarray(places[:, None][:, :parameters])
+    others = qmc.Halton(parameters - 1, scramble=False).random(count + 1)[1:]
+    return np.column_stack([places, others])
+
+
+def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
+    """The places that count, with all that is not held fitted."""
+    point, cost = explanation.point, explanation.best.cost
+    covariance, bend = (np.tile(values, (len(fit), 1)) for values in (point.covariance, point.bend))
+    begun = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, bend))
+    fitted = held.descend(begun, 1, lambda at: np.full(len(at), cost + _COUNTS))
+    return fitted[np.flatnonzero(fitted.cost < cost + _COUNTS)]
+
+
+def declared_d33(problem: FittingProblem, explanation: Explanation) -> float:
+    """The standard deviation of ln d33 by the skin's tolerances, beyond what its fit allows the declared values.
+
+    A prior's centre that is off by e moves the posterior mean of ln d33 by C/s² · e: C is the covariance of ln d33 and
+    that factor, s the standard deviation of its prior. So a value that the recordings tell themselves moves nothing.
+    """
+    skin = problem.lines.campaign.skin
+    off = skin.tolerances or Tolerances()
+    best = explanation.best
+    places = {parameter.name: place for place, parameter in enumerate(explanation.model.parameters)}
+    index = {name: best.hypothesis.mean_places.index(places[name]) for name in ("d33", "youngs_modulus", "thickness")}
+    variance = (_by_sensor_radius(problem) * off.sensor_radius_percent / 100) ** 2
+    percents = {"youngs_modulus": off.youngs_modulus_percent, "thickness": off.thickness_percent}
+    for name, percent in percents.items():
+        prior = explanation.model.parameters[places[name]].prior
+        assert isinstance(prior, Normal)
+        moved = float(best.covariance[index["d33"], index[name]]) / prior.sd**2
+        variance += moved**2 * max((percent / 100) ** 2 - prior.sd**2, 0.0)
+    return float(np.sqrt(variance))
+
+
+def _by_sensor_radius(problem: FittingProblem) -> float:
+    """∂ ln FRF/∂ ln rT of the base model, the median of the recordings inside the table; 0 where none is."""
+    campaign = problem.lines.campaign
+    frfs = frf_of(campaign)
+    skin = declared_skin(replace(campaign.skin, poisson_ratio=INCOMPRESSIBLE))  # as the table is
+    indenter = Indenter(to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in frfs]))
+    preload = to_si("preload_n", [entry.preload_n for entry in frfs])
+    slopes = log_slopes(problem.table, skin, indenter, preload)["sensor_radius"]
+    inside = np.isfinite(slopes)
+    return float(np.median(slopes[inside])) if inside.any() else 0.0

@@ -22,7 +22,7 @@ from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.conditions import Conditions, FrfConditions
+from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.units import Floats, Mask
 
 SEED = 20180206

@@ -9,7 +9,7 @@ import numpy as np
 
 from underskin.diagnosis.data.dataset import COLLAPSED_HZ
 from underskin.errors import out_of_range
-from underskin.recordings.conditions import Conditions, FrfConditions, frf_of, offsets
+from underskin.recordings.campaign import Conditions, FrfConditions, frf_of, offsets
 
 MOST_RECORDINGS = 8
 _FURTHER = 1.25  # beyond the highest preload used

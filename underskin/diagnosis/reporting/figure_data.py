@@ -1,22 +1,300 @@
-"""What the figures of a diagnosis show: measured and predicted responses, thinned to a number that an eye can read.
+"""The numbers behind the figures of a report.
+
+What the figure of a curve shows: its samples, what two explanations predict of it, and the marks on its course.
+
+Forces are less the zero that the samples in the air tell. Predicted ones are what the cell would show of the law's: the
+fit grants it the rest of a zero, a drift and a gain, of each curve its own. What leaves more so than by plain least
+squares, by which the report says what it leaves, is drawn by those: weighed by noise that has to hold all that it
+lacks, it may lie far from every sample.
+
+What the figure of FRFs shows of each recording: its lines, what two explanations predict of them, and the noise.
+
+A prediction holds the gain that the fit found of the sensor, but neither gain nor place of the single recording: how
+far these two shift all of its lines is part of the noise, as is the noise of each line.
+
+What the figures of a diagnosis show: measured and predicted responses, thinned to a number that an eye can read.
 
 A point is one recording, or one recording at some neighbouring lines where the misfit or its explanation runs along the
 lines. Its values are means weighted with 1/variance.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import WORDS, recording_axes
-from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.data.dataset import WORDS, Lines, finite_samples, recording_axes, way_along
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
+from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import whole_prediction
-from underskin.diagnosis.localisation.region import axis_values
-from underskin.diagnosis.reporting.curve_data import plain_reading
+from underskin.diagnosis.localisation import axis_values
+from underskin.diagnosis.reporting.numbers import place_of
 from underskin.diagnosis.reporting.report import DiagnosisResult
+from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
+from underskin.recordings.curve_course import course
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
+
+MOST_SAMPLES = 600  # of a curve
+_MORE = 1.1  # times what plain least squares leave
+_BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place on a curve."""
+
+    displacement_mm: float
+    force_n: float
+
+
+@dataclass(frozen=True)
+class CurvePrediction:
+    """Of one curve by one explanation: the force of its rows (rows,), the standard deviation about it that noise and
+    the errors that neighbouring samples share leave (rows,), and where contact begins."""
+
+    force_n: Floats
+    deviation_n: Floats
+    contact: Mark
+
+
+@dataclass(frozen=True)
+class ShownCurve:
+    """One recording: those of its `count` samples that are shown (shown,), and the means that were fitted (rows,).
+
+    `snap_in` is the first sample in contact after that jump, `pull_off` the last one before that; None where no jump
+    was found.
+    """
+
+    name: str
+    count: int
+    sample_mm: Floats  # (shown,)
+    sample_n: Floats  # (shown,)
+    displacement_mm: Floats  # (rows,)
+    force_n: Floats  # (rows,)
+    before: CurvePrediction
+    after: CurvePrediction
+    snap_in: Mark | None
+    pull_off: Mark | None
+
+    @property
+    def left_percent(self) -> float:
+        """100 √(Σ|y − m|²/Σ|y|²) of the explanation after."""
+        size = float(np.linalg.norm(self.force_n))
+        return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
+
+
+def shown_curves(
+    problem: FittingProblem, recorded: Campaign, before: Explanation, after: Explanation
+) -> list[ShownCurve]:
+    """Every curve that was fitted, the worst explained one first; `recorded` holds them with all their samples."""
+    raw = {
+        entry.id: entry
+        for entry in recorded.recordings
+        if isinstance(entry, CurveRecording) and entry.kind == problem.kind
+    }
+    lines = problem.lines
+    predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
+    curves = []
+    for entry, own, both in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
+        assert isinstance(entry, CurveRecording)
+        curves.append(_shown(raw[entry.id], entry.displacement_mm, lines.value.real[own], *both))
+    return sorted(curves, key=lambda curve: -curve.left_percent)
+
+
+def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
+    """Of indentations of which an explanation's most probable `reading` (rows,) [N] leaves more than plain least
+    squares do: the fit (parameters,) by these, and what the cells would show by it (rows,) [N]; else None."""
+    if problem.kind != "indentation":
+        return None
+    fit, _ = explanation.least_squares
+    plain = least_squares_reading(problem.lines, explanation.model.predict(fit).value.real)
+    measured = problem.lines.value.real
+    left, least = (float(np.linalg.norm(measured - one)) for one in (reading, plain))
+    return (fit, plain) if left > _MORE * least else None
+
+
+def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
+    """Of each curve."""
+    lines, fit = problem.lines, explanation.point.fit
+    force = explanation.model.predict(fit).value.real
+    cell = cell_response(lines, explanation.best.levels, force)
+    reading = cell.reading(lines, force)
+    plain = plain_reading(problem, explanation, reading)
+    if plain is not None:
+        fit, reading = plain
+    deviation = _deviation(problem, explanation, cell)
+    predicted = []
+    for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
+        assert isinstance(entry, CurveRecording)
+        contact = float(fit[place_of(explanation, f"contact_point {entry.id}")])
+        # What the cell shows in the air just before, a drift included, whatever describes it
+        in_air = np.flatnonzero(entry.displacement_mm[: int(entry.displacement_mm.argmax()) + 1] <= contact)
+        shown = reading[own][in_air[-1]] if len(in_air) else cell.offset[own][0]
+        predicted.append(CurvePrediction(reading[own], deviation[own], Mark(contact, float(shown))))
+    return predicted
+
+
+def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResponse) -> Floats:
+    """Of each row about what the cells show (rows,) [N]: less than the noise, for zero, drift and gain were fitted."""
+    lines, levels = problem.lines, explanation.best.levels
+    assert lines.smooth is not None
+    shared = [
+        np.diag(lines.smooth.part(np.arange(own.start, own.stop)).covariance(levels.smooth)) for own in lines.spans
+    ]
+    variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+def _shown(
+    raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
+) -> ShownCurve:
+    place, measured, *times = finite_samples(raw)
+    seen = course(place, measured, *times)
+    jumps: list[int | None] = [None, None]
+    if raw.kind == "indentation":
+        measured = measured - seen.zero
+        jumps = [seen.snap_in, None if seen.pull_off is None else seen.pull_off - 1]
+    snap_in, pull_off = (None if at is None else Mark(float(place[at]), float(measured[at])) for at in jumps)
+    shown = _thinned(way_along(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
+    return ShownCurve(
+        name=raw.id,
+        count=len(measured),
+        sample_mm=place[shown],
+        sample_n=measured[shown],
+        displacement_mm=displacement,
+        force_n=force,
+        before=before,
+        after=after,
+        snap_in=snap_in,
+        pull_off=pull_off,
+    )
+
+
+def _thinned(way: Floats, corners: list[int]) -> Indices:
+    """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
+    corners."""
+    count = len(way)
+    if count <= MOST_SAMPLES:
+        return np.arange(count)
+    even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
+    beside = [np.arange(max(at - _BESIDE_CORNER, 0), min(at + _BESIDE_CORNER + 1, count)) for at in corners]
+    return np.unique(np.concatenate([even, *beside]))
+
+
+MOST_RECORDINGS = 120
+_FEWEST_LINES, _MOST_LINES = 40, 160  # of a recording
+_MOST_FRF_POINTS = 6000  # of all together
+_PC_PER_C = 1e12
+
+
+@dataclass(frozen=True)
+class ShownFrf:
+    """One recording: those of its `count` lines that are shown (shown,); responses in pC/N.
+
+    `deviation` (2, shown): the noise's standard deviation about the explanation after, of real and imaginary part.
+    `left_before`, `left_after`: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
+    """
+
+    name: str
+    sensor: str
+    indenter_radius_mm: float
+    preload_n: float
+    count: int
+    frequency_hz: Floats
+    measured: Complexes
+    before: Complexes
+    after: Complexes
+    deviation: Floats
+    left_before: float
+    left_after: float
+
+
+def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
+    """The recordings that were fitted, the one that is explained worst after first; of very many those explained worst,
+    of each sensor as many as of another."""
+    lines = problem.lines
+    measured, was, now = (
+        _PC_PER_C * rows for rows in (lines.value, *(_predicted(problem, e) for e in (before, after)))
+    )
+    deviation = _PC_PER_C * _frf_deviation(problem, after)
+    left = [[_left_percent(measured[own], rows[own]) for own in lines.spans] for rows in (was, now)]
+    chosen = _worst([entry.sensor for entry in frf_recordings(lines.campaign)], left[1])
+    most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
+    shown = []
+    for number in chosen:
+        entry, own = lines.campaign.recordings[number], lines.spans[number]
+        assert isinstance(entry, FrfRecording)
+        some = own.start + _thinned_lines(lines.frequency[own], most)
+        shown.append(
+            ShownFrf(
+                name=entry.id,
+                sensor=entry.sensor,
+                indenter_radius_mm=entry.indenter_radius_mm,
+                preload_n=entry.preload_n,
+                count=own.stop - own.start,
+                frequency_hz=lines.frequency[some],
+                measured=measured[some],
+                before=was[some],
+                after=now[some],
+                deviation=deviation[:, some],
+                left_before=left[0][number],
+                left_after=left[1][number],
+            )
+        )
+    return shown
+
+
+def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
+    """Of each row [C/N], with the sensors' gains and what scatter of the place does to the mean."""
+    lines, best = problem.lines, explanation.best
+    gain = best.sensor_gains[lines.sensor] + 0.5 * best.levels.position**2 * problem.curvature.laplacian
+    predicted: Complexes = whole_prediction(problem, explanation) * np.exp(gain)[lines.recording]
+    return predicted
+
+
+def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
+    """Of real and imaginary part of each row about the prediction (2, rows) [C/N]: the lines' noise, mains pick-up, and
+    gain and place of the recording."""
+    lines, best = problem.lines, explanation.best
+    levels, predicted = best.levels, _predicted(problem, explanation)
+    pickup = best.pickup_variance
+    of_line = (levels.level * lines.deviation) ** 2 + (
+        pickup if len(pickup) == len(lines.value) else pickup[lines.recording]
+    )
+    placed = levels.position**2 * (best.relative_place_slopes**2).sum(axis=0)
+    relative = levels.gain**2 + placed + 0.5 * levels.position**4 * problem.curvature.square
+    parts = np.array([predicted.real, predicted.imag])
+    return np.sqrt(of_line + relative[lines.recording] * parts**2)
+
+
+def _left_percent(measured: Complexes, predicted: Complexes) -> float:
+    size = float(np.linalg.norm(predicted))
+    return 100 * float(np.linalg.norm(measured - predicted)) / size if size else 100.0
+
+
+def _worst(sensors: Sequence[str], left: Sequence[float]) -> list[int]:
+    """Which recordings are shown, in order."""
+    order = sorted(range(len(left)), key=lambda number: -left[number])
+    if len(order) <= MOST_RECORDINGS:
+        return order
+    seen: dict[str, int] = {}
+    ranks = {}
+    for number in order:
+        ranks[number] = seen[sensors[number]] = seen.get(sensors[number], -1) + 1
+    kept = set(sorted(order, key=lambda number: ranks[number])[:MOST_RECORDINGS])
+    return [number for number in order if number in kept]
+
+
+def _thinned_lines(frequency: Floats, most: int) -> Indices:
+    """Which of a recording's lines are shown, about evenly over the logarithm of frequency; `frequency` rises."""
+    count = len(frequency)
+    if count <= most:
+        return np.arange(count)
+    place = np.log(np.maximum(frequency, np.min(frequency[frequency > 0], initial=np.inf)))
+    wanted = np.linspace(place[0], place[-1], most)
+    return np.unique(np.minimum(np.searchsorted(place, wanted), count - 1))
+
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
 _TRAVEL = "displacement_mm"

@@ -1,17 +1,30 @@
-"""How much better the recordings are described: errors before and after, in sample and on groups held out."""
+"""How well the answer fits, what warns of it, and what each kind of recording adds.
 
-from collections.abc import Sequence
+How much better the recordings are described: errors before and after, in sample and on groups held out. Findings on the
+stated explanation itself: what in its fit should not be taken at face value. What each kind of recording told, and
+where they contradict each other, as a report has it.
+"""
+
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import NOTHING_MISSING
+from underskin.diagnosis.data.names import NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, place_of, rounded, with_hidden
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, at_bounds, parameter, place_of, rounded, with_hidden
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.curve_knowledge import hidden_factors, may_hide
+from underskin.diagnosis.selection.other_kinds import OfCurves, hidden_factors, may_hide
+from underskin.diagnosis.selection.search import Joined
 from underskin.diagnosis.validation import cross_validation
-from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.diagnosis.validation.cross_validation import NOISY
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_percent
+from underskin.mechanisms.base import Kind, Mechanism
+from underskin.mechanisms.unnamed.expressions import CurveLaw
+from underskin.mechanisms.unnamed.laws import UnnamedLaw, in_plain_words
 
 _FACTOR = "modulus_factor"  # of modulus_error
 
@@ -152,3 +165,180 @@ def _noise(explanation: Explanation) -> dict[str, Any]:
         "line_level": rounded(levels.level),
         "smooth_percent": rounded(100 * levels.smooth),
     }
+
+
+# With depth, as a layer on a stiff base does
+_STIFFENS = ("strain_stiffening", "compressible_layer", "layered_contact")
+
+
+def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
+    lines' own, and a thickness that only the curves tell."""
+    found = [
+        *(one.finding for one in at_bounds(explanation)),
+        *_beyond_tables(problem, explanation),
+        *_noisy(problem, explanation),
+    ]
+    return [*found, *_kept(problem, explanation), *_of_unknown_thickness(problem, explanation)]
+
+
+def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    best = explanation.best
+    outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
+    known = [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]
+    answer = in_words(known) or SIMPLEST[problem.kind]
+    entries = problem.lines.campaign.recordings
+    return [
+        Finding(Reason.OUT_OF_TABLES_FITTED, entries[number].id, "preload_n", {"answer": answer})
+        for number in outside.tolist()
+    ]
+
+
+def _kept(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    """On contacts that lie within the tables as found, and beyond them as declared."""
+    if problem.kind != "frf":
+        return []
+    best, skin = explanation.best, problem.lines.campaign.skin
+    kept = np.unique(best.hypothesis.lines.recording[best.prediction.inside & ~explanation.model.valid])
+    if not len(kept):
+        return []
+    assert skin.youngs_modulus_mpa is not None
+    fit = dict(zip([entry.name for entry in explanation.model.parameters], explanation.point.fit, strict=True))
+    found_mpa = None
+    if "modulus_factor" in fit:
+        found_mpa = skin.youngs_modulus_mpa * float(np.exp(fit["modulus_factor"] + fit["youngs_modulus"]))
+    arguments = {
+        "contacts": len(kept),
+        "recordings": problem.lines.recordings,
+        "declared_mpa": skin.youngs_modulus_mpa,
+        "found_mpa": found_mpa,
+        "answer": in_words([in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names]),
+    }
+    return [Finding(Reason.CONTACTS_KEPT, "", "skin.youngs_modulus_mpa", arguments)]
+
+
+def _noisy(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    level = explanation.best.levels.level
+    if problem.lines.curves or level < NOISY:
+        return []
+    return [Finding(Reason.LINE_NOISE_LEVEL, "", "frf_re_pc_per_n", {"level": level})]
+
+
+def _of_unknown_thickness(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
+    if problem.kind != "indentation" or problem.lines.campaign.skin.thickness_mm is not None:
+        return []
+    mechanisms = [problem.lines.mechanisms[name] for name in explanation.names]
+    alike = [one for one in mechanisms if one.name in _STIFFENS or _of_depth(one)]
+    if not alike:
+        return []
+    answer = in_words([in_plain_words(one) for one in alike])
+    is_tried = "layered_contact" in problem.lines.mechanisms.named
+    return [Finding(Reason.THICKNESS_UNKNOWN, "", "thickness_mm", {"answer": answer, "is_tried": is_tried})]
+
+
+def _of_depth(mechanism: Mechanism) -> bool:
+    return isinstance(mechanism, CurveLaw) and mechanism.spoken.axis in ("displacement_mm", "force_n")
+
+
+_CALLED: Mapping[Kind, str] = {"frf": "the FRFs", "indentation": "the indentations", "compression": "the block"}
+_MODULUS_ERROR = "modulus_error"
+
+
+def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
+    """E by each kind alone, and from curves the parameters of their mechanisms under the leading set, or under what the
+    curves alone find where the kinds contradict each other; empty where there is one kind."""
+    if joined.beside is None or joined.apart is None:
+        return []
+    told = []
+    for kind in joined.beside.kinds:
+        known = joined.beside.told_alone(kind) if joined.apart_is_likelier else joined.beside.told(kind, leading)
+        explanation = known.best
+        stated = [_of_elastomer(parameter(explanation, place_of(explanation, "youngs_modulus")), known)]
+        for own in own_places(explanation.names, explanation.best.hypothesis.lines).values():
+            stated += [parameter(explanation, place) for place in range(own.start, own.stop)]
+        told += [{"kind": kind.kind, **_entry(entry)} for entry in stated]
+    own_modulus = _modulus_alone(joined)
+    return told if own_modulus is None else [own_modulus, *told]
+
+
+def _of_elastomer(modulus: Mapping[str, Any], known: OfCurves) -> dict[str, Any]:
+    """With an interval that allows for what an apparent modulus hides, and for how the skin's may differ."""
+    return with_hidden(modulus, known.hidden, known.tolerance)
+
+
+def _entry(stated: Mapping[str, Any]) -> dict[str, Any]:
+    return {"parameter": stated["name"], **{key: stated[key] for key in ("unit", "value", "low", "high")}}
+
+
+def _modulus_alone(joined: Joined) -> dict[str, Any] | None:
+    """E as the recordings of the first kind alone have it; None where they do not ask for another than is declared."""
+    assert joined.apart is not None
+    declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
+    leader = joined.apart.answers[0]
+    explanation = joined.apart.shown_or_nothing(leader)
+    kind = {"kind": joined.problem.kind}
+    if declared is None:
+        return {**kind, **_entry(parameter(explanation, place_of(explanation, "youngs_modulus")))}
+    if _MODULUS_ERROR not in explanation.names:
+        return None
+    place = own_places(explanation.names, explanation.best.hypothesis.lines)[_MODULUS_ERROR].start
+    factor = parameter(explanation, place)
+    ends = {key: rounded(declared * factor[key]) for key in ("value", "low", "high")}
+    return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
+
+
+def moduli_clause(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
+    """E by kind; empty where there is one kind."""
+    moduli = [entry for entry in told if entry["parameter"] == "youngs_modulus"]
+    if not moduli:
+        return ""
+    each = ", ".join(
+        f"E from {_CALLED[entry['kind']]}: {entry['value']:.3g} MPa (95 %: {entry['low']:.3g} to {entry['high']:.3g})"
+        for entry in moduli
+    )
+    declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
+    return f"{each}, declared {declared:g}" if declared is not None else each
+
+
+def contradictions(joined: Joined) -> list[dict[str, Any]]:
+    """That the kinds are not of one material, where this is more probable than that they are."""
+    if joined.beside is None or not joined.apart_is_likelier:
+        return []
+    kinds = [joined.problem.kind, *(kind.kind for kind in joined.beside.kinds)]
+    named = " and ".join(_CALLED[kind] for kind in kinds)
+    said = (
+        f"{named[0].upper()}{named[1:]} contradict each other (probability {in_percent(joined.contradictory)}): they "
+        "are not of one material, or one of them is wrong, so each is explained alone."
+    )
+    return [{"parameter": "youngs_modulus", "kinds": kinds, "statement": said}]
+
+
+def of_curves_alone(joined: Joined, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
+    """Name, parameters and share of the misfit of mechanisms that act on the curves beside alone."""
+    entries = []
+    for kind in () if joined.beside is None else joined.beside.kinds:
+        assert joined.beside is not None
+        told = joined.beside.told(kind, leading)
+        entries += [
+            _of_mechanism(name, explanation, told.each[0][0])
+            for explanation, _ in told.each
+            for name in names
+            if name in explanation.names
+        ]
+    return entries
+
+
+def _of_mechanism(name: str, explanation: Explanation, without: Explanation) -> dict[str, Any]:
+    places = own_places(explanation.names, explanation.best.hypothesis.lines)[name]
+    left, all_of_it = (_left(entry) for entry in (explanation, without))
+    return {
+        "name": name,
+        "parameters": [parameter(explanation, place) for place in range(places.start, places.stop)],
+        "explains_percent": rounded(100 * max(1 - left / max(all_of_it, 1e-300), 0.0), 3),
+    }
+
+
+def _left(explanation: Explanation) -> float:
+    """Σ (F − model)² of the samples, what the cell may add not counted."""
+    predicted = explanation.model.predict(explanation.point.fit).value.real
+    return float(((explanation.best.hypothesis.lines.value.real - predicted) ** 2).sum())

@@ -16,10 +16,9 @@ from plotly.offline import get_plotlyjs
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.reporting import wording
-from underskin.diagnosis.reporting.answer_statement import first_and_rest, lacking_part
-from underskin.diagnosis.reporting.figures import explanations
-from underskin.diagnosis.reporting.scheme import SCHEME
-from underskin.diagnosis.reporting.several_figures import several_figures
+from underskin.diagnosis.reporting.figures import explanations, several_figures
+from underskin.diagnosis.reporting.law_statement import first_and_rest, lacking_part
+from underskin.diagnosis.reporting.page_styles import SCHEME
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import acted_on, followed

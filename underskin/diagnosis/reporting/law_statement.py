@@ -1,22 +1,501 @@
-"""A law that nobody listed in plain words: what it changes, by how much, what it is worth, what usually does it."""
+"""The statement of a report in words.
 
+A statement as a few sentences of clauses, so that it stays short however much there is to say.
+
+>>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
+'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
+
+The statement of a report: what decides, what is missing, what that means, and what to quote, in three sentences.
+
+Which physics usually does such a thing: hints, by where an unnamed law enters and what it follows.
+
+The same table stands in docs/unnamed.md.
+
+Findings that decide how far the statement of a report can be trusted, as clauses of that statement. A law that nobody
+listed in plain words: what it changes, by how much, what it is worth, what usually does it.
+"""
+
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.names import EXPLAINED
-from underskin.diagnosis.reporting.answer_statement import Around
-from underskin.diagnosis.reporting.hints import CONSTANT_PHASE, TURNED, hint
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
-from underskin.diagnosis.reporting.sentences import of_clauses
 from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
+from underskin.diagnosis.selection.answers import Answer
+from underskin.diagnosis.validation.signatures import Power
+from underskin.findings.codes import FindingCode
+from underskin.findings.english import lacking
 from underskin.findings.formatting import in_digits, in_percent
-from underskin.mechanisms.unnamed.curve_laws import TURN, CurveLaw
-from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw
+from underskin.findings.lacking import Lack, Lacking
+from underskin.mechanisms.base import Kind, Mechanism, Stage
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.mechanisms.unnamed.expressions import TURN, CurveLaw
+from underskin.mechanisms.unnamed.grammar import FrequencyLaw
 from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
 from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
-from underskin.recordings.time_zone import time_zone
+from underskin.recordings.readers.calendar_times import time_zone
+
+_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # of a sentence within a clause
+_END_OR_STOP = re.compile(r"([.?!]) +")
+_STOP = re.compile(r"\. +")
+_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': stays as it is
+_SYMBOLS = ("d33",)  # that no sentence writes with a capital
+
+
+def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
+    """One sentence of each of `sentences` that has a clause that is not empty; within them no full stop stands before
+    a space, so that they can be told apart again by these. `names` of campaigns and skins stay whole: "Palm 2. Upper"
+    is no end of a sentence."""
+    kept = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+
+    def told(text: str) -> str:
+        for name, whole in kept.items():
+            text = text.replace(name, whole)
+        return clause(text)
+
+    filled = ([told(text) for text in clauses if text] for clauses in sentences)
+    return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
+
+
+def clause(text: str) -> str:
+    """A text of one sentence or of several as part of a sentence, without the full stop at its end."""
+    first, *parts = _END.split(text.strip().rstrip("."))
+    for mark, following in zip(parts[::2], parts[1::2], strict=True):
+        first += f"{'; ' if mark == '.' else f'{mark} – '}{small(following)}"
+    return _STOP.sub(".\N{NO-BREAK SPACE}", first)
+
+
+def capital(text: str) -> str:
+    """With a capital at its beginning."""
+    return text if text.startswith(_SYMBOLS) else text[:1].upper() + text[1:]
+
+
+def small(text: str) -> str:
+    """With a small letter at its beginning, unless that is a symbol or somebody's name."""
+    plain = text[1:2].islower() or text.startswith("A ")
+    return text[:1].lower() + text[1:] if plain and not _NAME.match(text) else text
+
+
+_WORTH_NAMING = 0.02
+_FAR_ABOVE = 2.0  # times the noise: an error held out that a verdict's first sentence tells
+_INSUFFICIENT = "The recordings cannot tell anything: "
+_TO_CORRECT = "Nothing can be told before a correction: "
+_CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
+_SMALL = 5.0  # % of the response
+_STATED = 3  # mechanisms whose strengths are told
+
+
+@dataclass(frozen=True)
+class Around:
+    """What a statement says beside the answer itself.
+
+    `slips` and `contradictions` are clauses on what decides how far any answer can be trusted, `reserves` on what this
+    one leaves open; `quoted` are clauses on d33, and on E as each kind of recording has it.
+    """
+
+    slips: Sequence[str] = ()
+    contradictions: Sequence[str] = ()
+    reserves: Sequence[str] = ()
+    quoted: Sequence[str] = ()
+
+    def first(self, verdict: str, *reserve: str) -> list[str]:
+        """The clauses of the first sentence: what decides comes before the verdict."""
+        decides = [*self.contradictions, *self.slips]
+        return [*decides, f"apart from that, {verdict}" if decides else verdict, *reserve, *self.reserves]
+
+
+@dataclass(frozen=True)
+class OfAnswer:
+    """What is known of the leading answer beside its probability.
+
+    `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
+    `at_bounds` the parameters at an end of their search,
+    `mechanisms` those of the report, and `told` is what their values mean together.
+    """
+
+    groups: Sequence[Mapping[str, Any]] = ()
+    idle: Sequence[str] = ()
+    at_bounds: Sequence[str] = ()
+    mechanisms: Sequence[Mapping[str, Any]] = ()
+    told: Sequence[str] = ()
+
+
+_NOTHING_AROUND, _NOTHING_KNOWN = Around(), OfAnswer()
+
+
+def answer_statement(
+    answers: Sequence[Answer],
+    verdict: str,
+    kind: Kind = "frf",
+    fit: Mapping[str, Any] | None = None,
+    around: Around = _NOTHING_AROUND,
+    of_answer: OfAnswer = _NOTHING_KNOWN,
+    shape: str = "",
+    power: Sequence[Power] = (),
+) -> str:
+    """Three sentences at most: the verdict, after what decides how far it can be trusted; what is missing, its rivals,
+    or the `shape` of what remains; what to quote, or where nothing is missing what would have shown (`power`).
+
+    `fit` is the report's; of curves it has the modulus under the stated answer, or what the base model leaves.
+    """
+    model = SIMPLEST[kind]
+    stated, *means = _answer(answers, verdict, model, of_answer, all_used=not around.slips)
+    reserve = _reserve(fit) if fit is not None and verdict in ("explained", "no_mismatch") else ""
+    of_curves = fit is not None and "youngs_modulus" in fit["before"]
+    modulus = ""
+    if fit is not None and of_curves and verdict != "unexplained":
+        settled = verdict != "ambiguous"
+        how = "under this answer" if settled else f"with {in_words(fit['mechanisms'])}, which is not settled"
+        modulus = _modulus_clause(fit["after"], how)
+    quoted = [*around.quoted, modulus]
+    first = around.first(stated, reserve)
+    if verdict == "no_mismatch":
+        return of_clauses(first, [*means, *quoted], [power_clause(power, kind)])
+    left = [left_by(fit, model)] if fit is not None and of_curves and verdict == "unexplained" else []
+    return of_clauses(first, [*means, shape, *left, *of_answer.told], quoted)
+
+
+def _answer(
+    answers: Sequence[Answer], verdict: str, model: str, of_answer: OfAnswer, *, all_used: bool
+) -> tuple[str, ...]:
+    """The verdict as a clause, and further ones on what it means."""
+    leader = answers[0]
+    percent = in_percent(leader.probability)
+    rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
+    listed = _each(rivals)
+    mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
+    if verdict == "no_mismatch":
+        agree = f"recordings and {model} agree within the noise (probability {percent})"
+        if leader.probability >= EXPLAINED or not rivals:
+            return (f"{agree}, and nothing needs to be added{'' if all_used else ' for those that were used'}",)
+        return f"{agree}, but they do not rule out: {listed}", _law(tuple(mentioned))
+    if verdict == "unexplained":
+        return (f"something is missing that none of the known mechanisms describes (probability {percent})",)
+    by_sets = f"by sets: {_each([leader, *rivals])}" if rivals else ""
+    if verdict == "explained":
+        lacking, by_mechanism = _lacking(leader, of_answer)
+        means = _law(leader.names) or _strengths(of_answer.mechanisms)
+        return f"{model} lacks {lacking}", *([by_sets] if by_mechanism else []), means
+    idle = of_answer.idle
+    certain = [group for group in of_answer.groups if group["probability"] >= EXPLAINED]
+    if certain and not idle and not of_answer.at_bounds:
+        named = " and ".join(_group_in_words(group) for group in certain)
+        if any(len(group["mechanisms"]) > 1 for group in certain):
+            return f"{named}: these recordings cannot tell which", by_sets
+        return f"{model} lacks {named}, but these recordings cannot tell what else", by_sets, _law(tuple(mentioned))
+    but = list(of_answer.at_bounds)
+    but += [f"the 95 % intervals of {in_words(idle)} hold the values at which nothing changes"] if idle else []
+    but += [f"these rivals remain: {listed}"] if listed else []
+    but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
+    doubtful = bool(idle or of_answer.at_bounds) and leader.names != (NOTHING_MISSING,)
+    misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
+    begin = f"best explained by {in_words(leader.names)} ({percent})"
+    if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
+        known = sum(answer.probability for answer in answers if answer.kind == leader.kind)
+        begin = (
+            f"known mechanisms explain this ({in_percent(known)} together), best {in_words(leader.names)} ({percent})"
+        )
+    return (
+        f"{begin}, but {', and '.join(but)}",
+        misfit,
+        _law(tuple(mentioned)),
+    )
+
+
+def _lacking(leader: Answer, of_answer: OfAnswer) -> tuple[str, bool]:
+    """The mechanisms of the leading set with their probability, and whether that is each mechanism's own.
+
+    It is where a mechanism is in other sets too, or these have its twin in its place.
+    """
+    group, least = next(iter(of_answer.groups), None), leader.probability + _WORTH_NAMING
+    twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
+    if group is not None and twins and group["probability"] > least:
+        return f"{_group_in_words(group)}, rather {in_words(leader.names)} ({in_percent(leader.probability)})", True
+    present = {entry["name"]: entry["probability"] for entry in of_answer.mechanisms}
+    if not any(present.get(name, 0.0) > least for name in leader.names):
+        return f"{in_words(leader.names)} (probability {in_percent(leader.probability)})", False
+    own = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
+    return " and ".join(map(_group_in_words, own)), True
+
+
+def _group_in_words(group: Mapping[str, Any]) -> str:
+    named = " or ".join(in_words([name]) for name in group["mechanisms"])
+    return f"{named} ({in_percent(group['probability'])})"
+
+
+def _each(answers: Sequence[Answer]) -> str:
+    return ", or ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in answers)
+
+
+def _law(names: Sequence[str]) -> str:
+    """What a mechanism is; of several nothing, since a page says it of each."""
+    return f"{in_words(names)}: {small(CATALOGUE[names[0]].plain)}" if len(names) == 1 else ""
+
+
+def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
+    """The first parameter of each of a few mechanisms."""
+    each = [
+        (in_words([entry["name"]]), parameter_in_words(entry["parameters"][0]))
+        for entry in mechanisms[:_STATED]
+        if entry["parameters"]
+    ]
+    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in each)
+
+
+def parameter_in_words(entry: Mapping[str, Any]) -> str:
+    """Name, value and interval of a parameter: "tip mass of 6.02 g (5.9 to 6.1)"."""
+    value, low, high = (in_digits(entry[key], 3) for key in ("value", "low", "high"))
+    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
+    interval = "at or beyond the end of its search" if entry.get("at_bound") else f"{low} to {high}"
+    return f"{entry['name'].replace('_', ' ')} of {value}{unit} ({interval})"
+
+
+def _reserve(fit: Mapping[str, Any]) -> str:
+    """What keeps an answer from being one without reserve: recordings held out that are predicted far worse than noise
+    would have it."""
+    missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
+    if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
+        return ""
+    return f"but what was held out is missed by {in_digits(missed, 2)} %, where noise gives {in_digits(floor, 2)} %"
+
+
+def insufficient_statement(what: Lacking | None, slips: Sequence[str]) -> str:
+    """The statement on a campaign from which nothing can be concluded."""
+    assert what is not None
+    return of_clauses([f"{_TO_CORRECT if what.lack in _CORRECTED else _INSUFFICIENT}{lacking(what)}"], slips)
+
+
+# The page of a stored report lays its statement out by these two; nothing is decided by what they return.
+def lacking_part(statement: str) -> str:
+    """What is lacking or wrong, with its full stop, out of the statement that `insufficient_statement` made."""
+    return statement.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
+
+
+def first_and_rest(statement: str) -> tuple[str, str]:
+    """The first sentence of a statement, which is the verdict, without its full stop, and the other sentences."""
+    first, _, rest = statement.partition(". ")
+    return first.rstrip("."), rest
+
+
+def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
+    """E of curves, and what it is under."""
+    modulus = after["youngs_modulus"]
+    if modulus.get("at_bound"):
+        bound = f"{modulus['value']:.3g} {modulus['unit']}"
+        return f"Young's modulus {how} lies at or beyond {bound}, where its search ends: no result"
+    interval = f"95 %: {modulus['low']:.3g} to {modulus['high']:.3g}"
+    return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
+
+
+def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
+    """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
+    mechanisms beside it, which `law` holds."""
+    before, after, names = fit["before"], fit["after"], fit["mechanisms"]
+    modulus = before.get("least_squares_modulus_mpa")
+    alone = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
+    said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
+    added = in_words(names) if names else ""
+    if law is not None:
+        added = f"this law and {in_words(law)}" if law else "this law"
+    beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
+    modulus = _modulus_clause(after, f"with {added}") if added and "youngs_modulus" in after else ""
+    return f"{said}{beside}" + (f"; {modulus}" if modulus else "")
+
+
+def power_clause(power: Sequence[Power], kind: Kind) -> str:
+    """What the recordings would have shown."""
+    all_of_them = sum(kind in mechanism.kinds for mechanism in CATALOGUE.values())
+    shown = [entry.mechanism for entry in power if entry.smallest_visible_percent <= _SMALL]
+    if not shown:
+        return f"none of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response"
+    which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
+    return f"of the {all_of_them} known mechanisms {which}: {', '.join(in_words([name]) for name in shown)}"
+
+
+_ANY = ""
+TURNED = "time_s, on the way back"
+CONSTANT_PHASE = "frequency_hz, the same angle"
+HINTS: Mapping[tuple[str, str], str] = {
+    ("modulus", "recorded_at"): "A skin that warms up, cures on or swells would do this; note its temperature.",
+    ("modulus", "time_of_day"): "The temperature of the room would do this; at equal temperature it should vanish.",
+    ("modulus", "order"): "A skin that warms up or softens with use would do this; repeat in another order.",
+    ("modulus", "previous_preload_n"): "Softening by the press before (Mullins' effect) would do this; wait longer "
+    "between recordings, or come to each preload from the same one.",
+    ("modulus", "load_cycles"): "Fatigue or Mullins' effect would do this.",
+    ("modulus", "dwell_s"): "Relaxation that the known creep does not follow would do this.",
+    ("modulus", "x_mm"): "Uneven mixing or curing along x would do this.",
+    ("modulus", "y_mm"): "Uneven mixing or curing along y would do this.",
+    ("modulus", "preload_n"): "Stiffening or softening by another exponent than the known law's would do this.",
+    ("thickness", "recorded_at"): "Swelling or shrinking would do this; measure the thickness again.",
+    ("thickness", "order"): "Swelling, shrinking or a skin that is replaced would do this.",
+    ("thickness", "x_mm"): "A mould that is not level gives a wedge along x; measure the thickness at both ends.",
+    ("thickness", "y_mm"): "A mould that is not level gives a wedge along y; measure the thickness at both ends.",
+    ("contact_radius", "preload_n"): "A contact that grows with another power of the force than Hertz's would do this: "
+    "roughness, a worn sphere.",
+    ("contact_radius", "order"): "A sphere that was changed, worn or dirty from then on would do this; look at it.",
+    ("contact_radius", "recorded_at"): "A sphere that was changed or wears would do this; look at it.",
+    ("force", "preload_n"): "Friction in the guide takes a constant part of the force; a cell below the skin would "
+    "show it.",
+    ("force", "previous_preload_n"): "Friction or hysteresis of the stage would do this; come to each preload from "
+    "the same side.",
+    ("force", "recorded_at"): "A cell whose zero drifts would do this; set it to zero before each recording.",
+    ("force", "time_of_day"): "A cell whose zero follows the temperature would do this.",
+    ("force", "order"): "A cell whose zero drifts would do this; set it to zero before each recording.",
+    ("gain", "recorded_at"): "An amplifier that drifts, or d33 that follows the temperature, would do this; repeat the "
+    "first recording at the end.",
+    ("gain", "time_of_day"): "Temperature or humidity of the room would do this; at equal temperature it should "
+    "vanish.",
+    ("gain", "order"): "An amplifier or a plug that was changed on the way would do this; repeat the first recording.",
+    ("gain", "previous_preload_n"): "A film that remembers the press before would do this; wait longer in between.",
+    ("gain", "x_mm"): "A film that was drawn or poled unevenly along x would do this.",
+    ("gain", "y_mm"): "A film that was drawn or poled unevenly along y would do this.",
+    ("gain", "dynamic_force_n"): "A film or an amplifier that is not linear in the force would do this.",
+    ("gain", "preload_n"): "A film whose d33 depends on the stress otherwise than the known law has it would do this.",
+    ("gain", "load_cycles"): "Ageing by another law than the known one would do this.",
+    ("position", "order"): "A stage that loses steps or runs round would do this; return to its zero now and then.",
+    ("position", "recorded_at"): "A frame that creeps or warms up would do this.",
+    ("position", "time_of_day"): "A frame that follows the temperature would do this.",
+    ("position", "previous_preload_n"): "Play of the stage would do this; come to each place from the same side.",
+    ("modulus", "displacement_mm"): "A body that is not the same at all depths, or another law of stress and strain "
+    "than the known one, would do this; press with a sphere of another radius.",
+    ("modulus", "time_s"): "Relaxation that the known creep does not follow would do this, or a body that dries; hold "
+    "longer, and at two speeds.",
+    ("gain", "force_n"): "A cell or a cantilever that is not linear would do this; calibrate it at several forces.",
+    ("force", "time_s"): "A cell whose zero drifts otherwise than straight would do this; record longer in the air, "
+    "before and after.",
+    ("force", "displacement_mm"): "Something that touches on the way, or a screw with a periodic error, would do "
+    "this; record in the air.",
+    ("position", "displacement_mm"): "A surface that is rough or dirty, a tip that is no sphere, or an encoder with a "
+    "periodic error would do this; look at the tip, and press elsewhere.",
+    ("position", "time_s"): "A frame that warms up or creeps, or a surface that does not come back, would do this; "
+    "press a stiff block in its place.",
+    ("modulus", TURNED): "A body that softens as it is pressed, or friction that turns with the sphere, would do this; "
+    "press again at the same place.",
+    ("force", TURNED): "Friction in the guide would do this; move through the air and back.",
+    (
+        "position",
+        TURNED,
+    ): "Play of the stage, or a surface that does not come back, would do this; press a stiff block.",
+    ("frequency_response", "frequency_hz"): "A resonance of the frame, an electronic filter or a cable would do this; "
+    "record a stiff steel block in place of the skin.",
+    (
+        "frequency_response",
+        CONSTANT_PHASE,
+    ): "The reference phase of a lock-in amplifier, or a sensor's loss angle, would "
+    "do this; record a stiff steel block in place of the skin.",
+    ("frequency_response", "dynamic_force_n"): "Friction that grows with the amplitude would do this; record at "
+    "several dynamic forces.",
+    ("frequency_response", "preload_n"): "Losses in the contact that grow with the preload would do this.",
+    ("frequency_response", "recorded_at"): "A clock or filter that drifts would do this.",
+    ("frequency_response", _ANY): "Electronics or a frame that follow this axis would do this.",
+}
+OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sample is compressed or pulled
+    (
+        "modulus",
+        "displacement_mm",
+    ): "Another law of stress and strain than the known one, or a sample that slips in its "
+    "grips or at its platens, would do this; measure the strain on the sample itself.",
+    (
+        "modulus",
+        "force_n",
+    ): "Another law of stress and strain than the known one, or a sample that slips in its grips or "
+    "at its platens, would do this; measure the strain on the sample itself.",
+    (
+        "position",
+        "displacement_mm",
+    ): "Ends that are not even, grips that slip, or an encoder with a periodic error would do "
+    "this; measure the strain on the sample itself.",
+    (
+        "modulus",
+        TURNED,
+    ): "A sample that softens as it is strained, or friction at its platens, would do this; repeat the cycle.",
+    (
+        "position",
+        TURNED,
+    ): "Play of the machine, or a sample that does not come back, would do this; compress a stiff block.",
+}
+
+
+def hint(acts_on: str, axis: str, kind: Kind) -> str:
+    """A sentence, or none."""
+    if kind == "compression" and (acts_on, axis) in OF_BLOCKS:
+        return OF_BLOCKS[acts_on, axis]
+    return HINTS.get((acts_on, axis), HINTS.get((acts_on, _ANY), ""))
+
+
+_SLIPS = (
+    *(FindingCode.NO_RESPONSE, FindingCode.IMPOSSIBLE_GEOMETRY, FindingCode.NO_FINITE_LINE, FindingCode.REFUSED),
+    *(FindingCode.IMPOSSIBLE_NUMBER, FindingCode.SERIES_NOT_USABLE, FindingCode.CURVE_NOT_USABLE),
+    *(
+        FindingCode.SENSORS_EXCHANGED,
+        FindingCode.WEAK,
+        FindingCode.STRONG,
+        FindingCode.CONJUGATED,
+        FindingCode.GAIN_STEPS,
+    ),
+    FindingCode.WARM_UP,
+    *(FindingCode.FORCE_SATURATES, FindingCode.PERIODIC_ERROR),
+    *(
+        FindingCode.UNITS_OFF_BY_1000,
+        FindingCode.CHANNELS_SWAPPED,
+        FindingCode.SIGN_FLIPPED,
+        FindingCode.MAINS_IN_CHARGE,
+        FindingCode.OUT_OF_DOMAIN,
+    ),
+    *(FindingCode.CONTACTS_KEPT, FindingCode.DUPLICATED_RECORDING),
+)
+_RESERVES = (
+    *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
+    *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED),
+)
+_MOST = 2  # findings that are quoted; the others are counted
+
+
+def slips(findings: Sequence[Mapping[str, str]]) -> list[str]:
+    """Clauses on errors in the recordings: on the most decisive ones what they are, on the others how many."""
+    return _clauses(findings, _SLIPS)
+
+
+def reserves(findings: Sequence[Mapping[str, str]]) -> list[str]:
+    """Clauses on what the stated answer leaves open: a remainder, an error held out, a d33 that cannot be."""
+    return _clauses(findings, _RESERVES)
+
+
+def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:
+    chosen = sorted(
+        (entry for entry in findings if entry["code"] in decisive),
+        key=lambda entry: decisive.index(FindingCode(entry["code"])),
+    )
+    further = Counter(entry["code"].replace("_", " ") for entry in chosen[_MOST:])
+    counted = [f"{count} of {code}" for code, count in further.items()]
+    more = [f"further findings: {', '.join(counted)}"] if counted else []
+    return [*map(_quoted, chosen[:_MOST]), *more]
+
+
+def _quoted(entry: Mapping[str, str]) -> str:
+    text = clause(entry["statement"])
+    return f"recording {entry['recording']!r}: {text}" if entry["recording"] else text
+
+
+def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
+    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be what is
+    missing. Mechanisms of other kinds of recordings are none of it."""
+    return [
+        f"{name.replace('_', ' ')} was not tried: {reason}"
+        for name, reason in unsupported.items()
+        if kind != "frf" and name in CATALOGUE and kind in CATALOGUE[name].kinds and _is_physics(CATALOGUE[name])
+    ]
+
+
+def _is_physics(mechanism: Mechanism) -> bool:
+    """Whether it is more than another value of what is declared, which curves without a declared value have free."""
+    return mechanism.stage is not Stage.DECLARED
+
 
 _HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
 _DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle

@@ -12,37 +12,37 @@ from typing import Any
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
-from underskin.diagnosis.localisation.effect_size import EffectSize
-from underskin.diagnosis.localisation.permutation_test import AxisResult
-from underskin.diagnosis.localisation.region import reaches_all_along
-from underskin.diagnosis.localisation.residual_shape import Shape
+from underskin.diagnosis.localisation import AxisResult, EffectSize, Shape, reaches_all_along
 from underskin.diagnosis.planning.optimal_design import NextRecordings
-from underskin.diagnosis.reporting import averaged, kinds, next_experiment, statements
-from underskin.diagnosis.reporting.answer_statement import (
+from underskin.diagnosis.reporting import goodness_of_fit, numbers, statements
+from underskin.diagnosis.reporting import statements as next_experiment
+from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary, fit_warnings
+from underskin.diagnosis.reporting.law_statement import (
     Around,
     OfAnswer,
     answer_statement,
     insufficient_statement,
     left_by,
+    not_tried,
+    reserves,
+    slips,
 )
-from underskin.diagnosis.reporting.at_bounds import at_bounds
-from underskin.diagnosis.reporting.caveats import not_tried, reserves, slips
-from underskin.diagnosis.reporting.confirming import confirming
-from underskin.diagnosis.reporting.fit_warnings import fit_warnings
-from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary
-from underskin.diagnosis.reporting.idealised import idealised
 from underskin.diagnosis.reporting.law_statement import statement as law_statement
-from underskin.diagnosis.reporting.numbers import parameter, rounded, without_effect
-from underskin.diagnosis.reporting.sensors_apart import sensors_apart
-from underskin.diagnosis.reporting.stated_d33 import BY_NUISANCES, StatedD33, stated_d33
-from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, outweighed, unnamed
+from underskin.diagnosis.reporting.numbers import (
+    at_bounds,
+    idealised,
+    parameter,
+    rounded,
+    sensors_apart,
+    without_effect,
+)
+from underskin.diagnosis.reporting.statements import BY_NUISANCES, StatedD33, stated_d33
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, confirming, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
-from underskin.diagnosis.selection.kinds_together import Joined
 from underskin.diagnosis.selection.priors import least_evidence
+from underskin.diagnosis.selection.search import Joined
 from underskin.diagnosis.validation import cross_validation
-from underskin.diagnosis.validation.hidden_shift import HiddenShift
-from underskin.diagnosis.validation.identifiability import Confounding
-from underskin.diagnosis.validation.power import Power
+from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
 from underskin.findings.codes import FindingCode
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
@@ -188,8 +188,8 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     mechanisms = [] if stated_set is None else _mechanisms(search, problem, stated_set)
     if named is not None:
         mechanisms += _of_curves_alone(diagnosis, leader)
-    told_by_kind = [] if diagnosis.joined is None else kinds.by_kind(diagnosis.joined, shown.names)
-    contradictory = [] if diagnosis.joined is None else kinds.contradictions(diagnosis.joined)
+    told_by_kind = [] if diagnosis.joined is None else goodness_of_fit.by_kind(diagnosis.joined, shown.names)
+    contradictory = [] if diagnosis.joined is None else goodness_of_fit.contradictions(diagnosis.joined)
     law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33 = stated_d33(
@@ -204,14 +204,14 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         unsure=diagnosis.level_unsure,
         skin_pc_per_n=diagnosis.skin_d33_pc_per_n,
     )
-    alike = averaged.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
+    alike = numbers.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
-    present = averaged.presence(search, averaged.present(search, problem))
+    present = numbers.presence(search, numbers.present(search, problem))
     # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
     unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
     unseen |= {entry.mechanism for entry in d33.hidden}
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
-    of_kinds = "" if diagnosis.joined is None else kinds.moduli_clause(diagnosis.joined, told_by_kind)
+    of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, told_by_kind)
     untried = _not_tried(stated, search, problem, findings)
     around = Around(
         slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
@@ -220,7 +220,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         quoted=[
             of_kinds,
             _depths_clause(problem, shown),
-            "" if alike is None else averaged.alike_clause(alike),
+            "" if alike is None else numbers.alike_clause(alike),
             d33.clause(),
         ],
     )
@@ -301,7 +301,7 @@ def _not_tried(
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
     places = own_places(explanation.names, explanation.best.hypothesis.lines)
     whole = cross_validation.in_sample(problem, explanation)
-    probabilities = averaged.present(search, problem)
+    probabilities = numbers.present(search, problem)
     return [
         {
             "name": name,
@@ -317,8 +317,8 @@ def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanatio
 def _of_curves_alone(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
     if diagnosis.joined is None or leader.explanation is None or diagnosis.search is None or diagnosis.problem is None:
         return []
-    present = averaged.present(diagnosis.search, diagnosis.problem)
-    own = kinds.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
+    present = numbers.present(diagnosis.search, diagnosis.problem)
+    own = goodness_of_fit.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
     return [{**entry, "probability": round(present.get(entry["name"], 0.0), 3)} for entry in own]
 
 

@@ -1,17 +1,38 @@
-"""What a report says in words, for people who press skins: no statistics but percentages, values with their units."""
+"""What a report states of mechanisms, of d33, and of what to measure next.
+
+What a report says in words, for people who press skins: no statistics but percentages, values with their units. The
+planned recordings as the report's `next_experiment`, with a statement in words. The d33 of a report: whether it is to
+be quoted, and what would change it that these recordings do not show.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import in_words
-from underskin.diagnosis.localisation.effect_size import EffectSize
-from underskin.diagnosis.localisation.permutation_test import AxisResult, Undecidable
-from underskin.diagnosis.localisation.residual_shape import ALONG_CURVES, FormKind, Shape, ShapeForm
-from underskin.diagnosis.selection.answers import Answer
-from underskin.diagnosis.validation.identifiability import Likeness
-from underskin.findings.formatting import in_digits
+from underskin.diagnosis.inference.explanation import FittingProblem
+from underskin.diagnosis.localisation import (
+    ALONG_CURVES,
+    AxisResult,
+    EffectSize,
+    FormKind,
+    Shape,
+    ShapeForm,
+    Undecidable,
+)
+from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
+from underskin.diagnosis.reporting import numbers
+from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
+from underskin.diagnosis.selection.answers import Answer, Search
+from underskin.diagnosis.validation.cross_validation import REACHES_NOISE
+from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.findings.formatting import in_digits, in_percent
+from underskin.prediction import plausibility
 
 _UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
@@ -184,3 +205,237 @@ def _range(axis: str, ends: Sequence[float | str]) -> str:
 def listed(names: Sequence[str]) -> str:
     """Names with commas and a last "and"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+_STIFFENING = "strain_stiffening"
+_VARIED = {  # of curves, as `WORDS` else
+    "displacement_mm": "depth",
+    "force_n": "largest force",
+    "sample_diameter_mm": "diameter of the sample",
+    "sample_height_mm": "height of the sample",
+    "time_s": "speed and the time of a hold",
+}
+
+
+def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
+    """The document, in lab units; empty where nothing needs to be planned."""
+    if plan is None:
+        return {}
+    return {
+        "recordings": _recordings(plan),
+        "separates": [list(names) for names in plan.rivals],
+        "probability_of_deciding": round(plan.probability, 3),
+        "without_it": round(plan.without, 3),
+        "minutes": round(plan.minutes, 1),
+        "statement": _statement(plan) if plan.recordings else _why_none(plan),
+    }
+
+
+def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
+    documents = []
+    for entry in dict.fromkeys(plan.recordings):
+        names = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n")
+        described = {name: getattr(entry, name) for name in names}
+        described |= {"position_mm": list(entry.position_mm or ()), "dwell_s": entry.dwell_s}
+        known = {name: value for name, value in described.items() if value is not None}
+        documents.append({**known, "repeats": plan.recordings.count(entry)})
+    return documents
+
+
+def _statement(plan: NextRecordings) -> str:
+    first = plan.first
+    assert first is not None
+    beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
+    one = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
+    several = f"{len(plan.recordings)} recordings, of which that {one} tells most,"
+    return (
+        f"{several if len(plan.recordings) > 1 else f'One recording {one}'} should tell whether "
+        f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
+    )
+
+
+def _block(plan: NextRecordings) -> str:
+    """That a compressed block or an indentation would tell, where that is promising."""
+    if plan.block is None:
+        return ""
+    stiffens = any(_STIFFENING in names for names in plan.rivals)
+    also = "; compressed by a fifth of its height, a block shows strain stiffening too" if stiffens else ""
+    told = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
+    return f" A compressed block or an indentation of the same elastomer would tell E, and so {told}."
+
+
+def _why_none(plan: NextRecordings) -> str:
+    if plan.outside:
+        return (
+            f"No recordings within these limits can be planned to tell whether it is {_rivals(plan)}: the tables hold "
+            f"none of their contacts; choose spheres and preloads nearer to those of the campaign.{_block(plan)}"
+        )
+    statement = f"No recordings within these limits are likely to tell whether it is {_rivals(plan)}."
+    if plan.differ_on:
+        words = sorted(_VARIED[axis] if axis in _VARIED else WORDS[axis][0] for axis in plan.differ_on)
+        statement += f" They differ in what they depend on: vary the {listed(words)} more widely than here."
+    return statement + _block(plan)
+
+
+def _rivals(plan: NextRecordings) -> str:
+    """Each explanation in words, "with" between the mechanisms of one, so that "or" parts explanations alone."""
+    *others, last = [" with ".join(in_words([name]) for name in names) for names in plan.rivals]
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+_LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
+_MOST_NAMED = 2  # mechanisms that would not show, beside a value to quote
+_ANSWERS = "several answers remain"
+BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
+
+
+@dataclass(frozen=True)
+class StatedD33:
+    """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
+    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted. `why_not`: what
+    else does, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none."""
+
+    document: Mapping[str, Any] | None
+    findings: Sequence[Finding] = ()
+    hidden: Sequence[HiddenShift] = ()
+    why_not: Sequence[str] = ()
+    skin_pc_per_n: float | None = None
+
+    @property
+    def deciding(self) -> list[HiddenShift]:
+        """What keeps d33 from being quoted: hidden wrong declared numbers, and what would change it as much, the
+        largest first; none where no declared number does."""
+        least = min((abs(entry.log_factor) for entry in self.hidden if entry.declared), default=np.inf)
+        chosen = [entry for entry in self.hidden if abs(entry.log_factor) >= least]
+        return sorted(chosen, key=lambda entry: -abs(entry.log_factor))
+
+    def clause(self) -> str:
+        """The value to quote, or why none is; empty where there is no d33."""
+        if self.document is None:
+            return ""
+        if self.document["quotable"]:
+            return f"d33 to quote: {self.quoted()}"
+        return f"d33 is not to be quoted: {self.interval()}"
+
+    def quoted(self) -> str:
+        """The value with its interval, and which physics that would not show would change it most beyond that."""
+        assert self.document is not None
+        value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
+        largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
+        named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
+        hides = f", provided that no {named} hides" if named else ""
+        return f"{value} {self.document['unit']} (95 %: {low} to {high}{self._apart()}){self._beside_declared()}{hides}"
+
+    def _apart(self) -> str:
+        """The interval without what the declared values may be off by."""
+        assert self.document is not None
+        low, high = (f"{self.document['relative'][key]:.3g}" for key in ("low", "high"))
+        return f" with what declared values may be off, {low} to {high} to compare sensors or dates"
+
+    def _beside_declared(self) -> str:
+        """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
+        charge taken for an amplitude halves or doubles every FRF, which nothing else in the recordings tells."""
+        assert self.document is not None
+        declared = self.skin_pc_per_n
+        if declared is None or self.document["low"] <= declared <= self.document["high"]:
+            return ""
+        return f", {self.document['value'] / declared:.2g} times the declared {declared:g} {self.document['unit']}"
+
+    def interval(self) -> str:
+        """Where it lies, and why it is not to be quoted."""
+        assert self.document is not None
+        low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
+        lies = f"it lies from {low} to {high} {self.document['unit']}{self._beside_declared()}"
+        deciding = [f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.deciding[:_MOST_NAMED]]
+        if deciding:
+            return f"{lies}, but what would not show here would change it, {listed(deciding)}"
+        over = " over the answers that remain" if _ANSWERS in self.why_not else ""
+        others = " and ".join(words for words in self.why_not if words != _ANSWERS)
+        return f"{lies}{over}" + (f", {'and' if over else 'but'} {others}" if others else "")
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it is not to be quoted; none where it is."""
+        if self.document is None:
+            return list(self.why_not) or ["no answer explains its recordings"]
+        hidden = in_words([one.mechanism for one in self.deciding[:_MOST_NAMED]])
+        return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
+
+    def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
+        """The report's entries, with what each would do to d33 beyond its interval."""
+        hidden = {entry.mechanism: entry for entry in self.hidden}
+        known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
+        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.hidden]
+        return [
+            {
+                "mechanism": entry.mechanism,
+                "confounded_with": entry.confounded_with,
+                "reason": _reason(entry, hidden.get(entry.mechanism)),
+            }
+            for entry in (*confounded, *(one for one in further if one.mechanism not in known))
+        ]
+
+
+def stated_d33(
+    search: Search,
+    problem: FittingProblem,
+    fit: Mapping[str, Any],
+    shifts: Sequence[HiddenShift],
+    *,
+    stands: bool,
+    contradictory: bool,
+    at_bounds: Sequence[str],
+    law: LeadingLaw | None,
+    unsure: float,
+    skin_pc_per_n: float | None,
+) -> StatedD33:
+    """The d33 averaged over all answers.
+
+    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
+    search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
+    recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
+    show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that noise in their
+    channels leaves. `skin_pc_per_n`: the skin's declared one.
+    """
+    d33 = None if problem.lines.curves else numbers.d33(search, problem, unsure)
+    if d33 is None:
+        return StatedD33(None)
+    half_width = float(np.log(d33["high"] / d33["low"])) / 2
+    hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
+    implausible = plausibility.implausibility(d33["value"])
+    floor, error = fit["noise_floor_percent"], fit["after"]["rmse_percent"]
+    against = {
+        _ANSWERS: not stands,
+        "kinds of recordings contradict each other": contradictory,
+        " and ".join(at_bounds): bool(at_bounds),
+        "a law that is in no list acts on it": law is not None and not _acts_outside_band(law),
+        "no PVDF has such a value": implausible is not None,
+        f"the error in the recordings, {in_digits(error, 2)} %, is well above their noise": not (
+            error <= REACHES_NOISE * floor
+        ),
+        f"noise alone is {in_digits(floor, 2)} % of the response": not floor <= _LARGEST_FLOOR,
+    }
+    why_not = [words for words, holds in against.items() if holds]
+    finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
+    findings = [finding] if implausible else []
+    # Beside other reasons not to quote it, a hidden one would not be what decides.
+    quotable = {**d33, "quotable": not why_not}
+    stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
+    return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
+
+
+def _acts_outside_band(law: LeadingLaw) -> bool:
+    """Whether an unlisted law leaves the size of the response as it is over most of the band: a peak, a notch, and a
+    turn of the phase over frequency."""
+    return law.law.spoken.axis == "frequency_hz" and (law.is_phase or law.law.spoken.form == "peak")
+
+
+def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:
+    reason = CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
+    if hidden is None or entry.confounded_with not in BY_NUISANCES:
+        return reason
+    return f"{reason}; d33 would then be {_percent(hidden)} too {'large' if hidden.log_factor > 0 else 'small'}"
+
+
+def _percent(hidden: HiddenShift) -> str:
+    return f"{in_digits(abs(hidden.percent), 2)} %"

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from underskin.diagnosis.data.axes import WORDS
+from underskin.diagnosis.data.dataset import WORDS
 from underskin.diagnosis.data.names import quantity_in_words
 from underskin.diagnosis.reporting.figure_data import AXES
-from underskin.diagnosis.reporting.sentences import capital
-from underskin.diagnosis.reporting.typeset import FIELD_OF, with_minus, without_powers
+from underskin.diagnosis.reporting.law_statement import capital
+from underskin.diagnosis.reporting.page_styles import FIELD_OF, with_minus, without_powers
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
 from underskin.mechanisms.unnamed.vocabulary import followed

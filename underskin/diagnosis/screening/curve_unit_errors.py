@@ -1,6 +1,6 @@
 """Curves that contradict the others, or what rubber can be: copies, units off by 1000.
 
-What is compared is the apparent modulus (recordings/curve_magnitudes.py).
+What is compared is the apparent modulus (recordings/curve_course.py).
 """
 
 from collections.abc import Sequence
@@ -9,14 +9,19 @@ from functools import partial
 
 import numpy as np
 
-from underskin.diagnosis.data.inspected import Inspected
+from underskin.diagnosis.data.dataset import Inspected
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
-from underskin.recordings.campaign import Campaign, CompressionRecording, CurveRecording, IndentationRecording
-from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.curve_magnitudes import FAR, apparent_mpa, contradictions
+from underskin.recordings.campaign import (
+    Campaign,
+    CompressionRecording,
+    CurveRecording,
+    IndentationRecording,
+    SkinDescription,
+)
+from underskin.recordings.curve_course import FAR, apparent_mpa, contradictions
 
 _IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
 _DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli

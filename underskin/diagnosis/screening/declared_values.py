@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import hours
+from underskin.diagnosis.data.dataset import hours
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import Campaign, FrfRecording

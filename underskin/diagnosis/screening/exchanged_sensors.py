@@ -1,8 +1,23 @@
-"""Sensors that answer where other ones were pressed: labels exchanged, or cables since some recording.
+"""What sensors answer to contacts that all miss their places by the same vector, by the base model.
+
+How probable the levels of recordings are with the labels of sensors exchanged from some recording on, and without.
+
+A recording's level is
+    y_i = d S_i(e) + N(0, (s d S_i)² + (p d |∂S_i/∂place|)² + (f d max S)²),
+with S_i the response of the sensor that is taken to have answered, e the vector by which all contacts miss their
+places, s what sensors, scatter and unnamed physics make of a level, p the scatter of places, and f what reaches a
+sensor that is pressed nowhere near (its neighbours' charge). With probability ε a level is anything up to twice the
+largest. The evidence is averaged over e, d, s, p and f, and over the recordings from which on the sensors may be
+exchanged: one half for all of them, the other half evenly over the later ones.
+
+ε bounds what a wrong label costs, so that the evidence of an exchange may be that of one sensor alone, while the other
+one stays as wrong as it was. Each sensor's own gain, with the others exchanged, tells.
+
+Sensors that answer where other ones were pressed: labels exchanged, or cables since some recording.
 
 A sensor that answers where no response is expected of it is linked to the one that is nearest to where it was pressed.
 Each link is tried as an exchange of the two, and links that close a cycle of more sensors as a rotation, as by a plug
-that is off by one; `exchange_evidence` weighs each against none, at the cost of ln of how many are tried. Put right is
+that is off by one; each is weighed against none, at the cost of ln of how many are tried. Put right is
 one by which every sensor gains. Where a sensor gains by the label of another one, and none of them puts right both, its
 recordings contradict their places and are left out. A recording that answers with far less than is expected may be of a
 weak or dead sensor, and does not count.
@@ -10,21 +25,143 @@ weak or dead sensor, and does not count.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import dist, log
 
 import numpy as np
+from scipy.special import logsumexp
 
-from underskin.diagnosis.screening.aligned_lines import aligned_lines
-from underskin.diagnosis.screening.displaced_response import displaced_response
-from underskin.diagnosis.screening.exchange_evidence import ExchangeEvidence
-from underskin.diagnosis.screening.levels import flat_level
+from underskin.diagnosis.screening.levels import aligned_lines, flat_level
 from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
+from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.unnamed.axes import recording_order
-from underskin.recordings.campaign import Campaign, FrfRecording
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Floats, Indices
+
+
+@dataclass(frozen=True, eq=False)
+class DisplacedResponse:
+    """|FRF| of the base model [C/N] and how steep it is [C/N/mm] (displacements, recordings)."""
+
+    value: Floats
+    slope: Floats
+
+
+def displaced_response(
+    skin: SkinDescription,
+    entries: Sequence[FrfRecording],
+    sensors: Sequence[str],
+    displacement_mm: Floats,
+    table: SigmaTable,
+) -> DisplacedResponse:
+    """The response of one sensor to each recording's contact.
+
+    Parameters
+    ----------
+    skin
+        The array.
+    entries
+        The recordings; a contact without a place is on the sensor that the recording names.
+    sensors
+        (recordings,) the sensor that is to answer to each.
+    displacement_mm
+        (displacements, 2) by how much all contacts miss their places.
+    table
+        The σ table.
+    """
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in skin.sensors}
+    contacts = tuple(
+        entry.without_measurements(
+            frequency_hz=np.ones(1), sensor=sensor, position_mm=_moved(entry.position_mm or places[entry.sensor], by)
+        )
+        for by in displacement_mm
+        for entry, sensor in zip(entries, sensors, strict=True)
+    )
+    model = compose((), Conditions("contacts", skin, contacts), table, "frf")
+    prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
+    assert prediction.position_slopes is not None
+    shape = len(displacement_mm), len(entries)
+    slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes))
+    return DisplacedResponse(*(np.nan_to_num(part).reshape(shape) for part in (np.abs(prediction.value), slope)))
+
+
+def _moved(place: tuple[float, float], by: Floats) -> tuple[float, float]:
+    return place[0] + float(by[0]), place[1] + float(by[1])
+
+
+_ASTRAY = 1e-5  # ε
+_DISTANCES_MM, _DIRECTIONS, _MISS_MM = (0.3, 0.7, 1.2, 1.8), 8, 0.7  # of e, and its prior standard deviation
+_FREE = np.array(  # d over the usual one, s, p [mm], f
+    [*product(np.exp(np.linspace(-0.6, 0.6, 9)), (0.05, 0.12, 0.3), (0.05, 0.3), (0.02, 0.1))]
+)
+
+
+@dataclass(frozen=True)
+class Start:
+    """From which of the sensors' recordings on, in time, they are exchanged, and by how much ln evidence gains: by all,
+    and at least by each of them with the others exchanged."""
+
+    first: int
+    gain: float
+    least: float
+
+
+class ExchangeEvidence:
+    """The evidence of exchanges among the sensors of a campaign."""
+
+    def __init__(
+        self, skin: SkinDescription, entries: Sequence[FrfRecording], level: Floats, largest: float, table: SigmaTable
+    ) -> None:
+        """Work out the evidence as given; `level` (recordings,) over the usual one at the `largest` S [C/N]."""
+        self._skin, self._entries, self._table = skin, entries, table
+        angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+        around = np.column_stack([np.cos(angles), np.sin(angles)])
+        self._miss_mm = np.concatenate([np.zeros((1, 2)), *(distance * around for distance in _DISTANCES_MM)])
+        own = self._response(entries, [entry.sensor for entry in entries])
+        self._largest, self._level, self._own = largest, level, own
+        self._total = np.stack([self._density(own, self._level, at).sum(axis=-1) for at in range(len(self._miss_mm))])
+        self._total += self._prior[:, None]
+
+    def exchange(self, own: Indices, others: Sequence[str]) -> Start:
+        """The most probable start of an exchange; `own` are the sensors' recordings in time, `others` the sensor that
+        each is of."""
+        turned = self._response([self._entries[number] for number in own], others)
+        given = DisplacedResponse(self._own.value[:, own], self._own.slope[:, own])
+        level, places = self._level[own], range(len(self._miss_mm))
+        change = np.stack([self._density(turned, level, at) - self._density(given, level, at) for at in places])
+        since = np.cumsum(change[..., ::-1], axis=-1)[..., ::-1]
+        evidence = logsumexp(self._total[..., None] + since, axis=(0, 1))
+        prior = np.full(len(own), -log(2 * max(len(own) - 1, 1)))
+        prior[0] = -log(2)
+        weighed = evidence - logsumexp(self._total) + prior
+        first = int(np.argmax(weighed))
+        sensor = np.array([self._entries[number].sensor for number in own[first:]])
+        without = [
+            logsumexp(self._total + change[..., first:][..., sensor != name].sum(axis=-1)) for name in set(sensor)
+        ]
+        return Start(first, float(logsumexp(weighed)), float(evidence[first] - max(without)))
+
+    @property
+    def _prior(self) -> Floats:
+        """Of e but for a constant (displacements,), which stand for areas."""
+        distance = np.hypot(*self._miss_mm.T)
+        area = np.maximum(distance, _DISTANCES_MM[0] / 2)
+        return np.asarray(np.log(area) - distance**2 / (2 * _MISS_MM**2))
+
+    def _response(self, entries: Sequence[FrfRecording], sensors: Sequence[str]) -> DisplacedResponse:
+        return displaced_response(self._skin, entries, sensors, self._miss_mm, self._table)
+
+    def _density(self, response: DisplacedResponse, level: Floats, at: int) -> Floats:
+        """ln of that of each level under one displacement (d and noises, recordings)."""
+        d, s, p, f = _FREE.T[:, :, None]
+        value, slope = response.value[at] / self._largest, response.slope[at] / self._largest
+        variance = d**2 * ((s * value) ** 2 + (p * slope) ** 2 + f**2)
+        usual = np.exp(-0.5 * (level - d * value) ** 2 / variance) / np.sqrt(2 * np.pi * variance)
+        return np.asarray(np.log((1 - _ASTRAY) * usual + 0.5 * _ASTRAY))
+
 
 _LEAST_SHAPE = 0.3  # of the largest: smaller ones are measured by it
 _ANSWERS = 0.6  # of a level, or of `_LEAST_SHAPE`, that is not expected: then exchanges are sought

@@ -1,4 +1,9 @@
-"""What is wrong with the recordings of a campaign themselves, before any physics is held responsible.
+"""Slips that show in the levels of recordings only: a weak sensor, one that stands alone, amplitudes of another kind,
+a warm-up, cables exchanged.
+
+The plainest is put right first, since each looks a little like the others.
+
+What is wrong with the recordings of a campaign themselves, before any physics is held responsible.
 
 Recordings that contradict the others (copies, reversed signs, units off by 1000, no response, no finite line) are
 findings. They are left out of the diagnosis, or corrected where the error is plain (a sensor of reversed sign).
@@ -9,17 +14,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.data.axes import agree, recording_axes
-from underskin.diagnosis.data.inspected import Inspected
+from underskin.diagnosis.data.dataset import Inspected, agree, recording_axes
+from underskin.diagnosis.screening.amplitude_factors import Step, amplitude_step, without_step
 from underskin.diagnosis.screening.declared_values import unlikely
+from underskin.diagnosis.screening.exchanged_cables import exchanged_cables, with_right_sensors
 from underskin.diagnosis.screening.exchanged_sensors import without_exchanges
-from underskin.diagnosis.screening.level_slips import without_level_slips
+from underskin.diagnosis.screening.levels import causes_of, levels
 from underskin.diagnosis.screening.model_consistency import against_model
 from underskin.diagnosis.screening.phase_convention import in_one_convention
 from underskin.diagnosis.screening.position_errors import at_sensors, misplaced
+from underskin.diagnosis.screening.sensor_alone import Alone, at_the_others, standing_alone
 from underskin.diagnosis.screening.silent_together import without_silent_pair
 from underskin.diagnosis.screening.time_series import as_given, as_lines
 from underskin.diagnosis.screening.unit_errors import faint_oscillation, single_unit_errors
+from underskin.diagnosis.screening.warm_up import WarmUp, warming, without_first
+from underskin.diagnosis.screening.weak_sensors import weak_sensors
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
@@ -29,6 +38,55 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import loose_sphere, overlapping_sensors
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
+
+_LEAST = 4  # recordings
+_MOST = 300  # recordings: the covariance of more costs minutes
+_MOST_SLIPS = 3
+
+
+def without_level_slips(
+    campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable
+) -> tuple[list[FrfRecording], list[Finding]]:
+    """The recordings with such slips put right or left out, and the findings on them."""
+    left, findings = list(entries), list[Finding]()
+    if len(left) >= _LEAST:
+        weak, findings = weak_sensors(left, levels(campaign, left, table))
+        left = [entry for entry, off in zip(left, weak, strict=True) if not off]
+    for _ in range(_MOST_SLIPS):
+        found = _plainest(campaign, left, table)
+        if found is None:
+            break
+        left, finding = found
+        findings.append(finding)
+    return left, findings
+
+
+def _plainest(
+    campaign: Campaign, entries: list[FrfRecording], table: SigmaTable
+) -> tuple[list[FrfRecording], Finding] | None:
+    """The recordings without the plainest slip, and the finding on it; None where there is none."""
+    if len(entries) < _LEAST:
+        return None
+    own = levels(campaign, entries, table)
+    if not _LEAST <= len(own.value) <= _MOST:
+        return None
+    slips = (
+        amplitude_step(own),
+        warming(own, causes_of(campaign, entries, own, table)),
+        exchanged_cables(own),
+        standing_alone(own),
+    )
+    found = [one for one in slips if one is not None]
+    best = max(found, key=lambda one: one.gain, default=None)
+    if isinstance(best, Step):
+        return without_step(entries, own, best)
+    if isinstance(best, WarmUp):
+        return without_first(entries, best)
+    if isinstance(best, Alone):
+        return at_the_others(entries, own, best)
+    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    return None if best is None else with_right_sensors(entries, own, best, places)
+
 
 LEAST_RECORDINGS = 2
 _SAME = 1e-4  # relative difference of copies: files round numbers to some digits

@@ -1,4 +1,9 @@
-"""The level of each recording over the base model's, and what else than a slip may move it.
+"""Levels of recordings above the model, and what may cause them.
+
+The lines of recordings as FRFs in phase with the force: without a delay of the chain, which turns them. Whether
+something follows an axis along which recordings differ: then a law may be at work, and no slip need be.
+
+The level of each recording over the base model's, and what else than a slip may move it.
 
 With y_i = ln |level_i / shape_i| of recording i, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
@@ -7,6 +12,13 @@ where X holds a gain, one gain a sensor (of standard deviation t), and smooth fu
 positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size
 of the smooth functions, p(s) the prior of a recording's gain: a slip is believed where taking it out of y raises the
 evidence by far more than its own description costs.
+
+What may move the levels of recordings, how probable each is beforehand, and the evidence of levels over all of it.
+
+Either nothing does, or one mechanism of the catalogue, or something smooth (`levels`): several mechanisms, or a law
+that nobody listed. A mechanism's changes Δ of ln level, at K points drawn from the priors of its parameters, stand in
+the model of levels as a normal change of the same second moments, Σ Δ Δᵀ/K. Beside nothing and beside each mechanism,
+the declared modulus and thickness may be off as far as their priors allow.
 """
 
 from collections.abc import Sequence
@@ -16,15 +28,56 @@ from math import log
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+from scipy.stats import qmc
 
-from underskin.diagnosis.noise.noise_priors import GAIN_FALL, Plateau
+from underskin.diagnosis.noise import GAIN_FALL, Plateau
+from underskin.mechanisms.base import Unsupported
 from underskin.mechanisms.models.composed import compose
+from underskin.mechanisms.models.frf import FrfModel
+from underskin.mechanisms.parameter import Normal
+from underskin.mechanisms.registry import CATALOGUE
 from underskin.mechanisms.unnamed.axes import axes_of, recording_order
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.campaign import Campaign, Conditions, FrfRecording
+from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
+from underskin.recordings.frf.spectra import stacked
 from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats, Indices, Mask
+from underskin.units import Array, Complexes, Floats, Indices, Mask
+
+
+def aligned_lines(entries: Sequence[FrfRecording]) -> list[Complexes]:
+    """The values [C/N] of each recording's lines without the delay that all of them share."""
+    measured = [lines_of(entry) for entry in entries]
+    delay = common_delay(stacked(measured))
+    return [advanced(own.values, own.frequency, delay) if delay else own.values for own in measured]
+
+
+_LEAST = 2  # recordings: a single one is extreme along some axis
+_BESIDE = 0.25  # of them, as many may be lacking or too many
+_TERMS, _SIZE = 4, 0.3  # cosines over the rank along an axis, and the prior standard deviation of each
+
+
+def follows_an_axis(chosen: Mask, axes: Sequence[Floats]) -> bool:
+    """Whether some recordings are, but for few, those on one side of an axis, or on one level of it."""
+    if chosen.sum() < _LEAST:
+        return False
+    allowed = _BESIDE * chosen.sum()
+    for axis in axes:
+        for level in np.unique(axis):
+            for part in (axis >= level, axis == level):
+                beside = int((part ^ chosen).sum())
+                if min(beside, len(chosen) - beside) <= allowed:
+                    return True
+    return False
+
+
+def smooth_along(axis: Floats) -> Floats:
+    """Cosines over the rank along an axis, times their prior standard deviation (recordings, terms)."""
+    _, place = np.unique(axis, return_inverse=True)
+    share = place / max(int(place.max()), 1)
+    return np.asarray(_SIZE * np.cos(np.pi * np.outer(share, np.arange(1, _TERMS + 1))))
+
 
 _FLAT_HZ = 130.0  # the response is about flat below
 _LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
@@ -180,3 +233,108 @@ def _log_density(value: Floats, covariance: Floats) -> float:
     root = np.linalg.cholesky(covariance)
     white = solve_triangular(root, value, lower=True, check_finite=False)
     return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
+
+
+_NO_CAUSE, _ONE_CAUSE, _SMOOTH_COURSE = 0.6, 0.25, 0.15  # prior probabilities
+_DRAWS = 8
+_LEAST_RATIO = 1e-3  # of the base model's
+
+
+@dataclass(frozen=True, eq=False)
+class Cause:
+    """The logarithm of its prior, and what it adds to X: columns times their prior standard deviations
+    (recordings, columns)."""
+
+    log_prior: float
+    columns: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """ln evidence of each alternative (alternatives,), and what is expected of its coefficients, over their prior
+    standard deviations (alternatives, columns)."""
+
+    evidence: Floats
+    coefficient: Floats
+
+
+def causes_of(campaign: Campaign, entries: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
+    """All that may move the levels of a campaign's recordings, those that `levels` has."""
+    contacts = tuple(entry.without_measurements(frequency_hz=np.ones(1)) for entry in entries)
+    conditions = Conditions("contacts", campaign.skin, contacts)
+    base = compose((), conditions, table, "frf")
+    start = np.array([parameter.start for parameter in base.parameters])
+    prediction = base.predict(start)
+    value = prediction.value[levels.number]
+    declared = np.stack(
+        [
+            (slope[levels.number] / value).real * parameter.prior.sd
+            for parameter, slope in zip(base.parameters, prediction.slopes, strict=True)
+            if isinstance(parameter.prior, Normal)
+        ],
+        axis=1,
+    )
+    laws = []
+    for name, mechanism in CATALOGUE.items():
+        if "frf" not in mechanism.kinds or mechanism.needs_lines:
+            continue
+        try:
+            model = compose((name,), conditions, table, "frf")
+        except Unsupported:
+            continue
+        assert isinstance(model, FrfModel)
+        if not any(parameter.moves_covariance for parameter in model.parameters):
+            relative = np.abs([changed[levels.number] / value for changed in model.values(_drawn(model, start))])
+            change = np.log(np.maximum(relative, _LEAST_RATIO))
+            laws.append(change.T / len(change) ** 0.5)
+    bends = [bend for bend in BENDS if bend > 0]
+    return [
+        Cause(log(_NO_CAUSE), declared),
+        *(Cause(log(_ONE_CAUSE / len(laws)), np.hstack([declared, law])) for law in laws),
+        *(Cause(log(_SMOOTH_COURSE / len(bends)), bend * levels.smooth) for bend in bends),
+    ]
+
+
+def explained(levels: Levels, causes: Sequence[Cause], further: Floats) -> Explained:
+    """The levels by each alternative, over all causes, at the best s, t, p (`levels`) of each.
+
+    `further` (alternatives, recordings, columns) is what each alternative adds to X, times prior standard deviations.
+    """
+    each = [_by_cause(levels, cause.columns, further) for cause in causes]
+    joint = np.array([cause.log_prior + one.evidence for cause, one in zip(causes, each, strict=True)])
+    total = logsumexp(joint, axis=0)
+    share = np.exp(joint - total)
+    coefficient = (share[:, :, None] * np.array([one.coefficient for one in each])).sum(axis=0)
+    return Explained(np.asarray(total), np.asarray(coefficient))
+
+
+def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
+    """The same by one cause."""
+    alternatives, recordings, width = further.shape
+    right = np.column_stack([levels.value, further.transpose(1, 0, 2).reshape(recordings, -1)])
+    evidence, coefficient = np.full(alternatives, -np.inf), np.zeros((alternatives, width))
+    for spread, place in product(levels.spreads, levels.places):
+        fixed = levels.expected(spread, columns) + np.diag((levels.slope * place) ** 2)
+        for scatter in SCATTER:
+            root = np.linalg.cholesky(fixed + scatter**2 * np.eye(recordings))
+            white = solve_triangular(root, right, lower=True, check_finite=False)
+            value, own = white[:, 0], white[:, 1:].reshape(recordings, alternatives, width).transpose(1, 0, 2)
+            precision = np.eye(width) + own.transpose(0, 2, 1) @ own
+            along = value @ own
+            best = np.linalg.solve(precision, along[:, :, None])[:, :, 0]
+            nothing = -0.5 * value @ value - np.log(np.diag(root)).sum() + SCATTER_PRIOR.log_density(log(scatter))
+            density = nothing + 0.5 * (along * best).sum(axis=1) - 0.5 * np.linalg.slogdet(precision)[1]
+            better = density > evidence
+            evidence = np.where(better, density, evidence)
+            coefficient = np.where(better[:, None], best, coefficient)
+    return Explained(evidence, coefficient)
+
+
+def _drawn(model: FrfModel, start: Floats) -> Array:
+    """Points (points, parameters) from the priors of a mechanism's parameters, declared values as they are."""
+    own = model.parameters[: len(model.parameters) - len(start)]
+    if not own:
+        return start[None, :]
+    share = qmc.Halton(len(own), scramble=False).random(_DRAWS + 1)[1:]  # the first is 0
+    points = [[parameter.quantile(float(one)) for parameter, one in zip(own, row, strict=True)] for row in share]
+    return np.hstack([points, np.tile(start, (len(points), 1))])

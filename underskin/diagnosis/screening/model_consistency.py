@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.screening.aligned_lines import aligned_lines
+from underskin.diagnosis.screening.levels import aligned_lines
 from underskin.diagnosis.screening.no_response import dead, no_response
 from underskin.diagnosis.screening.reversed_signs import signs_of
 from underskin.diagnosis.screening.table_domain import within_tables

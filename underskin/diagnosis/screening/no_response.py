@@ -27,7 +27,7 @@ _PLAIN = 0.1  # of the largest response that is expected: a smaller one is near 
 
 
 def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
-    """Which recordings show none, of the lines (lines,) [C/N] of each without a common delay (`aligned_lines`), and the
+    """Which recordings show none, of the lines (lines,) [C/N] of each without a common delay (see `levels`), and the
     variance of each one's mean [(C/N)²]; 0 where its lines are too few."""
     unresponsive, variance = np.zeros(len(aligned), dtype=bool), np.zeros(len(aligned))
     for number, values in enumerate(aligned):

@@ -1,27 +1,306 @@
-"""Imported FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
+"""The course of each recording's phase over frequency, and the nearest one that a causal, stable sensor can have.
+
+In the convention e^(+iωt) every element between force and charge has a logarithm ln H(iω) whose phase is tied to its
+magnitude: a high pass ln(iωτ/(1+iωτ)) leads where it attenuates, a relaxation −ln(iω) or 1/(1+iω/ω_s) lags where it
+falls, a resonance −ln(1−(ω/ω0)²+2iζω/ω0) lags above it, and a delay −iω only lags. Elements in a row add up with
+weights that are not negative, which a conjugated FRF contradicts.
+
+How near the listed mechanisms come to a course of ln FRF over frequency, in the convention e^(+iωt).
+
+ln H of a high pass is −ln(1 + f_c/(if)): it leads where it attenuates. A low pass, −ln(1 + if/f_c), lags where it does,
+and so does a relaxation, −n ln(if) + ln(1 + s/(1 + if/f_s)). A delay −iωt0 lags. The resonance of a tip on its contact,
+−ln(1 − r² + 2iζr), lags where it rises. A conjugated FRF contradicts each of them. Strengths have the catalogue's
+priors, so that no relaxation far below the band, of a size that nothing has, stands for a conjugated high pass; a delay
+is one of the charge, t0 ≥ 0.
+
+Imported FRFs whose phase is in the other sign convention, e^(−iωt): conjugated, in some recordings or in all.
 
 Of some: each course of phase over frequency is q_i = ±1 times one smooth course φ. With the signs that explain them
 best the evidence must exceed that of one sign for all by what choosing k of n recordings costs, and the sizes of the
 phases must be of two signs rather than a channel's own phase in each recording. Of all: the listed mechanisms explain
-the conjugated course (`phase_laws`), and neither they nor a vibrating part the course as it is. Where a lag of the
+the conjugated course (laws of the phase), and neither they nor a vibrating part the course as it is. Where a lag of the
 force channel explains the course as well, both readings are stated and nothing is changed.
 """
 
-from collections.abc import Collection, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from math import comb, log
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.special import log_ndtr
 from scipy.stats import norm
 
-from underskin.diagnosis.screening.phase_course import PhaseCourses, phase_courses
-from underskin.diagnosis.screening.phase_laws import Course, leading, misfit, unlisted_misfit
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.units import Floats
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.spectra import Frf
+from underskin.units import Complexes, Floats, Indices, Mask
+
+_BANDS = 24  # of equal width in the logarithm of frequency
+_LEAST_LINES = 6
+_MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
+_STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
+_UNSURE = 6.0  # of a line's noise
+_WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
+_SECOND = 0.6745 * np.sqrt(6.0)  # median of the size of second differences over the noise of a line
+_ENOUGH = 12  # second differences in a band, or in it and the two beside it on either side
+
+
+@dataclass(frozen=True)
+class PhaseCourses:
+    """ln FRF without its real mean, in bands of frequency (recordings, bands), NaN where there is no line or the lines
+    are too noisy; the polarity is taken off. `deviation` is the noise of each part."""
+
+    frequency: Floats  # (bands,)
+    value: Complexes
+    deviation: Floats
+    followed: Mask  # below where the way round of the phase is lost: at a zero of the response or a sharp resonance
+
+    @property
+    def telling(self) -> Mask:
+        """Whether a recording has a course at all (recordings,)."""
+        return np.asarray(np.isfinite(self.value).any(axis=1))
+
+
+def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
+    """Those of recordings."""
+    measured = [lines_of(entry) for entry in entries]
+    lowest = min(float(own.frequency.min()) for own in measured)
+    highest = max(float(own.frequency.max()) for own in measured)
+    edges = np.geomspace(lowest * (1 - 1e-9), highest * (1 + 1e-9), _BANDS + 1)
+    value = np.full((len(entries), _BANDS), np.nan + 0j)
+    followed = np.zeros(value.shape, dtype=bool)
+    share, noises = np.full((len(entries), _BANDS), np.nan), np.full(len(entries), np.nan)
+    rough: list[tuple[Indices, Floats]] = []
+    for number, own in enumerate(measured):
+        frequency, lines = _usable(own)
+        if len(lines) < _LEAST_LINES:
+            continue
+        logarithm = _logarithm(lines)
+        second = np.abs(np.diff([logarithm.real, logarithm.imag], 2)) / _SECOND
+        noise = float(np.median(second))
+        if not 0 < noise < _WIDEST:
+            continue
+        band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
+        rough += [(part, second / noise) for part in (band[:-2], band[1:-1], band[2:])]
+        followed[number] = np.arange(_BANDS) < _lost(logarithm, band, noise)
+        count = np.bincount(band, minlength=_BANDS)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            real, imaginary = (
+                np.bincount(band, weights=part, minlength=_BANDS) / count for part in (logarithm.real, logarithm.imag)
+            )
+            share[number] = 1 / np.sqrt(count)
+        value[number] = real - np.nanmean(real) + 1j * imaginary
+        noises[number] = noise
+    if rough:
+        noises = np.maximum(noises, np.nanmedian(noises))
+    return PhaseCourses(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
+
+
+def _usable(measured: Frf) -> tuple[Floats, Complexes]:
+    """Frequency and value of the lines that are not 0 and not beside mains, by frequency."""
+    beside = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _BESIDE_MAINS_HZ
+    kept = ~beside & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
+    return measured.frequency[kept], measured.values[kept]
+
+
+def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
+    """The band from which on the way round of the phase is not known: where it steps beside a zero of the response, or
+    by half a turn but for the noise of a line."""
+    near_zero = np.minimum(logarithm.real[1:], logarithm.real[:-1]) < np.median(logarithm.real) + np.log(_FAINT)
+    step = np.abs(np.diff(logarithm.imag))
+    steps = np.flatnonzero((near_zero & (step > _STEP)) | (step > np.pi - _UNSURE * noise))
+    return int(band[steps[0]]) if len(steps) else _BANDS
+
+
+def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
+    """How noisy each band is beside the whole (bands,), from second differences `rough` of both parts (2, lines) of all
+    recordings: those of the smoother part, since a resonance bends the other."""
+    profile = np.ones(_BANDS)
+    if not rough:
+        return profile
+    band = np.concatenate([own for own, _ in rough])
+    second = np.concatenate([own for _, own in rough], axis=1)
+    for number in range(_BANDS):
+        chosen = np.abs(band - number) <= (0 if (band == number).sum() >= _ENOUGH else 2)
+        if chosen.sum() >= _ENOUGH:
+            profile[number] = np.median(second[:, chosen], axis=1).min()
+    return np.asarray(np.clip(profile, 0.3, 10.0))
+
+
+def _logarithm(lines: Complexes) -> Complexes:
+    """ln of the lines, the phase followed from the lowest ones, where it is nearest to 0 but for the polarity."""
+    phase = np.unwrap(np.angle(lines))
+    start = np.pi * np.round(np.median(phase[: max(3, len(phase) // 8)]) / np.pi)
+    return np.asarray(np.log(np.abs(lines)) + 1j * (phase - start))
+
+
+_CHANNEL_DEVIATION, _IDEALISED = (
+    1.5e-3,
+    0.08,
+)  # of ln H: what channels differ by, and the share by which a real course departs
+_TOLERANCE, _FARTHEST = 1e-3, 30.0  # of a fit, and of its logarithms
+_COST = 5.0  # of χ², for each of them
+
+
+@dataclass(frozen=True)
+class _Law:
+    """ln H(f; fit, spread), where fit starts, and the centre and the deviation of the prior of each parameter.
+
+    `spread` are the contacts' natural frequencies over the usual one.
+    """
+
+    value: Callable[[Floats, Floats, Floats], Complexes]
+    starts: Callable[[Floats], tuple[tuple[float, ...], ...]]  # of the bands' frequencies
+    centre: tuple[float, ...]
+    deviation: tuple[float, ...]
+
+
+def _exp(logarithm: float) -> float:
+    return float(np.exp(np.clip(logarithm, -_FARTHEST, _FARTHEST)))
+
+
+def _high_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -np.log(1 + _exp(fit[0]) / (1j * frequency))
+
+
+def _low_pass(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -np.log(1 + 1j * frequency / _exp(fit[0]))
+
+
+def _relaxation(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    step = np.abs(fit[1]) / (1 + 1j * frequency / _exp(fit[2]))
+    return -np.abs(fit[0]) * np.log(1j * frequency) + np.log(1 + step)
+
+
+def _delay(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -2e-6j * np.pi * frequency * np.abs(fit[0])
+
+
+def _lead(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    return -_delay(frequency, fit, _)
+
+
+def _resonance(frequency: Floats, fit: Floats, spread: Floats) -> Complexes:
+    ratio = frequency[:, None] / (_exp(fit[0]) * spread)
+    return -np.log(1 - ratio**2 + 2j * _exp(fit[1]) * ratio).mean(axis=1)
+
+
+def _loose_part(frequency: Floats, fit: Floats, _: Floats) -> Complexes:
+    turn = 1j * frequency / _exp(fit[0])
+    return np.log(1 + (fit[2] * turn**2 + fit[3] * turn) / (turn**2 + 2 * _exp(fit[1]) * turn + 1))
+
+
+_DELAY = _Law(_delay, lambda f: ((1e4 / f[-1],),), (0.0,), (300.0,))
+_LEAD = replace(_DELAY, value=_lead)
+# As the mechanisms' own files have them: corner 0.5 Hz, upper corner 300 Hz, n 0.08, s 0.4 at 20 Hz, 300 µs, ζ 0.05.
+# Where a tip resonates depends on contact and mass, 1 kHz within a factor of 10.
+_LAWS: Mapping[str, _Law] = {
+    "amplifier_high_pass": _Law(
+        _high_pass, lambda f: ((np.log(f[0] / 20),), (np.log(f[0]),)), (-0.7,), (1.5,)
+    ),
+    "amplifier_low_pass": _Law(
+        _low_pass, lambda f: ((np.log(f[-1]),), (np.log(3 * f[-1]),)), (5.7,), (1.5,)
+    ),
+    "sensor_relaxation": _Law(
+        _relaxation,
+        lambda f: ((0.01, 1e-3, np.log(20.0)), (1e-4, 0.05, np.log(20.0)), (1e-4, 0.05, np.log(f[-1]))),
+        (0.0, 0.0, 3.0),
+        (0.08, 0.4, 1.5),
+    ),
+    "timing_delay": _DELAY,
+    "contact_resonance": _Law(
+        _resonance,
+        lambda f: tuple((np.log(times * f[-1]), -3.0) for times in (0.5, 1.3, 4.0)),
+        (np.log(1000.0), -3.0),
+        (2.3, 1.0),
+    ),
+}  # fmt: skip
+# A part that vibrates inside the band, as of a cable or a loose screw, or a notch: 1 + (A r² + B r)/(r² + 2ζr + 1),
+# r = if/f1. No mechanism lists it, so that it may be of either sign.
+_UNLISTED = _Law(
+    _loose_part,
+    lambda f: tuple((np.log(f[0]) + share * np.log(f[-1] / f[0]), -1.0, size, 0.0)
+                    for share, size in product((0.4, 0.6, 0.8, 0.95), (-0.1, 0.1))),
+    (5.0, -1.0, 0.0, 0.0),
+    (1.5, 1.0, 0.3, 0.3),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Course:
+    """A course of ln FRF (bands,), real part and phase each with its deviation; the natural frequencies (any number,)
+    of the contacts behind it over the usual one."""
+
+    frequency: Floats
+    value: Complexes
+    deviation: Complexes  # of the real part and of the phase
+    spread: Floats
+
+    @property
+    def conjugated(self) -> "Course":
+        """The same in the other convention."""
+        return Course(self.frequency, self.value.conj(), self.deviation, self.spread)
+
+
+class Lead(NamedTuple):
+    """χ² of the nearest course with a lag of the force channel, as `misfit`, and that lag [µs]."""
+
+    misfit: float
+    lag_us: float
+
+
+def misfit(course: Course) -> float:
+    """χ² of the nearest course that at most two mechanisms give, with what their priors and their number cost."""
+    alone = {name: _nearest(course, (law,))[0] for name, law in _LAWS.items()}
+    first = min(alone, key=lambda name: alone[name])
+    pairs = [_nearest(course, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
+    return min(_nearest(course, ())[0], alone[first], *pairs)
+
+
+def leading(course: Course) -> Lead:
+    """The nearest course of a lag of the force channel, alone or beside one mechanism."""
+    beside = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
+    chi2, fit = min((_nearest(course, (_LEAD, *laws)) for laws in beside), key=lambda one: one[0])
+    return Lead(chi2, abs(float(fit[0])))
+
+
+def unlisted_misfit(course: Course) -> float:
+    """χ² of the nearest course that a vibrating part or a notch gives, with the same costs."""
+    return _nearest(course, (_UNLISTED,))[0]
+
+
+def _nearest(course: Course, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
+    """χ² with its costs, and the parameters of the laws."""
+    ends = np.cumsum([0, *(len(law.centre) for law in laws)])
+    centre = np.concatenate([[], *(law.centre for law in laws)])
+    deviation = np.concatenate([[], *(law.deviation for law in laws)])
+    size = _IDEALISED * np.abs(course.value)
+    weight = [
+        1 / np.hypot(np.hypot(part, _CHANNEL_DEVIATION), size)
+        for part in (course.deviation.real, course.deviation.imag)
+    ]
+    level = weight[0] ** 2 / (weight[0] ** 2).sum()
+
+    def residual(fit: Floats) -> Floats:
+        left = course.value - sum(
+            law.value(course.frequency, fit[first:last], course.spread)
+            for law, first, last in zip(laws, ends, ends[1:], strict=False)
+        )
+        parts = [(left.real - level @ left.real) * weight[0], left.imag * weight[1], (fit - centre) / deviation]
+        return np.concatenate(parts)
+
+    if not laws:
+        return float((residual(np.zeros(0)) ** 2).sum()), np.zeros(0)
+    starts = [np.concatenate(start) for start in product(*(law.starts(course.frequency) for law in laws))]
+    fitted = (least_squares(residual, start, method="lm", ftol=_TOLERANCE, xtol=_TOLERANCE) for start in starts)
+    best = min(fitted, key=lambda one: float(one.cost))
+    return float(2 * best.cost) + _COST * len(laws), best.x
+
 
 _LEAST = 3  # recordings that tell a phase, for some of them to contradict the others
 _LARGEST = 0.7  # rad: a sharp resonance, at its own place in each recording, weighs no more

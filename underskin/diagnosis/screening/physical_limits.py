@@ -1,4 +1,4 @@
-"""Numbers beyond any instrument and any skin (`recordings/physical_limits.py`): a recording that holds one is left out;
+"""Numbers beyond any instrument and any skin (`recordings/campaign.py`): a recording that holds one is left out;
 where the skin has one, nothing can be concluded.
 """
 
@@ -6,13 +6,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from underskin.diagnosis.data.inspected import Inspected
+from underskin.diagnosis.data.dataset import Inspected
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
-from underskin.recordings.campaign import Campaign, FrfRecording
-from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.physical_limits import excesses
+from underskin.recordings.campaign import Campaign, FrfRecording, SkinDescription, excesses
 
 _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.diagnosis.screening.aligned_lines import aligned_lines
+from underskin.diagnosis.screening.levels import aligned_lines
 from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding

@@ -2,7 +2,7 @@
 
 Where the declared modulus is too small, contacts are computed wider and harder pressed than they were. Those that a
 plausible modulus brings within the tables are not left out before the fit has told E; until then they are predicted by
-continuation of the tables (mechanisms/models/off_centre_response.py).
+continuation of the tables (mechanisms/models/sigma_curves.py).
 """
 
 from collections.abc import Callable, Collection

@@ -5,16 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from underskin.diagnosis.data.curve_samples import curve_lines
+from underskin.diagnosis.data.dataset import curve_lines
 from underskin.errors import InvalidInput, too_few, unusable
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.base import Kind
-from underskin.recordings.block_modulus import of_compression
-from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording
-from underskin.recordings.conditions import SkinDescription
-from underskin.recordings.exchanged_columns import require_own_columns
-from underskin.recordings.sphere_modulus import estimate, require_depth, tip_of
+from underskin.recordings.campaign import Campaign, CompressionRecording, IndentationRecording, SkinDescription
+from underskin.recordings.curve_preparation import require_own_columns
+from underskin.recordings.modulus import estimate, of_compression, require_depth, tip_of
 from underskin.units import Floats, to_si
 
 

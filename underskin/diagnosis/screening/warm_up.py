@@ -1,6 +1,6 @@
 """A drift within the first recordings, y_j + A e^(−j/τ) in the order of time j, to the level of all later ones.
 
-It is judged beside all that may move the levels (`level_causes`). A fall that load cycles could have caused is `ageing`
+It is judged beside all that may move the levels (`levels`). A fall that load cycles could have caused is `ageing`
 and none of this, nor is what a smooth law along any axis explains as well, a first recording that is off alone, or a
 step after the first recordings, or of one sensor, that explains far more.
 """
@@ -10,9 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from underskin.diagnosis.screening.along_axes import smooth_along
-from underskin.diagnosis.screening.level_causes import Cause, explained
-from underskin.diagnosis.screening.levels import Levels
+from underskin.diagnosis.screening.levels import Cause, Levels, explained, smooth_along
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.unnamed.axes import recording_order

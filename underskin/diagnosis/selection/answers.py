@@ -1,4 +1,26 @@
-"""How probable each set of mechanisms that was fitted is, and the answers that follow."""
+"""Probabilities of sets of mechanisms, and the answers that they leave.
+
+Odds between explanations that differ only in the widths of their priors.
+
+The evidence of a set of mechanisms is the product of the likelihood at the best fit, the prior density of the values
+there, and Occam's factor: the share of the prior's range that fits. The likelihood is what the recordings say, the
+density what is known of materials and rigs. Occam's factor penalises extra parameters, and is needed where the null
+hypothesis is compared with a mechanism, or one mechanism with two. Between sets of equally many mechanisms that fit
+equally well, however, it would decide by the widths that were chosen for this catalogue.
+
+So among sets of as many mechanisms as the leading one, none is less probable than that by Occam's factor alone: its
+odds are at least e^(s − s_leader), at most 1, with s = log L + Σ log(prior/prior at its peak) at the best fit. Where
+the evidences of two candidates for the lead differ by less than their accuracy, s decides.
+
+How probable each set of mechanisms that was fitted is, and the answers that follow.
+
+Contacts that lie beyond the tables by the declared values: which of them the answers bring within.
+
+Until E is known, a contact that is computed too wide, or too hard pressed, by a modulus that was declared too small
+counts in every hypothesis, each of which predicts it, the null hypothesis by continuation of the tables. Contacts that
+lie within the tables by answers that stand are kept; something undescribed counts by what is beneath it. The others are
+left out, and the rest is diagnosed again: no answer is found by a continuation alone.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,8 +30,9 @@ from functools import cached_property
 import numpy as np
 
 from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
-from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.selection.occam_correction import fit_and_plausibility, without_occam
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.selection.gaussian_processes import Discrepancy
 from underskin.diagnosis.selection.other_kinds import Beside
 from underskin.diagnosis.selection.priors import (
     declared_laws,
@@ -19,9 +42,45 @@ from underskin.diagnosis.selection.priors import (
     log_prior_of,
     must_gain,
 )
-from underskin.diagnosis.selection.unnamed_rivals import Discrepancy
 from underskin.mechanisms.unnamed.laws import UnnamedLaw
 from underskin.units import Floats
+
+_BEHIND = 1e-6  # of an equal: the leader stays the leader
+_ACCURACY = 0.1  # of Laplace's method, in nats
+
+
+def fit_and_plausibility(explanation: Explanation) -> float:
+    """s: the log posterior density at the best fit, were each own parameter's prior 1 at its peak."""
+    places = own_places(explanation.names, explanation.best.hypothesis.lines)
+    own = [entry for place in places.values() for entry in explanation.model.parameters[place]]
+    return -explanation.best.cost - sum(entry.log_prior(entry.start) for entry in own)
+
+
+def without_occam(explanations: Sequence[Explanation], log_weights: Sequence[float], sizes: Sequence[int]) -> Floats:
+    """The weights, those of the leader's equals in size raised to what fit and plausibility say of them; `sizes` count
+    the mechanisms that are guesses."""
+    weights = np.array(log_weights)
+    first = _leader(explanations, weights, sizes)
+    leader = explanations[first]
+    weights[first] = weights.max()
+    for number, rival in enumerate(explanations):
+        if sizes[number] and sizes[number] == sizes[first] and number != first:
+            gap = fit_and_plausibility(rival) - fit_and_plausibility(leader)
+            raised = max(weights[number], weights[first] + gap)
+            weights[number] = min(raised, weights[first] - _BEHIND)
+    return weights
+
+
+def _leader(explanations: Sequence[Explanation], weights: Floats, sizes: Sequence[int]) -> int:
+    """The place of the one of largest weight, or among its equals in weight and size of the best fit."""
+    first = int(np.argmax(weights))
+    equals = [
+        number
+        for number in np.flatnonzero(weights > weights[first] - _ACCURACY).tolist()
+        if sizes[number] and sizes[number] == sizes[first]
+    ]
+    return max(equals, key=lambda number: fit_and_plausibility(explanations[number]), default=first)
+
 
 _OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
 _IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
@@ -64,7 +123,7 @@ def leading_first(ranked: Sequence[Answer]) -> list[Answer]:
 class Search:
     """What was tried: explanations, processes on top of some of them, and what the campaign does not support.
 
-    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see residual_noise.py);
+    `contradicted`: sets under which the residual keeps structure, or its noise is no noise (see cross_validation.py);
     their probability, or of curves most of it, is that of `none_of_these`. `imitating`: the odds of an unlisted law
     that looks like a set on these recordings, or does not show; `none_of_these` has them beside the leading set.
     """
@@ -266,3 +325,17 @@ class Search:
         beside = probabilities.copy()
         beside[-1] = max(beside[-1], self.imitating.get(kept[leader].names, 0.0) * probabilities[leader])
         return np.asarray(beside / beside.sum())
+
+
+_STANDS = 0.2  # probability of all answers together by which a contact lies within
+
+
+def within_as_found(problem: FittingProblem, result: Search) -> frozenset[str]:
+    """The ids of the recordings whose contacts lie within the tables by answers that stand."""
+    entries = problem.lines.campaign.recordings
+    within = np.zeros(len(entries))
+    for answer in result.answers:
+        best = result.shown_or_nothing(answer).best
+        outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
+        within[np.isin(np.arange(len(entries)), outside, invert=True)] += answer.probability
+    return frozenset(entries[number].id for number in np.flatnonzero(within > _STANDS).tolist())

@@ -1,24 +1,321 @@
-"""Laws that nobody listed, as rivals of the mechanisms: which are fitted, alone and beside named ones.
+"""The search for laws that nobody listed.
 
-A score test (unnamed_screening.py) ranks them on top of nothing, of the best sets of mechanisms, and of what is left of
+A score test of several hundred laws that nobody listed: what each would gain on top of an explanation, roughly.
+
+What an explanation leaves is projected onto the change that a law would make, over a small grid of what bends it:
+linear algebra under the noise, no fit. A law that acts on whole recordings is weighed on its gains
+(`gaussian_processes`), one that acts along frequency on what lines lie off their own recording's best real multiple
+(`residuals`).
+
+A score test of the laws that nobody listed on indentation curves: what each would gain on top of an explanation.
+
+What the explanation leaves is projected onto the change that a law would make of each sample, over a small grid of what
+bends it, beside the explanation's own parameters: linear algebra, no fit.
+
+Laws that nobody listed, as rivals of the mechanisms: which are fitted, alone and beside named ones.
+
+A score test ranks them on top of nothing, of the best sets of mechanisms, and of what is left of
 the best set without one member, for which a law may stand. The few that may matter are fitted like any other set. What
 they gain on top of nothing is then tried beside each named mechanism, of FRFs alone.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
 
 import numpy as np
 
+from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.explanation import integrated as integrate
+from underskin.diagnosis.inference.residuals import beside, force_and_slopes, information, line_residuals, precision_of
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.curve_law_screening import CurveScreening
-from underskin.diagnosis.selection.priors import least_evidence
-from underskin.diagnosis.selection.unnamed_screening import Score, Screening
+from underskin.diagnosis.selection.gaussian_processes import GainResidual
+from underskin.mechanisms.models.curve_state import Samples
+from underskin.mechanisms.models.curves import CurveModel, times_of
+from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.grammar import Grammar, combination
-from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.mechanisms.unnamed.axes import Axis
+from underskin.mechanisms.unnamed.expressions import CurveLaw, Extent, curve_laws, of_samples
+from underskin.mechanisms.unnamed.forms import Shape
+from underskin.mechanisms.unnamed.grammar import FrequencyLaw, Grammar, combination
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.recordings.campaign import curves_of
+from underskin.units import Array, Floats, Indices
+
+Law = TypeVar("Law", bound=UnnamedLaw)
+_USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What a law gains in log evidence on top of an explanation; where it gains most, its amplitudes over the sds of
+    their priors, and what bends it; `others` are fit coordinates elsewhere from which a fit may begin as well."""
+
+    law: UnnamedLaw
+    gain: float
+    log_share: float
+    amplitudes: Floats
+    bending: Floats
+    others: tuple[Floats, ...] = ()
+
+    @property
+    def guess(self) -> Floats:
+        """The law's fit coordinates there."""
+        count = len(self.law.parameters_bound) - len(self.law.amplitudes)
+        return np.concatenate([self.amplitudes * prior_deviations(self.law), self.bending[:count]])
+
+
+@dataclass(frozen=True, eq=False)
+class _Group(Generic[Law]):
+    """Laws with equally many amplitudes that enter at one place.
+
+    `log_shares` of each; `first` point of each on the grid of what bends it, and one more; `grid` of each point;
+    `scale`, the sds of the amplitudes' priors at each (points, amplitudes).
+    """
+
+    laws: list[Law]
+    log_shares: list[float]
+    first: Indices
+    grid: Floats
+    scale: Floats
+
+    @classmethod
+    def of(cls, laws: Sequence[tuple[Law, float]], alike: Callable[[Law], str]) -> list["_Group[Law]"]:
+        """Laws with their log shares, by what they are `alike` in."""
+        groups: dict[tuple[str, int], list[tuple[Law, float]]] = {}
+        for law, log_share in laws:
+            groups.setdefault((alike(law), len(law.amplitudes)), []).append((law, log_share))
+        each = []
+        for members in groups.values():
+            own = [law for law, _ in members]
+            counts = [len(law.grid) for law in own]
+            first = np.cumsum([0, *counts])
+            grid = np.zeros((first[-1], max(law.grid.shape[1] for law in own)))
+            for law, start, end in zip(own, first[:-1], first[1:], strict=True):
+                grid[start:end, : law.grid.shape[1]] = law.grid
+            scale = np.repeat([prior_deviations(law) for law in own], counts, axis=0)
+            each.append(cls(own, [log_share for _, log_share in members], first, grid, scale))
+        return each
+
+    def scores(self, gains: Floats, amplitudes: Floats) -> Iterator[Score]:
+        """From the gain at each point, and the most probable amplitudes there."""
+        start = self.first[:-1]
+        counts = np.diff(self.first)
+        means = np.logaddexp.reduceat(gains, start) - np.log(counts)
+        highest = np.flatnonzero(gains == np.repeat(np.maximum.reduceat(gains, start), counts))
+        best = highest[np.searchsorted(highest, start)]  # the first of each law
+        return map(Score, self.laws, means.tolist(), self.log_shares, amplitudes[best], self.grid[best])
+
+
+class Screening:
+    """The laws of a campaign, and the change that each would make by a small amplitude; the same for every score."""
+
+    def __init__(self, problem: FittingProblem, grammar: Grammar) -> None:
+        """Of all laws of the grammar."""
+        self._problem = problem
+        self._ids = tuple(entry.id for entry in problem.collapsed.campaign.recordings)
+        self._frequency, self._line = np.unique(problem.lines.frequency, return_inverse=True)
+        self._features: dict[tuple[Axis, Shape], Floats] = {}
+
+        def some(kind: type[Law]) -> list[tuple[Law, float]]:
+            laws = zip(grammar.laws, grammar.log_shares.tolist(), strict=True)
+            return [(law, log_share) for law, log_share in laws if isinstance(law, kind)]
+
+        self._of_recordings = _Group.of(some(RecordingLaw), lambda law: law.spoken.acts_on)
+        self._over_frequency = _Group.of(some(FrequencyLaw), lambda _: "")
+        self._lags = _Group.of(some(LagLaw), lambda law: law.kind)
+
+    def scores(self, explanation: Explanation) -> list[Score]:
+        """Of every law, the grid of what bends it averaged."""
+        along_lines = self._along_lines(explanation) if len(self._frequency) > 1 else ()
+        return [*self._along_recordings(explanation), *along_lines]
+
+    def _along_recordings(self, explanation: Explanation) -> Iterator[Score]:
+        residual = GainResidual(self._problem, explanation)
+        for group in self._of_recordings:
+            features = np.concatenate([self._features_of(law) for law in group.laws])
+            columns = self._sensitivity[group.laws[0].spoken.acts_on].T
+            changes = np.concatenate([features * column[:, None] for column in columns], axis=2)
+            changes *= group.scale[:, None]
+            yield from group.scores(residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes))
+
+    def _along_lines(self, explanation: Explanation) -> Iterator[Score]:
+        weights, moments, noise = self._moments(explanation)
+        total, moment, own = weights.sum(axis=0), moments.sum(axis=0), weights.sum(axis=1)
+        for group in self._over_frequency:
+            tangents = np.concatenate([law.tangents(self._frequency) for law in group.laws]) * group.scale[:, None]
+            changes = tangents.transpose(0, 2, 1)  # (points, features, frequencies)
+            gram = np.einsum("pif,f,pjf->pij", changes.conj(), total, changes, optimize=True).real
+            means = changes.real @ weights.T  # (points, features, recordings)
+            gram = gram - np.einsum("pir,r,pjr->pij", means, 1 / own, means, optimize=True)
+            yield from group.scores(*noise.gains(gram, (changes.conj() @ moment).real))
+        for lags in self._lags:
+            pattern = lags.laws[0].pattern(self._frequency)
+            spread = weights @ np.abs(pattern) ** 2 - (weights @ pattern.real) ** 2 / own  # by recording
+            lag = np.concatenate([self._lag(law) for law in lags.laws]) * lags.scale[:, None]
+            turned = lag.transpose(0, 2, 1)
+            gram = (turned * spread) @ lag if lag.shape[2] > 1 else (turned**2 @ spread)[:, None]
+            yield from lags.scores(*noise.gains(gram, turned @ (moments @ pattern.conj()).real))
+
+    @cached_property
+    def _sensitivity(self) -> dict[str, Floats]:
+        """∂ ln level by the features of laws that act on this (recordings, 1 or 2)."""
+        laws = {law.spoken.acts_on: law for group in self._of_recordings for law in group.laws[:1]}
+        return {acts_on: law.sensitivity(self._ids) for acts_on, law in laws.items()}
+
+    def _lag(self, law: LagLaw) -> Floats:
+        """Features of the recordings; what they make of lines depends on the kind of lag."""
+        features = self._features_of(law)
+        return np.exp(law.grid[:, :, None] * features) if law.shape.logarithmic else features
+
+    def _features_of(self, law: RecordingLaw | LagLaw) -> Floats:
+        """Of its form over its axis (points, recordings, features)."""
+        key = law.axis, law.shape
+        if key not in self._features:
+            grid = law.shape.points
+            values = grid_values(law.shape.bending, grid)
+            each = [
+                np.broadcast_to(one.value if isinstance(one, Differentiated) else one, (len(grid), len(self._ids)))
+                for one in law.shape.features(law.axis.of(self._ids), values)
+            ]
+            self._features[key] = np.stack(each, axis=2)
+        return self._features[key]
+
+    def _moments(self, explanation: Explanation) -> tuple[Floats, Array, "_Levels"]:
+        """Of lines by recording and distinct frequency: the weights, the residuals times them, and their χ²."""
+        lines = self._problem.lines
+        relative, weight = line_residuals(self._problem, explanation)
+        size = lines.recordings, len(self._frequency)
+        place = lines.recording * size[1] + self._line
+        weights, real, imag = (
+            np.asarray(np.bincount(place, values, size[0] * size[1]), dtype=float).reshape(size)
+            for values in (weight, weight * relative.real, weight * relative.imag)
+        )
+        chi2 = float((weight * np.abs(relative) ** 2).sum())
+        return weights, real + 1j * imag, _Levels(chi2, 2 * len(relative) - lines.recordings)
+
+
+def grid_values(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differentiated]:
+    """What bends a form at the points of a grid (points, parameters), as values without derivatives."""
+    values = {}
+    for entry, at in zip(bending, grid.T, strict=True):
+        value = np.exp(at) if entry.scale == "log" else at
+        values[entry.name] = Differentiated(value[:, None], np.zeros((0, len(grid), 1)))
+    return values
+
+
+def prior_deviations(law: UnnamedLaw) -> Floats:
+    """Of the amplitudes (amplitudes,)."""
+    priors = [entry.prior for entry in law.parameters_bound[: len(law.amplitudes)]]
+    return np.array([prior.sd for prior in priors if isinstance(prior, Normal)])
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """χ² of the lines and its degrees of freedom; the noise's level is what suits best, at least 1."""
+
+    chi2: float
+    freedom: int
+
+    def gains(self, gram: Floats, moment: Floats) -> tuple[Floats, Floats]:
+        """log p with amplitudes of prior sd 1 over that without (points,), and their most probable values."""
+        eye = np.eye(gram.shape[-1])
+        first = max(1.0, self.chi2 / max(self.freedom, 1))
+        before = -0.5 * self.chi2 / first - 0.5 * self.freedom * np.log(first)
+        level = np.full(len(gram), 1.0)
+        for _ in range(4):
+            solved = np.linalg.solve(gram + level[:, None, None] * eye, moment[..., None])[..., 0]
+            left = self.chi2 - np.maximum((solved * moment).sum(axis=1), 0.0)
+            level = np.maximum(1.0, left / max(self.freedom, 1))
+        determinant = np.linalg.slogdet(eye + gram / level[:, None, None])[1]
+        after = -0.5 * left / level - 0.5 * self.freedom * np.log(level) - 0.5 * determinant
+        return np.asarray(after - before), np.asarray(solved)
+
+
+_HELD = 2e-3  # of the range of displacement: off the deepest sample while a sphere is held
+_ELSEWHERE = 30.0  # nats behind the best point of a grid within which a fit begins too
+
+
+class CurveScreening:
+    """The laws of a campaign of indentations."""
+
+    def __init__(self, problem: FittingProblem, nothing: Explanation, best: Explanation) -> None:
+        """With contact as the null hypothesis, `nothing`, has it; `best` is the best explanation."""
+        self._lines, self._best = problem.lines, best
+        curves = curves_of(self._lines.campaign)
+        model = nothing.best.hypothesis.model
+        assert isinstance(model, CurveModel)
+        contacts = nothing.point.fit[model.contact_points].tolist()
+        depths = [float(one.displacement_mm.max()) - at for one, at in zip(curves, contacts, strict=True)]
+        times = {one.id: times_of(one) for one in curves}
+        turns = {one.id: _last_deep(one.displacement_mm) for one in curves}
+        back = any(turns[one.id] < len(one.displacement_mm) - 1 for one in curves)
+        extent = Extent(
+            depth_mm=max(depths),
+            force_n=float(np.abs(self._lines.value.real).max()),
+            time_s=max(float(np.ptp(own)) for own in times.values()),
+            begins={name: float(own[0]) for name, own in times.items()},
+            turns={name: float(own[turns[name]]) for name, own in times.items()} if back else {},
+        )
+        self.laws = curve_laws(extent, timed=all(one.time_s is not None for one in curves))
+
+    def scores(self, explanation: Explanation) -> list[Score]:
+        """Of every law, the grid of what bends it averaged; under the noise that the best explanation found, since a
+        worse one takes what a law would change for noise."""
+        force, slopes, stiffness = force_and_slopes(explanation)
+        samples = self._samples(explanation)
+        changes = [self._changes(law, samples, force, stiffness) for law, _ in self.laws]
+        left = self._lines.value.real - force
+        flat = [one.reshape(-1, len(force)) for one in changes]
+        whole = information(explanation, np.concatenate([slopes, *flat, left[None]]), self._best)
+        shown = beside(whole, np.arange(len(slopes)), precision_of(explanation.best.hypothesis))
+        scores, first = [], 0
+        for (law, log_share), own in zip(self.laws, changes, strict=True):
+            points, count = own.shape[:2]
+            rows = first + np.arange(points * count).reshape(points, count)
+            first += points * count
+            gram = shown[rows[:, :, None], rows[:, None, :]] + np.eye(count)
+            moment = shown[rows, -1]
+            amplitudes = np.linalg.solve(gram, moment[..., None])[..., 0]
+            gains = 0.5 * (amplitudes * moment).sum(axis=1) - 0.5 * np.linalg.slogdet(gram)[1]
+            best = int(np.argmax(gains))
+            mean = float(np.logaddexp.reduce(gains) - np.log(points))
+            others = [place for place in range(points) if place != best and gains[place] > gains[best] - _ELSEWHERE]
+            guesses = tuple(np.append(amplitudes[place] * prior_deviations(law), law.grid[place]) for place in others)
+            scores.append(Score(law, mean, log_share, amplitudes[best], law.grid[best], guesses))
+        return scores
+
+    def _samples(self, explanation: Explanation) -> Samples:
+        """Each sample as a curve of its own."""
+        model = explanation.best.hypothesis.model
+        assert isinstance(model, CurveModel)
+        curves, recording = curves_of(self._lines.campaign), self._lines.recording
+        contact = explanation.point.fit[model.contact_points][recording]
+        travel = np.concatenate([one.displacement_mm for one in curves]) - contact
+        time = np.concatenate([times_of(one) for one in curves])
+        return Samples([curves[number].id for number in recording], 1e-3 * travel[None, :, None], time[:, None])
+
+    @staticmethod
+    def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:
+        """What each feature changes in the force by an amplitude of its prior's deviation (grid, features, samples)."""
+        values = {name: of_samples(value) for name, value in grid_values(law.shape.bending, law.grid).items()}
+        unit = {"force": np.ones_like(force), "position": stiffness}.get(law.spoken.acts_on, force)
+        each = []
+        for feature, deviation in zip(
+            law.features(samples, force[None, :, None], values), prior_deviations(law), strict=True
+        ):
+            value = feature.value if isinstance(feature, Differentiated) else feature
+            whole = np.broadcast_to(value, (len(law.grid), *samples.travel.shape[1:]))[..., 0]
+            each.append(deviation * unit * whole)
+        return np.stack(each, axis=1)
+
+
+def _last_deep(displacement: Floats) -> int:
+    """The last sample before a sphere turns back: the deepest one, or that with which a hold ends."""
+    return int(np.flatnonzero(displacement >= displacement.max() - _HELD * np.ptp(displacement))[-1])
+
 
 _BENEATH = 1  # sets of mechanisms, the most probable, on top of which laws are tried, and nothing
 _FITTED = 8  # laws at most
@@ -202,6 +499,3 @@ def law_of(problem: FittingProblem, explanation: Explanation) -> UnnamedLaw | No
         if isinstance(mechanism, UnnamedLaw):
             return mechanism
     return None
-
-
-__all__ = ["NearestLaw", "law_of", "least_evidence", "nearest_law", "with_laws"]

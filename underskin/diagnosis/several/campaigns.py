@@ -16,11 +16,18 @@ import numpy as np
 from underskin.diagnosis.inference.explanation import Explanation
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, reported
-from underskin.diagnosis.several.dates import Dated, date_of, in_order
-from underskin.diagnosis.several.left_out import used_recordings
-from underskin.diagnosis.several.posteriors import Shared, values
-from underskin.diagnosis.several.sensors import SensorsOfCampaign, Values, changes, corrected, sensors_of
-from underskin.diagnosis.several.together_report import together_report
+from underskin.diagnosis.several.course import Shared, values
+from underskin.diagnosis.several.sensors import (
+    Dated,
+    SensorsOfCampaign,
+    Values,
+    changes,
+    corrected,
+    date_of,
+    in_order,
+    sensors_of,
+)
+from underskin.diagnosis.several.together_report import together_report, used_recordings
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
 from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording

@@ -1,8 +1,17 @@
-"""Which mechanisms act in each of several campaigns of one skin: a course through the sets, one set a campaign.
+"""Courses of parameters over the campaigns of one skin.
+
+What two fits say together of parameters that they share, by their normal approximations.
+
+Which mechanisms act in each of several campaigns of one skin: a course through the sets, one set a campaign.
 
 The evidence of a course is the product of the evidences of its sets, times how well the parameters that neighbours
 share agree, times the prior of the changes. Sets change seldom, by one mechanism rather than by two. All courses over
 the sets that any campaign asks for are summed.
+
+The scatter of gains and positions of skins of one make, which are recorded on one bench: what a skin's sisters say.
+
+A few recordings determine neither, nor many whether positions scatter at all. Where gain scatter is underestimated
+intervals are too narrow; where positions scatter and none is assumed, or the reverse, all d33 are off to one side.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,12 +19,108 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.special import expit, logit
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.fit import GAIN
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
+from underskin.diagnosis.noise import Plateau
 from underskin.diagnosis.selection.answers import UNTHOUGHT, Search
 from underskin.diagnosis.selection.priors import log_prior
-from underskin.diagnosis.several.posteriors import Shared, log_agreement
+from underskin.mechanisms.parameter import Parameter
+from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
 from underskin.units import Floats
+
+_UNIFORM_VARIANCE = 12.0  # a uniform prior's variance is the square of its width over this
+_SKINS_OWN = ("youngs_modulus", "thickness")  # nuisances of FRFs that are of the skin
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """Mean and covariance of some parameters of a fit, and mean and precision of their priors, in fit coordinates."""
+
+    parameters: tuple[Parameter, ...]
+    mean: Floats
+    covariance: Floats
+    prior_mean: Floats
+    prior_precision: Floats  # (parameters,)
+
+    @classmethod
+    def of(cls, explanation: Explanation, mechanisms: Sequence[str], *, skin: bool = True) -> "Shared":
+        """Of these mechanisms' parameters and, with `skin`, the factors on its modulus and thickness."""
+        hypothesis = explanation.best.hypothesis
+        model = explanation.model.parameters
+        own = own_places(explanation.names, hypothesis.lines)
+        places = [place for name in mechanisms for place in range(own[name].start, own[name].stop)]
+        if skin:
+            names = [entry.name for entry in model]
+            places += [names.index(name) for name in _SKINS_OWN if name in names]
+        places = [place for place in places if place in hypothesis.mean_places]
+        rows = [hypothesis.mean_places.index(place) for place in places]
+        moments = np.array([_prior(model[place], float(explanation.point.fit[place])) for place in places]).reshape(
+            -1, 2
+        )
+        return cls(
+            tuple(model[place] for place in places),
+            explanation.point.fit[places],
+            explanation.best.covariance[np.ix_(rows, rows)],
+            moments[:, 0],
+            moments[:, 1],
+        )
+
+    @property
+    def precision(self) -> Floats:
+        """That of the posterior, at least the prior's in every direction: a quadratic may be flatter."""
+        prior = np.diag(self.prior_precision)
+        values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
+        return np.asarray(prior + (vectors * np.maximum(values, 0.0)) @ vectors.T)
+
+
+def _prior(entry: Parameter, fit: float) -> tuple[float, float]:
+    precision, centre = quadratic_of_prior(entry, fit)
+    low, high = entry.bounds
+    return (centre, precision) if precision else ((low + high) / 2, _UNIFORM_VARIANCE / (high - low) ** 2)
+
+
+def log_agreement(one: Shared, two: Shared) -> float:
+    """ln ∫ p₁(x) p₂(x)/p(x) dx: how much more probable two campaigns are if parameters are the same in both."""
+    if not len(one.mean):
+        return 0.0
+    prior = _least_prior([one, two])
+    first, second = one.precision, two.precision
+    both = first + second - prior
+    towards = first @ one.mean + second @ two.mean - prior @ one.prior_mean
+    squares = one.mean @ first @ one.mean + two.mean @ second @ two.mean - one.prior_mean @ prior @ one.prior_mean
+    volumes = sum(
+        sign * np.linalg.slogdet(part)[1] for sign, part in ((1, first), (1, second), (-1, prior), (-1, both))
+    )
+    return float(0.5 * volumes - 0.5 * (squares - towards @ np.linalg.solve(both, towards)))
+
+
+def _least_prior(each: Sequence[Shared]) -> Floats:
+    """The precision of the prior that is in all: in heavy tails the quadratics of one prior differ."""
+    return np.diag(np.min([one.prior_precision for one in each], axis=0))
+
+
+def combined(each: Sequence[Shared]) -> tuple[Floats, Floats]:
+    """Mean and standard deviations of parameters that several fits share: their precisions add, the prior's once."""
+    prior = _least_prior(each)
+    precisions = [one.precision for one in each]
+    covariance = np.linalg.inv(sum(precisions[1:], precisions[0]) - (len(each) - 1) * prior)
+    towards = sum((precision @ one.mean for precision, one in zip(precisions, each, strict=True)), np.zeros(len(prior)))
+    mean = covariance @ (towards - (len(each) - 1) * prior @ each[0].prior_mean)
+    low, high = (np.array([entry.bounds[end] for entry in each[0].parameters]) for end in (0, 1))
+    return np.clip(mean, low, high), np.sqrt(np.diag(covariance))
+
+
+def values(parameters: Sequence[Parameter], fit: Floats) -> dict[str, float]:
+    """Of parameters at these fit coordinates, in their units, by name."""
+    found = {entry.name: entry.from_fit(float(at)) for entry, at in zip(parameters, fit, strict=True)}
+    return {
+        entry.name: found[entry.name] * (1.0 if entry.relative_to is None else found[entry.relative_to])
+        for entry in parameters
+    }
+
 
 CHANGES = 0.15  # probability that a set changes from one campaign to the next by one mechanism
 _BEHIND, _MOST_SETS = 12.0, 12  # nats behind a campaign's best, and how many of its sets
@@ -153,3 +258,33 @@ def log_change(mechanisms: int, supported: int, share: float = CHANGES) -> float
 def same_strength(one: Shared, two: Shared) -> bool:
     """Whether it is more probable that a mechanism kept its strength than that it has another."""
     return bool(np.log(_SAME_STRENGTH) + log_agreement(one, two) > np.log(1 - _SAME_STRENGTH))
+
+
+_FROM_SKIN_TO_SKIN = 0.2  # deviation of the logarithm of the gain scatter on one bench
+_UNSURE = 0.02  # the least probability that positions do, or do not, scatter
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The prior of the gain scatter's logarithm, and the probability that positions scatter."""
+
+    gain: Plateau
+    placed: float
+
+
+def benches(candidates: Sequence[Candidate]) -> list[Bench]:
+    """Of each skin, by what its sisters say, one at least."""
+    leaders = [one.search.shown_or_nothing(one.search.answers[0]) for one in candidates]
+    said = np.array([one.point.covariance[GAIN] for one in leaders])
+    recordings = np.array([one.best.hypothesis.lines.recordings for one in leaders])
+    precision = 1 / (_FROM_SKIN_TO_SKIN**2 + 0.5 / np.maximum(recordings - 1, 1))
+    usual = logit(1 - NO_POSITION_SCATTER)
+    gained = logit(np.clip([one.placed for one in leaders], _UNSURE, 1 - _UNSURE)) - usual
+    found = []
+    for number in range(len(candidates)):
+        sisters = np.arange(len(candidates)) != number
+        own = np.where(sisters, precision, 0.0)
+        deviation = float(np.hypot(_FROM_SKIN_TO_SKIN, own.sum() ** -0.5))
+        placed = float(np.clip(expit(usual + gained[sisters].sum()), _UNSURE, 1 - _UNSURE))
+        found.append(Bench(Plateau.normal(float(own @ said / own.sum()), deviation), placed))
+    return found

@@ -1,7 +1,18 @@
-"""Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
+"""Fleets of skins: what their population is, and the report on it.
+
+Which mechanisms act in skins of one make: a set that all have in common, from which single skins may differ.
+
+Every set that any skin asks for may be the common one; given it, each skin has it, or one that differs by a mechanism
+or two, each of which shows in that skin's own recordings. A skin of which little was recorded so leans on its sisters.
+Errors of E and of the thickness are no mechanisms here: they make a skin depart (population.py).
+
+The strengths of mechanisms that several skins of one make have, as populations. The report of skins of one make that
+were diagnosed as a fleet.
+
+Skins of one make: their E, thickness, d33 and the strengths of their mechanisms as populations, and which departs.
 
 Each skin speaks by its latest campaign of FRFs that can be used, with the curves of its campaigns without FRFs. The set
-of mechanisms that all have in common is found over all skins (common_set.py), and what each says of its E, thickness
+of mechanisms that all have in common is found over all skins, and what each says of its E, thickness
 and d33 (skin.py) is pooled (population.py), so that a skin of which little was recorded leans on its sisters.
 """
 
@@ -11,21 +22,414 @@ from typing import Any
 
 import numpy as np
 
+from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import Knowledge, own_places, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
-from underskin.diagnosis.reporting.report import DiagnosisResult, report
-from underskin.diagnosis.selection.priors import log_prior
-from underskin.diagnosis.several.bench import benches
+from underskin.diagnosis.reporting.law_statement import of_clauses
+from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report, reported
+from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.selection.priors import SHOWS, log_prior
+from underskin.diagnosis.several import together_report
 from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
-from underskin.diagnosis.several.common_set import CommonSet, common_set, sets_of, with_smaller
-from underskin.diagnosis.several.course import Candidate
-from underskin.diagnosis.several.dates import Dated, date_of, in_order
-from underskin.diagnosis.several.fleet_report import Fleet, fleet_report
-from underskin.diagnosis.several.population import Make, Populations, Spread, populations
-from underskin.diagnosis.several.skin import D33_PRIOR, ERRORS, FAR, FleetSkin
-from underskin.diagnosis.several.strengths import of_strengths
+from underskin.diagnosis.several.course import Candidate, Names, benches, log_change
+from underskin.diagnosis.several.population import (
+    D33,
+    D33_PRIOR,
+    ERRORS,
+    FAR,
+    QUANTITIES,
+    REGULAR,
+    STATED,
+    FleetSkin,
+    Make,
+    Populations,
+    Spread,
+    State,
+    populations,
+)
+from underskin.diagnosis.several.sensors import Dated, date_of, in_order
+from underskin.diagnosis.several.together_report import of_kinds
 from underskin.errors import InvalidInput
+from underskin.findings.formatting import in_percent
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Floats
+
+_HOPELESS = 40.0  # nats
+_DIFFERS = 0.03  # probability that a skin differs from its sisters by one mechanism
+
+
+@dataclass(frozen=True)
+class CommonSet:
+    """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
+    of all of them together. `from_sisters`: of each skin the logarithms of the sets' probabilities by what its sisters
+    say alone. `log_evidence`: of all recordings, over all sets."""
+
+    common: Names
+    sets: tuple[Names, ...]
+    each: tuple[float, ...]
+    probability: float
+    from_sisters: tuple[Mapping[frozenset[str], float], ...]
+    log_evidence: float
+
+
+def sets_of(candidates: Sequence[Candidate]) -> list[frozenset[str]]:
+    """The sets that any skin asks for, beside errors of E and of the thickness."""
+    asked = (names.difference(ERRORS) for candidate in candidates for names in candidate.asked_for)
+    return list(dict.fromkeys((frozenset[str](), *asked)))
+
+
+def with_smaller(sets: Sequence[frozenset[str]]) -> list[frozenset[str]]:
+    """The sets, and those with one mechanism less, which say whether each of theirs shows."""
+    return list(dict.fromkeys((*sets, *(names - {name} for names in sets for name in sorted(names)))))
+
+
+def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], supported: int) -> CommonSet:
+    """Of skins that were fitted under these sets and the smaller ones; `supported` mechanisms."""
+    evidence = np.array([[skin.log_evidence(names, len(skins)) for names in sets] for skin in skins])
+    log_evidence = np.maximum(evidence - evidence.max(axis=1, keepdims=True), -_HOPELESS)
+    changes = np.array([[log_change(len(one ^ two), supported, _DIFFERS) for two in sets] for one in sets])
+    shown = np.array([[_shows(skin, names, len(skins)) for names in sets] for skin in skins])
+    own = shown[:, None] | np.eye(len(sets), dtype=bool)  # (skins, common sets, sets)
+    change = np.where(own, changes[None], -np.inf)
+    weights = change + log_evidence[:, None]
+    of_skins = np.logaddexp.reduce(weights, axis=2)  # (skins, common sets)
+    prior = np.array([log_prior(len(one), supported) for one in sets])
+    together = of_skins.sum(axis=0)
+    least = SHOWS + np.array(
+        [
+            max((together[sets.index(one - {name})] for name in one if one - {name} in sets), default=-np.inf)
+            for one in sets
+        ]
+    )
+    log_common = np.where(together > least, prior + together, -np.inf)  # what shows in no skin the smaller set says
+    share = np.exp(log_common - np.logaddexp.reduce(log_common))
+    best = int(share.argmax())
+    # Of each skin the posterior of its set, all common sets averaged
+    posterior = np.einsum("c,ncm->nm", share, np.exp(weights - of_skins[..., None]))
+    chosen = weights[:, best].argmax(axis=1)
+    order = skins[0].candidate.problem.lines.mechanisms.named
+
+    def named(names: frozenset[str]) -> Names:
+        return tuple(name for name in order if name in names)
+
+    each = tuple(float(posterior[number, place]) for number, place in enumerate(chosen))
+    at_best = weights[np.arange(len(chosen)), best, chosen] - of_skins[:, best]
+    probability = float(share[best] * np.exp(at_best.sum()))
+    of_each = tuple(named(one.candidate.supported(sets[place])) for one, place in zip(skins, chosen, strict=True))
+    of_sisters = np.logaddexp.reduce((log_common - of_skins)[..., None] + change, axis=1)
+    of_sisters -= np.logaddexp.reduce(of_sisters, axis=1, keepdims=True)
+    from_sisters = tuple(dict(zip(sets, row.tolist(), strict=True)) for row in of_sisters)
+    total = float(np.logaddexp.reduce(log_common) + evidence.max(axis=1).sum())
+    return CommonSet(named(sets[best]), of_each, each, probability, from_sisters, total)
+
+
+def _shows(skin: FleetSkin, names: frozenset[str], skins: int) -> bool:
+    """Whether each mechanism of a set brings evidence in a skin's own recordings."""
+    whole = skin.log_evidence(names, skins)
+    return all(whole > skin.log_evidence(names - {name}, skins) + SHOWS for name in names)
+
+
+_LEAST_SKINS_OF_STRENGTH = 3
+_INFORMS = 0.5  # of a prior's precision: what recordings must say at least to count
+_WIDEST = 10.0  # deviation of the logarithm of a strength of which nothing is known
+_SPREAD = Spread(0.1, 2.0)  # deviation of its logarithm from skin to skin
+_FAR = 1.0  # the same of a skin that departs in it
+DEPARTS = "strength"
+
+
+@dataclass(frozen=True)
+class Strength:
+    """One parameter of a mechanism, with its unit, as a population of the skins that have it."""
+
+    parameter: str
+    unit: str
+    skins: tuple[str, ...]
+    population: Populations
+
+
+def of_strengths(candidates: Mapping[str, Candidate], common: CommonSet) -> list[Strength]:
+    """Of the positive parameters of mechanisms that at least three skins have."""
+    said: dict[tuple[str, str], dict[str, list[State]]] = {}
+    for (skin, candidate), names in zip(candidates.items(), common.sets, strict=True):
+        fit = candidate.explained(frozenset(names))
+        if fit is None:
+            continue
+        for mechanism, places in own_places(fit.names, fit.best.hypothesis.lines).items():
+            for place in range(places.start, places.stop):
+                entry = fit.model.parameters[place]
+                likelihood = _likelihood(fit, place)
+                if entry.scale == "log" and likelihood is not None:
+                    states = [State(REGULAR, likelihood, np.zeros(1)), State(DEPARTS, likelihood, np.array([_FAR**2]))]
+                    said.setdefault((f"{mechanism}.{entry.name}", entry.unit), {})[skin] = states
+    make = Make(0.0, np.zeros(1), np.array([_WIDEST**-2]))
+    return [
+        Strength(parameter, unit, tuple(own), populations(list(own.values()), [make], [_SPREAD]))
+        for (parameter, unit), own in said.items()
+        if len(own) >= _LEAST_SKINS_OF_STRENGTH
+    ]
+
+
+def _likelihood(fit: Explanation, place: int) -> Knowledge | None:
+    """Of one fit coordinate by the recordings alone, the prior taken out; None where they say next to nothing of it, or
+    it moves the covariance alone."""
+    hypothesis = fit.best.hypothesis
+    if place not in hypothesis.mean_places:
+        return None
+    row = hypothesis.mean_places.index(place)
+    after = 1 / float(fit.best.covariance[row, row])
+    prior, centre = quadratic_of_prior(fit.model.parameters[place], float(fit.point.fit[place]))
+    precision = after - prior
+    if precision < _INFORMS * prior:
+        return None
+    return Knowledge(np.array([[precision]]), np.array([after * fit.point.fit[place] - prior * centre]), 0.0)
+
+
+_MOST_TOLD = 3  # skins that depart in the statement
+_WORTH_SAYING = 0.1  # probability from which on a quantity is listed in which such a skin may depart
+_UNITS = {"youngs_modulus": "MPa", "thickness": "mm", "d33": "pC/N"}
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """What was found: the usable skins, the sets of their mechanisms, their E and thickness over the declared ones and
+    d33, the logarithms of the declared ones (skins, quantities), the probabilities that one of these is declared
+    wrongly for all skins, and the strengths of mechanisms."""
+
+    candidates: Mapping[str, Candidate]
+    common: CommonSet
+    pooled: Populations
+    declared: Floats
+    declared_wrongly: Mapping[str, float]
+    strengths: Sequence[Strength]
+
+
+def fleet_report(
+    name: str,
+    campaigns: Sequence[str],
+    results: Mapping[str, DiagnosisResult],
+    fleet: Fleet,
+    orders: Mapping[str, str],
+) -> dict[str, Any]:
+    """Of a fleet of this name, its campaigns' names, the result of each skin alone, and of skins with several campaigns
+    what is said where their order is not one of time."""
+    usable = {skin: results[skin] for skin in fleet.candidates}
+    lacking = [skin for skin in results if skin not in usable]
+    reports = {skin: reported(result) for skin, result in usable.items()}
+    own_d33 = {skin: own.d33 for skin, own in reports.items()}
+    populations = [*_populations(fleet), *(_of_strength(strength) for strength in fleet.strengths)]
+    mechanisms = _mechanisms(fleet)
+    departs = any(entry["departures"] for entry in populations)
+    undescribed = {skin: one.undescribed for skin, one in fleet.candidates.items()}
+    unexplained = [skin for skin, share in undescribed.items() if share > STATED]
+    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
+    wrongly = max(fleet.declared_wrongly.values(), default=0.0)
+    declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
+    of_sets = fleet.common.probability * declared * described
+    agreed, settled = _departures_stated(fleet)
+    probability = 1 - described if unexplained else of_sets * agreed
+    d33 = next(entry for entry in populations if entry["parameter"] == D33)
+    stated = {skin: {one["name"] for one in own.document["mechanisms"]} for skin, own in reports.items()}
+    of_d33 = together_report.of_skins(d33["mean"], d33["unit"], own_d33, _lacking(mechanisms, stated))
+    by_kind = of_kinds(reports.items())
+    contradictory = [f"in {entry['statement']}" for entry in by_kind.get("contradictions", ())]
+    return {
+        "schema": SCHEMA,
+        "campaign": name,
+        "campaigns": list(campaigns),
+        "verdict": _verdict(min(of_sets, settled), bool(mechanisms) or departs, unexplained),
+        "probability": round(probability, 3),
+        "statement": _statement(
+            probability,
+            mechanisms,
+            unexplained,
+            [*contradictory, *_asides(lacking, orders), of_d33],
+            populations,
+            _expected(fleet),
+            [*results, *campaigns],
+        ),
+        "location": {"axes": [], "region": {}, "effect_percent": None, "statement": "See each skin's own diagnosis."},
+        "mechanisms": mechanisms,
+        "presence": [{"mechanisms": [entry["name"]], "probability": entry["probability"]} for entry in mechanisms],
+        "unnamed": None,
+        "alternatives": [],
+        "not_identifiable": together_report.not_identifiable(own_d33),
+        "findings": [
+            {**finding, "statement": f"{skin}: {finding['statement']}"}
+            for skin, own in reports.items()
+            for finding in own.document["findings"]
+        ],
+        **by_kind,
+        "fit": None,
+        "power": [],
+        "population": populations,
+        "d33": {"name": D33, "unit": d33["unit"], "value": d33["mean"], "quotable": False, "per_skin": d33["skins"]},
+        "next_experiment": None,
+        "provenance": {
+            **next(iter(usable.values())).provenance,
+            "each": [
+                {"skin": skin, **{key: own.document[key] for key in ("verdict", "probability")}}
+                for skin, own in reports.items()
+            ],
+        },
+    }
+
+
+def _populations(fleet: Fleet) -> list[dict[str, Any]]:
+    """Of d33, E and the thickness."""
+    pooled, skins = fleet.pooled, tuple(fleet.candidates)
+    rows = {quantity: (row, departure) for row, (departure, quantity) in enumerate(QUANTITIES.items())}
+    return [
+        _population(quantity, _UNITS[quantity], skins, pooled, *rows[quantity], fleet.declared[:, rows[quantity][0]])
+        for quantity in (D33, *(quantity for quantity in rows if quantity != D33))
+    ]
+
+
+def _expected(fleet: Fleet) -> dict[tuple[str, str], float]:
+    """What the others would have if they were declared as one skin is, by parameter and skin, where they differ."""
+    each = np.exp(fleet.pooled.mean + fleet.declared)
+    return {
+        (quantity, skin): float(each[number, row])
+        for row, quantity in enumerate(QUANTITIES.values())
+        for number, skin in enumerate(fleet.candidates)
+        if np.ptp(fleet.declared[:, row]) > 0
+    }
+
+
+def _departures_stated(fleet: Fleet) -> tuple[float, float]:
+    """The probability of what is stated of all skins' departures, and the least of that of one skin: were the first to
+    decide the verdict, fleets of many skins would all be ambiguous."""
+    departing = [one.population for one in fleet.strengths if any(one.population.stated)]
+    agreed, settled = 1.0, 1.0
+    for pooled in (fleet.pooled, *departing):
+        agreed *= pooled.together.get(pooled.stated, 0.0)
+        each = [own[departs] for own, departs in zip(pooled.departs, pooled.stated, strict=True)]
+        settled = min(settled, *each)
+    return agreed, settled
+
+
+def _of_strength(strength: Strength) -> dict[str, Any]:
+    return _population(
+        strength.parameter,
+        strength.unit,
+        strength.skins,
+        strength.population,
+        0,
+        DEPARTS,
+        np.zeros(len(strength.skins)),
+    )
+
+
+def _population(
+    parameter: str, unit: str, skins: Sequence[str], pooled: Populations, row: int, departure: str, declared: Floats
+) -> dict[str, Any]:
+    """Of one quantity, pooled over one that is declared, of which these are the logarithms (skins,)."""
+    mean, spread = float(np.exp(pooled.mean[row] + declared.mean())), float(pooled.spread[row])
+    value, low, high = np.exp(pooled.of_skins[:, :, row] + declared)
+    return {
+        "parameter": parameter,
+        "unit": unit,
+        "mean": rounded(mean),
+        "sd": rounded(mean * float(np.hypot(spread, declared.std())), 3),
+        "departures": [
+            {"skin": skin, "value": rounded(float(value[number])), "probability": round(share, 3)}
+            for number, (skin, own) in enumerate(zip(skins, pooled.departs, strict=True))
+            if own[REGULAR] < 1 - STATED and (share := own.get(departure, 0.0)) > _WORTH_SAYING
+        ],
+        "skins": [
+            {
+                "skin": skin,
+                "value": rounded(float(value[number])),
+                "low": rounded(float(low[number])),
+                "high": rounded(float(high[number])),
+            }
+            for number, skin in enumerate(skins)
+        ],
+    }
+
+
+def _mechanisms(fleet: Fleet) -> list[dict[str, Any]]:
+    """With the skins that have each; a declared E or thickness that is wrong for all, or for one that departs in it."""
+    present: dict[str, dict[str, float]] = {
+        error: dict.fromkeys(fleet.candidates, share)
+        for error, share in fleet.declared_wrongly.items()
+        if share > STATED
+    }
+    for skin, names, share in zip(fleet.candidates, fleet.common.sets, fleet.common.each, strict=True):
+        for mechanism in names:
+            present.setdefault(mechanism, {})[skin] = share
+    for skin, own, departs in zip(fleet.candidates, fleet.pooled.departs, fleet.pooled.stated, strict=True):
+        if departs in ERRORS:
+            present.setdefault(departs, {})[skin] = own[departs]
+    return [
+        {
+            "name": mechanism,
+            "probability": round(float(np.mean(list(each.values()))), 3),
+            "parameters": [],
+            "explains_percent": None,
+            "scope": {"skins": list(each)},
+        }
+        for mechanism, each in present.items()
+    ]
+
+
+def _lacking(mechanisms: Sequence[Mapping[str, Any]], stated: Mapping[str, set[str]]) -> dict[str, list[str]]:
+    """Of each skin the mechanisms that it has by the fleet's report and not by its own."""
+    return {
+        skin: [one["name"] for one in mechanisms if skin in one["scope"]["skins"] and one["name"] not in own]
+        for skin, own in stated.items()
+    }
+
+
+def _verdict(probability: float, anything: bool, unexplained: Sequence[str]) -> str:
+    """By the probability of what is stated of the least certain skin."""
+    if unexplained:
+        return "unexplained"
+    if probability < EXPLAINED:
+        return "ambiguous"
+    return "explained" if anything else "no_mismatch"
+
+
+def _asides(lacking: Sequence[str], orders: Mapping[str, str]) -> list[str]:
+    unknown = [f"nothing could be told of {', '.join(lacking)}"] if lacking else []
+    return unknown + [
+        f"of {skin}, the last that can be used speaks: {clause}" for skin, clause in orders.items() if clause
+    ]
+
+
+def _statement(
+    probability: float,
+    mechanisms: Sequence[Mapping[str, Any]],
+    unexplained: Sequence[str],
+    asides: Sequence[str],
+    populations: Sequence[Mapping[str, Any]],
+    expected: Mapping[tuple[str, str], float],
+    names: Sequence[str],
+) -> str:
+    each = [f"{in_words([entry['name']])} in {', '.join(entry['scope']['skins'])}" for entry in mechanisms]
+    missing = "; ".join(each) or in_words((NOTHING_MISSING,))
+    verdict = f"By skin: {missing} ({in_percent(probability)} probability)"
+    if unexplained:
+        verdict = f"Something is missing in {', '.join(unexplained)} that no known mechanism describes; else: {missing}"
+    departures: dict[str, list[str]] = {}
+    for entry in populations:
+        for one in entry["departures"]:
+            middle = expected.get((entry["parameter"], one["skin"]))
+            others = f"{entry['mean']:g} ± {entry['sd']:g}" if middle is None else f"{middle:.4g} for the same declared"
+            departures.setdefault(one["skin"], []).append(
+                f"in {quantity_in_words(entry['parameter'])}: {one['value']:g}{_unit(entry['unit'])}, where the others "
+                f"have {others} ({in_percent(one['probability'])})"
+            )
+    told = [f"one departs, {skin}, {', or '.join(ways)}" for skin, ways in departures.items()][:_MOST_TOLD]
+    told += [f"{len(departures) - _MOST_TOLD} more depart, see the populations"] if len(departures) > _MOST_TOLD else []
+    return of_clauses([verdict], told or ["none is seen to depart from the others"], asides, names=names)
+
+
+def _unit(label: str) -> str:
+    return "" if label == "-" else f" {label}"
+
 
 _LEAST_SKINS = 3
 _DECLARED = (0.02, 0.01)  # deviations of ln of the make's E and thickness about the declared ones

@@ -1,22 +1,115 @@
-"""The d33 of each sensor in each of several campaigns, the mechanisms found taken into account, and what changed."""
+"""The sensors of an array at several dates.
 
-from collections.abc import Collection, Mapping, Sequence
+When campaigns were recorded, and how a report calls them by that. The d33 of each sensor in each of several campaigns,
+the mechanisms found taken into account, and what changed.
+
+Two sensors of which each has, from a campaign on, the d33 that the other one had: their labels were exchanged.
+
+Two changes of single sensors at once, which would be this size by chance alone, against an exchange, which fixes both.
+
+A d33 of all sensors that changed from one campaign to the next: how well that is known, and what could have done it.
+
+The same factor on all sensors tells nothing of its cause: d33 itself, or a mechanism that in this design acts as one
+factor, such as a glue line that gives way alike under every sphere.
+"""
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import date, datetime
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from underskin.diagnosis.reporting.numbers import rounded
+from underskin.diagnosis.inference.explanation import Explanation
+from underskin.diagnosis.inference.hypothesis import own_places
+from underskin.diagnosis.inference.residuals import with_unseen
+from underskin.diagnosis.reporting.numbers import place_of, rounded
+from underskin.diagnosis.several.course import Candidate, Course, Shared, same_strength
 from underskin.errors import InvalidInput
 from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.inversion.array_course import FEWEST_DATES, FEWEST_SENSORS, ArrayLevels, array_levels
 from underskin.inversion.array_course import changes as changes_between_ends
 from underskin.inversion.invert import Inversion, invert
 from underskin.prediction.adopted_model import AdoptedModel
 from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.readers.calendar_times import time_zone
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_lab
+
+
+@dataclass(frozen=True)
+class Dated:
+    """Names of campaigns in their order, with the dates of their first recordings, None of those without a time."""
+
+    names: Sequence[str]
+    dates: Sequence[str | None]
+
+    @property
+    def ordered(self) -> bool:
+        """Whether their order is one of time: all have a date."""
+        return None not in self.dates
+
+    def since(self, number: int) -> str | None:
+        """The date from which on something is there that begins with this campaign; None where the order is not one of
+        time."""
+        return self.dates[number] if self.ordered else None
+
+    @property
+    def times(self) -> Floats:
+        """When the campaigns were recorded, in days; where not all have a date of their own, their places in the
+        order."""
+        days = [date.fromisoformat(own).toordinal() for own in self.dates if own is not None]
+        ordered = self.ordered and days == sorted(days) and len(set(days)) == len(days)
+        return np.array(days if ordered else range(len(self.dates)), dtype=float)
+
+    def days(self, first: int, last: int) -> int | None:
+        """Between two campaigns; None where their order is not one of time."""
+        begin, end = self.dates[first], self.dates[last]
+        if begin is None or end is None or not self.ordered:
+            return None
+        return (date.fromisoformat(end) - date.fromisoformat(begin)).days
+
+    def called(self, number: int) -> str:
+        """A campaign by its date where that says which it is, else by its name: "campaign B (no date)"."""
+        own = self.dates[number]
+        if own is not None and self.ordered and self.dates.count(own) == 1:
+            return own
+        return f"campaign {self.names[number]} ({own or 'no date'})"
+
+    def order_clause(self) -> str:
+        """That the order is not one of time; empty where it is."""
+        if self.ordered:
+            return ""
+        listed = ", ".join(self.called(number) for number in range(len(self.names)))
+        return f"not every campaign has a date, so they count in the order in which they were given: {listed}"
+
+
+def in_order(campaigns: Sequence[Campaign]) -> list[Campaign]:
+    """By the first time of each; as they come where one has none."""
+    times = [_first_time(campaign) for campaign in campaigns]
+    known = [time for time in times if time is not None]
+    if len(known) < len(times):
+        return list(campaigns)
+    return [campaigns[number] for number in np.argsort(known, kind="stable")]
+
+
+def _first_time(campaign: Campaign) -> float | None:
+    """In seconds; None where none of its recordings has a time."""
+    written = [entry.recorded_at for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    times = [datetime.fromisoformat(time) for time in written if time is not None]
+    zone = time_zone()
+    return min((time if time.tzinfo else time.replace(tzinfo=zone)).timestamp() for time in times) if times else None
+
+
+def date_of(campaign: Campaign) -> str | None:
+    """The date of its first recording; None where none has a time."""
+    times = [str(entry.recorded_at)[:10] for entry in campaign.recordings if isinstance(entry, FrfRecording)]
+    known = [time for time in times if time != "None"]
+    return min(known, default=None)
+
 
 _STATED = 0.98  # probability of a change that is stated
 _PRIOR, USUAL = 0.05, 0.2  # that d33 changes between campaigns, and the sd of such a change's logarithm
@@ -184,10 +277,10 @@ def _levels(each: Sequence[SensorsOfCampaign | None]) -> tuple[list[int], list[s
     told = {number: one for number, one in enumerate(each) if one is not None}
     sensors = list(dict.fromkeys(sensor for one in told.values() for sensor in one.ids))
     value, deviation = np.full((2, len(sensors), len(told)), np.nan)
-    for date, one in enumerate(told.values()):
+    for number, one in enumerate(told.values()):
         rows = [sensors.index(sensor) for sensor in one.ids]
-        value[rows, date] = np.log(np.abs(one.d33))
-        deviation[rows, date] = one.uncertainty / np.abs(one.d33)
+        value[rows, number] = np.log(np.abs(one.d33))
+        deviation[rows, number] = one.uncertainty / np.abs(one.d33)
     return list(told), sensors, array_levels(value, deviation)
 
 
@@ -251,3 +344,127 @@ def _probability(change: float, deviation: float, prior: float) -> float:
 def per_sensor(each: Sequence[SensorsOfCampaign | None]) -> list[dict[str, Any]]:
     """Of all campaigns."""
     return [row for one in each if one is not None for row in one.in_report()]
+
+
+_LEAST_ODDS = float(np.log(0.98 / 0.02))  # of an exchange that is stated, over two changes
+_LOG_PRIOR = float(np.log(0.2))  # of an exchange, where two sensors have changed at once, over two changes
+
+
+def with_exchanges(found: Sequence[Change], each: Sequence[SensorsOfCampaign | None]) -> list[Change]:
+    """The changes, two of single sensors marked as an exchange where that is far more probable."""
+    changes = list(found)
+    single = [place for place, change in enumerate(changes) if change.sensor is not None and change.is_step]
+    odds = {
+        (one, two): _log_odds(changes[one], changes[two], each)
+        for one, two in combinations(single, 2)
+        if changes[one].since == changes[two].since
+    }
+    for one, two in sorted(odds, key=lambda pair: -odds[pair]):
+        free = changes[one].exchanged_with is None and changes[two].exchanged_with is None
+        if free and odds[one, two] > _LEAST_ODDS:
+            changes[one], changes[two] = (
+                replace(changes[place], exchanged_with=changes[other].sensor)
+                for place, other in ((one, two), (two, one))
+            )
+    return changes
+
+
+def _log_odds(one: Change, two: Change, each: Sequence[SensorsOfCampaign | None]) -> float:
+    """Of an exchange over two changes of usual size; both changes are beyond that of all sensors."""
+    before = each[one.since - 1]
+    assert before is not None
+    first, second = (float(before.d33[before.ids.index(str(change.sensor))]) for change in (one, two))
+    apart = float(np.log(np.abs(second / first)))
+    log_odds = _LOG_PRIOR
+    for change, expected in ((one, apart), (two, -apart)):
+        size, sd = float(np.log1p(change.value)), change.uncertainty
+        by_chance = -0.5 * (size**2 / (sd**2 + USUAL**2) + np.log(sd**2 + USUAL**2))
+        log_odds += -0.5 * (((size - expected) / sd) ** 2 + np.log(sd**2)) - by_chance
+    return log_odds
+
+
+def changed_once(changes: Sequence[Change]) -> Iterator[Change]:
+    """The changes, exchanges first, each of these by one of its two sensors."""
+    exchanges = [change for change in changes if change.exchanged_with is not None]
+    yield from (change for change in exchanges if str(change.sensor) < str(change.exchanged_with))
+    yield from (change for change in changes if change.exchanged_with is None)
+
+
+def findings(changes: Sequence[Change], dated: Dated) -> list[Finding]:
+    """One of each exchange."""
+    return [
+        Finding(
+            Reason.LEVELS_EXCHANGED,
+            "",
+            "sensor",
+            {"since": dated.called(change.since), "first": change.sensor, "second": change.exchanged_with},
+        )
+        for change in changed_once(changes)
+        if change.exchanged_with is not None
+    ]
+
+
+AGEING = "ageing"
+_LIKELY = 0.1  # of the weight of the most probable cause, from which on another one is listed
+_BETWEEN = 0.03  # of ln d33: places over a mechanism's prior lie about as far apart
+
+
+def unsure_of_changes(candidates: Sequence[Candidate], leader: Course) -> list[float]:
+    """Of each campaign by how much ln d33 since the one before is unsure by the mechanisms' strengths; a mechanism that
+    is in both with one strength moves both alike. 0 of the first."""
+    found = [0.0]
+    for number in range(1, len(candidates)):
+        before, after = (_moving(candidates[place], leader.sets[place]) for place in (number - 1, number))
+        common = [name for name in before.names if name in after.names and _stays(before, after, name)]
+        of_both = (_added(candidates[number - 1], before, common), _added(candidates[number], after, common))
+        found.append(float(np.hypot(*of_both)))
+    return found
+
+
+def causes(candidate: Candidate, names: Sequence[str], change: Change) -> tuple[str, ...]:
+    """The mechanisms that, appearing beside a campaign's own `names`, would change d33 of all sensors so: ageing, which
+    is d33 itself and only falls, then the most probable first."""
+    explanation = _moving(candidate, names)
+    before = float(explanation.point.fit[place_of(explanation, "d33")] - np.log1p(change.value))
+    weights = {AGEING: float(_normal(np.log1p([change.value]), USUAL)[0])} if change.value < 0 else {}
+    width = float(np.hypot(change.uncertainty, _BETWEEN))
+    for name in candidate.problem.lines.mechanisms.named:
+        found = None if name in {*names, AGEING} else with_unseen(candidate.problem, explanation, name, "d33")
+        if found is not None:
+            weights[name] = float(found.share @ _normal(found.mean - before, width))
+    most = max(weights.values(), default=0.0)
+    likely = {name: weight for name, weight in weights.items() if weight > _LIKELY * most}
+    return tuple(sorted(likely, key=lambda name: (name != AGEING, -likely[name])))
+
+
+def _moving(candidate: Candidate, names: Sequence[str]) -> Explanation:
+    """Of a set that part which moves predictions: a spread of the sensors does not change what one of them has."""
+    mechanisms = candidate.problem.lines.mechanisms
+    found = candidate.explained(frozenset(name for name in names if mechanisms[name].moves_predictions))
+    assert found is not None
+    return found
+
+
+def _stays(before: Explanation, after: Explanation, name: str) -> bool:
+    return same_strength(*(Shared.of(fit, [name], skin=False) for fit in (before, after)))
+
+
+def _added(candidate: Candidate, fit: Explanation, common: Sequence[str]) -> float:
+    """Standard deviation of ln d33 beyond the base model's, with the parameters of `common` mechanisms known."""
+    nothing = candidate.explained(frozenset())
+    assert nothing is not None
+    return float(np.sqrt(max(_variance(fit, common) - _variance(nothing, ()), 0.0)))
+
+
+def _variance(fit: Explanation, common: Sequence[str]) -> float:
+    hypothesis, covariance = fit.best.hypothesis, fit.best.covariance
+    places = own_places(fit.names, hypothesis.lines)
+    known = [place for name in common for place in range(places[name].start, places[name].stop)]
+    rows = [hypothesis.mean_places.index(place) for place in known if place in hypothesis.mean_places]
+    d33 = hypothesis.mean_places.index(place_of(fit, "d33"))
+    with_known = covariance[d33, rows]
+    return float(covariance[d33, d33] - with_known @ np.linalg.solve(covariance[np.ix_(rows, rows)], with_known))
+
+
+def _normal(away: Floats, deviation: float) -> Floats:
+    return np.asarray(np.exp(-0.5 * np.square(away / deviation)) / deviation)

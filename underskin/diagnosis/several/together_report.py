@@ -1,35 +1,284 @@
-"""The report of campaigns of one skin that were diagnosed together."""
+"""The report on several campaigns of one skin.
 
-from collections.abc import Sequence
-from dataclasses import replace
+What recordings of each kind tell of several campaigns or skins, and where kinds contradict each other. Why no d33 of
+several campaigns, or of skins of one make, is to be quoted, and what may be quoted in its place.
+
+Sensors that a campaign's own diagnosis leaves out, as dead or weak: what is left out of one campaign is left out of
+what is said of all, and a sensor that died between two of them comes first.
+
+Clauses on how d33 changed from campaign to campaign. The report of campaigns of one skin that were diagnosed together.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words
+from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
-from underskin.diagnosis.reporting.sentences import of_clauses
+from underskin.diagnosis.reporting.statements import StatedD33, listed
 from underskin.diagnosis.selection.answers import UNTHOUGHT
-from underskin.diagnosis.several import change_words, left_out, quoted
-from underskin.diagnosis.several.course import Candidate, Course, Courses, courses, same_strength
-from underskin.diagnosis.several.dates import Dated
-from underskin.diagnosis.several.exchanged import findings as exchanges
-from underskin.diagnosis.several.exchanged import with_exchanges
-from underskin.diagnosis.several.kinds import of_kinds
-from underskin.diagnosis.several.level import AGEING, causes, unsure_of_changes
-from underskin.diagnosis.several.posteriors import Shared, combined, values
+from underskin.diagnosis.several.course import (
+    Candidate,
+    Course,
+    Courses,
+    Shared,
+    combined,
+    courses,
+    same_strength,
+    values,
+)
 from underskin.diagnosis.several.sensors import (
+    AGEING,
     ArrayOverDates,
     Change,
+    Dated,
+    SensorsOfCampaign,
     array_over_dates,
+    causes,
+    changed_once,
     changes,
     per_sensor,
     sensors_of,
+    unsure_of_changes,
+    with_exchanges,
 )
+from underskin.diagnosis.several.sensors import findings as exchanges
+from underskin.findings.codes import FindingCode
 from underskin.findings.formatting import in_percent
-from underskin.recordings.campaign import Campaign
+from underskin.inversion.array_course import FEWEST_DATES
+from underskin.inversion.array_history import TWO_DATES, array_change_in_words
+from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
+
+
+def of_kinds(reports: Iterable[tuple[str, Reported]]) -> dict[str, Any]:
+    """`by_kind` and `contradictions`, these led by the name of the campaign or skin that the report is of; empty where
+    none has several kinds."""
+    told = [(name, own.document) for name, own in reports if "by_kind" in own.document]
+    if not told:
+        return {}
+    contradictions = [
+        {**entry, "statement": f"{name}: {entry['statement']}"}
+        for name, document in told
+        for entry in document["contradictions"]
+    ]
+    return {
+        "by_kind": [entry for _, document in told for entry in document["by_kind"]],
+        "contradictions": contradictions,
+    }
+
+
+_MOST_NAMED = 3  # skins in a clause
+
+
+def of_campaigns(last: str, own: StatedD33) -> str:
+    """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
+    if own.document is None:
+        return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
+    alone = f"d33 here is by the recordings of {last} alone, and not to be quoted for all campaigns"
+    if own.document["quotable"]:
+        return f"{alone}: {own.quoted()}"
+    return f"{alone}, nor for {last} itself: {own.interval()}"
+
+
+def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Mapping[str, Sequence[str]]) -> str:
+    """A clause on the d33 of a fleet, the mean of its skins.
+
+    `each`: what the skins' recordings say alone; `lacking`: of some skins the mechanisms that the fleet finds in them
+    and their own diagnosis does not.
+    """
+    may: list[str] = []
+    by_reason: dict[str, list[str]] = {}
+    for skin, own in each.items():
+        sisters = [f"its own diagnosis lacks {in_words(lacking[skin])}"] if lacking.get(skin) else []
+        reason = " and ".join(own.reasons or sisters)
+        (by_reason.setdefault(reason, []) if reason else may).append(skin)
+    others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
+    told = ", ".join([f"of {_few(may) if may else 'none'}", *others])
+    return (
+        f"d33 is not to be quoted, because {mean:.3g} {unit} is the mean of the skins and no skin's own; "
+        f"by its own recordings alone it may be quoted {told}"
+    )
+
+
+def not_identifiable(each: Mapping[str, StatedD33]) -> list[dict[str, str]]:
+    """What would not show in a campaign, or in a skin's, and keeps its d33 from being quoted."""
+    return [
+        {**entry, "reason": f"{name} alone: {entry['reason']}"}
+        for name, own in each.items()
+        for entry in own.not_identifiable([])
+        if entry["mechanism"] in {one.mechanism for one in own.deciding}
+    ]
+
+
+def _few(skins: Sequence[str]) -> str:
+    further = len(skins) - _MOST_NAMED
+    return listed([*skins[:_MOST_NAMED], *([f"{further} more"] if further > 0 else [])])
+
+
+class Fault(StrEnum):
+    """Why a sensor is left out, as a sentence says it of one or of several."""
+
+    DEAD = "dead: no charge above noise"
+    WEAK = "nearly dead: a small share of the others' charge"
+    OTHER = "without a usable recording: see the findings"
+
+
+Faults = Mapping[str, Fault | None]  # by recorded sensor, None of one that is used
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Campaigns in a row that record a sensor and leave it out: the first, the last one before and the first one after
+    that use it."""
+
+    fault: Fault
+    first: int
+    before: int | None
+    after: int | None
+
+
+def used_recordings(result: DiagnosisResult) -> frozenset[str]:
+    """The recordings that a diagnosis used (ids)."""
+    return (
+        frozenset() if result.problem is None else frozenset(one.id for one in result.problem.lines.campaign.recordings)
+    )
+
+
+def faults_of(campaign: Campaign, result: DiagnosisResult) -> Faults:
+    """Each sensor that was recorded with FRFs, and why none of these was used."""
+    used = used_recordings(result)
+    owner = {entry.id: entry.sensor for entry in campaign.recordings if isinstance(entry, FrfRecording)}
+    usable = {sensor for name, sensor in owner.items() if name in used}
+    codes: dict[str, set[FindingCode]] = {}
+    for finding in result.findings:
+        sensor = finding.arguments.get("sensor", owner.get(finding.recording))
+        codes.setdefault(str(sensor), set()).add(finding.code)
+    return {
+        sensor: None if sensor in usable else _fault(codes.get(sensor, set()))
+        for sensor in dict.fromkeys(owner.values())
+    }
+
+
+def _fault(codes: set[FindingCode]) -> Fault:
+    if FindingCode.NO_RESPONSE in codes:
+        return Fault.DEAD
+    return Fault.WEAK if FindingCode.WEAK in codes else Fault.OTHER
+
+
+def left_out_in_words(each: Sequence[Faults], sensors: Sequence[SensorsOfCampaign | None], dated: Dated) -> list[str]:
+    """A clause on all sensors that share a fault and its dates, those that came between two campaigns first."""
+    runs: dict[_Run, list[str]] = {}
+    for sensor in dict.fromkeys(sensor for one in each for sensor in one):
+        for run in _runs_of_dates([one.get(sensor, _NOT_RECORDED) for one in each]):
+            runs.setdefault(run, []).append(sensor)
+    ordered = sorted(runs.items(), key=lambda entry: (entry[0].before is None, entry[0].first))
+    return [_clause(run, own, sensors, dated) for run, own in ordered]
+
+
+_NOT_RECORDED = "not recorded"
+
+
+def _runs_of_dates(states: Sequence[Fault | str | None]) -> list[_Run]:
+    found: list[_Run] = []
+    before: int | None = None
+    current: _Run | None = None
+    for number, state in enumerate(states):
+        if state == _NOT_RECORDED:
+            continue
+        if isinstance(state, Fault):
+            current = current or _Run(state, number, before, None)
+            continue
+        if current is not None:
+            found.append(_Run(current.fault, current.first, current.before, number))
+            current = None
+        before = number
+    return found if current is None else [*found, current]
+
+
+def _clause(run: _Run, own: Sequence[str], sensors: Sequence[SensorsOfCampaign | None], dated: Dated) -> str:
+    """ "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
+    one = len(own) == 1
+    who = f"sensor {own[0]}" if one else f"sensors {listed(own)}"
+    state, _, why = run.fault.partition(": ")
+    begun = dated.called(run.first)
+    if run.after is not None:
+        again = f"answer{'s' if one else ''} again on {dated.called(run.after)}"
+        were = "was" if one else "were"
+        return f"{who} {were} {state} on {begun} ({why}) and {again}; left out of what is compared there"
+    when = "in all campaigns" if run.before is None else f"since {begun}"
+    earlier = (
+        "" if run.before is None else f", after {_earlier(own, sensors[run.before])} on {dated.called(run.before)}"
+    )
+    return f"{who} {'is' if one else 'are'} {state} {when}: {why}{earlier}; left out of all that follows"
+
+
+def _earlier(own: Sequence[str], before: SensorsOfCampaign | None) -> str:
+    """d33 that the sensors had."""
+    had = [] if before is None else [f"{before.d33[before.ids.index(one)]:.3g}" for one in own if one in before.ids]
+    return f"{listed(had)} pC/N" if had else "a response"
+
+
+_MOST_TOLD, _MOST_CAUSES = 3, 3  # changes in a statement, and mechanisms that would make one
+_OF_THE_CHAIN = ("an amplifier's gain", "the temperature")
+
+
+def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: Dated) -> list[str]:
+    """What a statement says of d33: of the array first where it changed, and of sensors beside it, of more than a few
+    how many."""
+    dates = 0 if over is None else len(over.numbers)
+    steps = [change for change in changed if change.sensor is None and change.is_step and dates > 2]
+    of_array = [change_in_words(change, dated) for change in steps]
+    if over is not None and not steps:
+        of_array = _array_in_words(over, changed, dated)
+    own = [change for change in changed_once(changed) if change.sensor is not None]
+    said = [change_in_words(change, dated) for change in own[:_MOST_TOLD]]
+    more = len(own) - _MOST_TOLD
+    said += [f"d33 of each sensor has {more} further changes"] if more > 0 else []
+    changed_at_all = steps or (over is not None and over.is_significant)
+    return [*of_array, *said] if changed_at_all else [*said, *of_array]
+
+
+def change_in_words(change: Change, dated: Dated) -> str:
+    """A clause on d33 of one sensor or of the array; of the array, that a change of level tells nothing of its
+    cause."""
+    if change.exchanged_with is not None:
+        both = f"sensors {change.sensor} and {change.exchanged_with}"
+        return f"{both} look exchanged since {dated.called(change.since)}: each has the d33 that the other had"
+    whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
+    way = "fell" if change.value < 0 else "rose"
+    before, after = (dated.called(number) for number in (change.before, change.until))
+    half = SDS_OF_95 * change.uncertainty
+    low, high = sorted(abs(100 * (change.value + end * half)) for end in (-1, 1))
+    size = f"{abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g})"
+    level = f", {_causes(change)}" if change.sensor is None else ""
+    return f"d33 {whose} {way} by {size} between {before} and {after}{level}"
+
+
+def _array_in_words(over: ArrayOverDates, changed: Sequence[Change], dated: Dated) -> list[str]:
+    """From the first to the last campaign."""
+    first, last = over.numbers[0], over.numbers[-1]
+    between = f"between {dated.called(first)} and {dated.called(last)}"
+    said = array_change_in_words(
+        over.change.value, over.low, over.high, over.d33.tolist(), between, dated.days(first, last)
+    )
+    if not over.is_significant:
+        return [said]
+    stated = next((change for change in changed if change.sensor is None), over.change)
+    return [f"{said}, {_causes(stated)}", *([TWO_DATES] if len(over.numbers) < FEWEST_DATES else [])]
+
+
+def _causes(change: Change) -> str:
+    few = [in_words([name]) for name in change.causes[:_MOST_CAUSES]]
+    more = ["another mechanism"] if len(change.causes) > _MOST_CAUSES else []
+    causes = " or ".join([*few, *more, *_OF_THE_CHAIN])
+    return f"a change of level that {causes} would make: these recordings do not tell which"
+
 
 _ALTERNATIVES = 6
 _DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
@@ -59,7 +308,7 @@ def together_report(
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
-        sensors_of(campaigns[number], strengths[place], table, left_out.used_recordings(results[number]))
+        sensors_of(campaigns[number], strengths[place], table, used_recordings(results[number]))
         if undescribed[place] <= _DESCRIBED
         else None  # whose levels no mechanism here explains
         for place, number in enumerate(usable)
@@ -72,7 +321,7 @@ def together_report(
         over = replace(over, change=_with_causes(over.change, candidates, leader))
     mechanisms = [*_mechanisms(candidates, found, leader, dated), *_aged(changed, dated)]
     verdict = _verdict(leader, described, undescribed, changed)
-    faults = [left_out.faults(campaigns[number], results[number]) for number in usable]
+    faults = [faults_of(campaigns[number], results[number]) for number in usable]
     probability = 1 - described if verdict == "unexplained" else leader.probability * described
     last_name, last = names[-1], reports[usable[-1]].d33
     findings = [
@@ -83,7 +332,7 @@ def together_report(
     findings = [*(finding.in_report() for finding in exchanges(changed, dated)), *findings]
     by_kind = of_kinds(zip((campaign.name for campaign in campaigns), reports, strict=True))
     contradictory = [f"in {entry['statement']}" for entry in by_kind.get("contradictions", ())]
-    of_d33 = quoted.of_campaigns(last_name, last)
+    of_d33 = of_campaigns(last_name, last)
     return {
         "schema": SCHEMA,
         "campaign": name,
@@ -97,8 +346,8 @@ def together_report(
             undescribed,
             mechanisms,
             dated,
-            [*left_out.in_words(faults, sensors, dated), *contradictory],
-            change_words.in_statement(changed, over, dated),
+            [*left_out_in_words(faults, sensors, dated), *contradictory],
+            in_statement(changed, over, dated),
             of_d33,
         ),
         "location": {
@@ -111,7 +360,7 @@ def together_report(
         "presence": [*_presence(found, described), *_groups(changed)],
         "unnamed": None,
         "alternatives": [_alternative(course, described, names) for course in found.best[1 : _ALTERNATIVES + 1]],
-        "not_identifiable": quoted.not_identifiable({last_name: last}),
+        "not_identifiable": not_identifiable({last_name: last}),
         "findings": findings,
         **by_kind,
         "fit": None,
@@ -253,7 +502,7 @@ def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
                 ],
                 "explains_percent": None,
                 "scope": scope,
-                "statement": of_clauses([change_words.change_in_words(change, dated)]),
+                "statement": of_clauses([change_in_words(change, dated)]),
             }
         )
     return entries

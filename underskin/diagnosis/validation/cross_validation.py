@@ -1,4 +1,6 @@
-"""How well the recordings are predicted before and after, on groups that were left out whole: extrapolation.
+"""Predictions of what was left out, and noise that the fit leaves.
+
+How well the recordings are predicted before and after, on groups that were left out whole: extrapolation.
 
 Groups: the highest preload, one sphere (the largest), one sensor (the last), the highest band, the latest day; of a law
 that nobody listed, thirds along its axis. Without
@@ -6,6 +8,9 @@ the group everything is fitted again: nothing missing, and the choice among the 
 rmse = 100 √(Σ|y − m|²/Σ|m|²) over all groups together, of curves with the measured force in place of m below; the noise
 floor is its expectation from the noise alone, for a new recording: gain, positioning and line scatter, and the
 sensors' gains where the sensor was not seen.
+
+What groups held out say of the answers, and of laws that nobody listed, which predict within their range only. Whether
+what an explanation leaves is noise: the check of the residual that decides between named and unexplained.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,11 +20,17 @@ from typing import Any
 import numpy as np
 
 from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.curve_nuisances import cell_response
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
-from underskin.diagnosis.noise.noise_levels import NoiseLevels
+from underskin.diagnosis.inference.hypothesis import cell_response
+from underskin.diagnosis.noise import NoiseLevels
+from underskin.diagnosis.selection.answers import Search
+from underskin.diagnosis.selection.search import left_smooth
+from underskin.diagnosis.selection.unnamed_search import law_of, nearest_law
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.recordings.conditions import curves_of, frf_of
+from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, in_plain_words
+from underskin.recordings.campaign import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
 _STRETCHES = 9  # of a curve
@@ -251,3 +262,130 @@ def in_sample(problem: FittingProblem, explanation: Explanation) -> PredictionSc
     """The recordings that the explanation was fitted to."""
     every = np.ones(len(problem.lines.value), dtype=bool)
     return _predict(problem, explanation, problem, every, problem.lines)
+
+
+_LAWS_HELD_OUT = 4  # of laws, and of sets of mechanisms, among which the choice is repeated
+
+
+def held_out(
+    problem: FittingProblem, result: Search, ranked: Sequence[Explanation], nothing: Explanation
+) -> list[HeldOut]:
+    """What groups held out say; of a law that nobody listed, which predicts within its range only, thirds along it."""
+    law = result.law
+    if result.answers[0].explanation is not None or law is None:
+        return hold_out(problem, ranked, nothing, result.log_prior, groups(problem.lines))
+    laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
+    both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
+    return hold_out(problem, both, nothing, result.log_prior, _along(problem, law))
+
+
+def _along(problem: FittingProblem, law: Explanation) -> dict[str, Mask]:
+    """The rows of thirds along the axis of a law that nobody listed."""
+    if problem.lines.curves:
+        return stretches(problem.lines)
+    leading = law_of(problem, law)
+    ids = [entry.id for entry in problem.lines.campaign.recordings]
+    column = leading.axis.of(ids) if isinstance(leading, RecordingLaw | LagLaw) else np.arange(len(ids), dtype=float)
+    return thirds(problem.lines, column)
+
+
+def of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation) -> list[Finding]:
+    """What the nearest law that nobody listed is worth, where none is stated."""
+    nearest = nearest_law(problem, result)
+    if nearest is None:
+        return []
+    found = nearest.explanation
+    law = None if found is None else law_of(problem, found)
+    if found is None or law is None:
+        return [Finding(Reason.NO_SIMPLE_LAW, "", "", {"tried": nearest.tried})]
+
+    def the_law(entry: Explanation) -> float:
+        return 0.0 if entry.names == found.names else -np.inf
+
+    groups = hold_out(problem, [found], nothing, the_law, _along(problem, found))
+    before, after = total(groups)
+    if not (np.isfinite(before.rmse_percent) and np.isfinite(after.rmse_percent)):
+        return []
+    arguments = {
+        "tried": nearest.tried,
+        "law": law.spoken.words,
+        "part": "samples" if problem.lines.curves else "recordings",
+        "after_percent": after.rmse_percent,
+        "before_percent": before.rmse_percent,
+    }
+    return [Finding(Reason.NO_SIMPLE_LAW, "", "", arguments)]
+
+
+_ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
+NOISY = 2.0  # times what the lines' own roughness says
+_GRANTED = 4.0  # times as much remainder of a compression as the null hypothesis is allowed
+_GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
+_STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
+_LEAST_STRUCTURE = 5e-4  # of the largest force
+_SLOW = 3.0  # times the slow noise that the air shows
+_PLAIN_STRUCTURE = 40.0  # nats of a smooth error; a law that is right leaves 5 to 20, very seldom more than 30
+_LEAST_LEVEL = 0.6  # of the noise that samples show: below, how few of them bend, or steps of a converter, made that
+REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
+
+
+def above_noise(problem: FittingProblem, explanation: Explanation, groups: Sequence[HeldOut]) -> list[Finding]:
+    """Of curves: a residual above the noise, and held-out parts that are predicted no better than by the base model."""
+    if problem.lines.smooth is None:
+        return []
+    findings = []
+    smooth, noise = _smooth_part(problem, explanation)
+    if _is_above_noise(smooth, noise):
+        findings.append(Finding(Reason.REMAINDER, "", "force_n", {"percent": 100 * smooth, "times": smooth / noise}))
+    before, after = total(groups)
+    if explanation.names and after.recordings and after.rmse_percent >= before.rmse_percent:
+        arguments = {
+            "groups": [entry.group for entry in groups],
+            "mechanisms": [in_plain_words(problem.lines.mechanisms[name]) for name in explanation.names],
+            "before_percent": before.rmse_percent,
+            "after_percent": after.rmse_percent,
+        }
+        findings.append(Finding(Reason.HELD_OUT_NO_BETTER, "", "force_n", arguments))
+    return findings
+
+
+def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
+    """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
+
+    Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
+    plainly; a law is granted it where plain least squares leave less than a twentieth of what
+    they leave under the null hypothesis, since every law of contact idealises. Of a law of compressions more is
+    granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more than about their
+    neighbours by as much as those do.
+    """
+    if problem.lines.smooth is None:
+        return not explanation.names and explanation.best.levels.level > _STRUCTURED
+    smooth, noise = _smooth_part(problem, explanation)
+    if problem.kind != "indentation":
+        return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
+    assert problem.lines.smooth is not None
+    slow = float(problem.lines.smooth.slow.max() / np.median(problem.lines.smooth.scale))
+    if smooth <= max(_LEAST_STRUCTURE, _SLOW * slow):
+        return False
+    known = explanation.best.levels.level > _LEAST_LEVEL
+    if smooth <= _STRUCTURED * noise and not (known and left_smooth(explanation) > _PLAIN_STRUCTURE):
+        return False
+    return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
+
+
+def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
+    """What noise alone would make of the error, in the recordings and in each group held out, the largest [%]."""
+    return max(entry.floor_percent for entry in (in_sample(problem, null), *(entry.before for entry in groups)))
+
+
+def _smooth_part(problem: FittingProblem, explanation: Explanation) -> tuple[float, float]:
+    """Of curves: the size of what is left smoothly, and a sample's noise, both relative to the largest force.
+
+    Noise is at least what neighbouring samples show.
+    """
+    lines, levels = problem.lines, explanation.best.levels
+    assert lines.smooth is not None
+    return levels.smooth, max(levels.level, 1.0) * float(np.median(lines.deviation / lines.smooth.scale))
+
+
+def _is_above_noise(smooth: float, noise: float) -> bool:
+    return smooth > max(_ABOVE_NOISE * noise, _LEAST_REMAINDER)

@@ -1,26 +1,81 @@
-"""What each mechanism would change in the recordings of this design, and how much of that noise and nuisances leave.
+"""What mechanisms would leave in the recordings: whether they would show, be told apart, or hide.
+
+What each mechanism would change in the recordings of this design, and how much of that noise and nuisances leave.
 
 Each mechanism's signature is what a typical strength of it (the quartile of its prior away from the limit) would change
 in the base model's response. The information of all signatures and the nuisances is one matrix JᵀC⁻¹J. What is left of
 a signature after the nuisances (with their priors) are taken out is the χ² by which the mechanism would show. A law has
 a shape too (when an ageing sets in, at which stress a d33 saturates): after its typical one, a mechanism has signatures
 with each further parameter at either end of its usual range.
+
+Which mechanisms these recordings would have shown, and from which strength on.
+
+A mechanism would have shown if, at the noise that was found, its expected gain in log likelihood ½χ² pays for what it
+costs: the prior odds of nothing missing, those that an explanation must win by, and Occam's factor of its strength,
+½ log(1 + χ²). χ² is what the nuisances leave of its typical signature, which grows as the strength
+squared.
+
+By how much d33 would be off if a mechanism were there that these recordings cannot show.
+
+Where a mechanism's typical strength leaves too little beside d33, E and h to be named, these take up what it does: by
+(H + P)⁻¹ Hₛ to first order, H the information on them, P that of their priors and Hₛ what they share with the
+mechanism's signature.
+
+Which mechanisms a campaign's design cannot tell from d33, E and h, or from each other; worked out before any fit.
+
+By their signatures under the noise that is usual: the cosine between what the nuisances leave of two of them says
+whether they are alike. What one mechanism typically does is held against all shapes of another.
+
+How many laws that no catalogue lists would look like an explanation of curves, at the strength that is seen.
+
+Such a law acts as listed ones do: it multiplies the force, shifts the travel or adds a force, by a simple form of the
+force, the depth, the time or the way back. Each is given the strength that the explanation's own mechanisms show, χ²
+beyond what the nuisances take up, under the noise that was found. It is imitated if the explanation would be named for
+it: its parameters leave too little to be named, and without any one of its mechanisms more than that is left (all to
+first order in the parameters). The prior of unlisted physics times the share of such laws that are imitated is the
+weight of those beside the set's own prior, and never more than that: laws that are more probable are fitted themselves
+(selection/unnamed_search.py).
+
+Where nothing is missing as far as one can see, an unlisted law of a usual strength may still be there and not show,
+since the nuisances take it up: the prior of unlisted physics times the share of such laws stands beside that of
+nothing.
+
+Stiffening that only the beginning of compression curves tells: a platen that seats, tilted or on an uneven end.
+
+While a wedge closes the force rises too slowly, and from full contact on linearly, shifted by half the wedge: as a
+whole the curve looks stiffer at its end than at its beginning. Stiffening goes on, seating does not: what only the
+first tenth of the displacement tells is seating. Samples that are pulled are gripped, and seat on nothing.
 """
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
 
-from underskin.diagnosis.data.dataset import Lines
-from underskin.diagnosis.inference.explanation import FittingProblem
-from underskin.diagnosis.inference.likelihood import Likelihoods
-from underskin.diagnosis.inference.optimizer import Fitter
-from underskin.diagnosis.noise.noise_levels import NoiseLevels, SeveralLevels
-from underskin.mechanisms.base import Unsupported
+from underskin.diagnosis.data.dataset import Lines, curve_lines
+from underskin.diagnosis.data.names import EXPLAINED, NONE_OF_THESE
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
+from underskin.diagnosis.inference.fit import Fitter
+from underskin.diagnosis.inference.hypothesis import Likelihoods, own_places
+from underskin.diagnosis.inference.residuals import beside, force_and_slopes, information, precision_of
+from underskin.diagnosis.noise import TYPICAL, NoiseLevels, SeveralLevels
+from underskin.diagnosis.selection.answers import Answer
+from underskin.diagnosis.selection.priors import PRIORS, SHOWS, guesses, least_evidence, log_prior
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
+from underskin.mechanisms.base import Kind, Stage, Unsupported
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
+from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.units import Array, Floats
+from underskin.mechanisms.registry import CATALOGUE
+from underskin.recordings.campaign import Campaign, CompressionRecording, CurveConditions, Recording, samples_of
+from underskin.recordings.usual_scatter import USUAL_GAIN
+from underskin.surrogate.sigma_table import SigmaTable
+from underskin.units import Array, Floats, Indices
 
 Split = tuple[Floats, NDArray[np.float32] | None]
 _ENDS = (0.1, 0.9)  # of a shape's usual range
@@ -192,3 +247,332 @@ def _shapes(parameters: Sequence[Parameter]) -> list[Floats]:
             moved[place] = entry.quantile(quantile)
             shapes.append(moved)
     return shapes
+
+
+_LARGEST = 100.0  # % of the response: what changes less than that nowhere is not told from the nuisances
+_ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class Power:
+    """The least change of the response, as a root mean square over all rows [%], from which on a mechanism shows."""
+
+    mechanism: str
+    smallest_visible_percent: float
+
+
+def power(signatures: Signatures, explanation: Explanation, supported: int) -> list[Power]:
+    """Of each mechanism that could show here at all, the most visible first.
+
+    Parameters
+    ----------
+    signatures
+        Of the recordings' design.
+    explanation
+        Whose noise levels are taken: the answer's.
+    supported
+        How many mechanisms the campaign supports, among which the prior is shared.
+    """
+    if not signatures.owners:
+        return []
+    chi2 = np.diag(signatures.left(explanation.best.levels)[0])
+    least = least_chi2(supported, least_evidence(explanation))
+    visible = []
+    for name in dict.fromkeys(signatures.owners):
+        typical = signatures.owners.index(name)
+        if chi2[typical] <= 0:
+            continue
+        percent = signatures.percent[typical] * float(np.sqrt(least / chi2[typical]))
+        if percent < _LARGEST:
+            visible.append(Power(name, percent))
+    return sorted(visible, key=lambda entry: entry.smallest_visible_percent)
+
+
+def least_chi2(supported: int, shows: float) -> float:
+    """The χ² from which on one of so many mechanisms is expected to be named, which must bring `shows` nats."""
+    odds = max(log_prior(0, supported) - log_prior(1, supported) + np.log(EXPLAINED / (1 - EXPLAINED)), shows)
+    chi2 = 2 * odds
+    for _ in range(_ROUNDS):
+        chi2 = 2 * odds + np.log1p(chi2)
+    return float(chi2)
+
+
+@dataclass(frozen=True)
+class HiddenShift:
+    """A mechanism that would not be named at its typical strength, and the logarithm of the factor by which d33 would
+    be off; `declared`: it is a wrong declared number."""
+
+    mechanism: str
+    log_factor: float
+    declared: bool
+
+    @property
+    def percent(self) -> float:
+        """Of d33."""
+        return float(100 * np.expm1(self.log_factor))
+
+
+def hidden_shifts(
+    problem: FittingProblem,
+    signatures: Signatures,
+    explanation: Explanation,
+    supported: int,
+    other_kinds: frozenset[Kind] = frozenset(),
+) -> list[HiddenShift]:
+    """Of FRFs: the mechanisms that are not in the stated `explanation` and would not be named beside it.
+
+    `supported` is how many the campaign supports, among which the prior is shared; recordings of `other_kinds` tell the
+    mechanisms that act on them too, with which the signatures do not count.
+    """
+    if problem.lines.curves or not signatures.owners:
+        return []
+    levels = explanation.best.levels
+    chi2 = np.diag(signatures.left(levels)[0])
+    off = _of_d33(signatures, levels)
+    least = least_chi2(supported, least_evidence(explanation))
+    return [
+        HiddenShift(name, float(off[place]), problem.lines.mechanisms[name].stage is Stage.DECLARED)
+        for name, place in signatures.typical.items()
+        if name not in explanation.names
+        and chi2[place] < least
+        and not other_kinds & {*problem.lines.mechanisms[name].kinds}
+    ]
+
+
+def _of_d33(signatures: Signatures, levels: NoiseLevels) -> Floats:
+    """What ln d33 is off by for each signature (signatures,)."""
+    return signatures.taken_up(levels)[signatures.nuisances.index("d33")]
+
+
+_LEAST_CHI2 = 9.0
+_TWINS = 0.98
+_OPEN = 0.1  # of the leader's probability: a rival beyond that is not told from it
+
+
+class Likeness(Enum):
+    """Why a mechanism is confounded."""
+
+    NOISE = auto()
+    TAKEN_UP = auto()  # by d33, E and h
+    IMITATED = auto()  # what it typically does, the other can do
+    IMITATES = auto()  # what the other typically does, it can do
+    FITS_AS_WELL = auto()  # the other explains these recordings as well
+
+
+@dataclass(frozen=True)
+class Confounding:
+    """`confounded_with` is another mechanism, "d33", or "noise" where too little of it shows."""
+
+    mechanism: str
+    confounded_with: str
+    why: Likeness
+
+
+def confounding(signatures: Signatures) -> list[Confounding]:
+    """What cannot be told apart here; mechanisms that the campaign does not support at all are not listed."""
+    owners = signatures.owners
+    if not owners:
+        return []
+    left, own = signatures.left(NoiseLevels(USUAL_GAIN, 1.0, 0.0, SENSOR_SPREAD, smooth=TYPICAL))
+    chi2 = np.maximum(np.diag(left), 0.0)
+    first = {name: owners.index(name) for name in owners}  # a mechanism's first signature is the typical one
+    confounded = []
+    for name, index in first.items():
+        if own[index, index] < _LEAST_CHI2:
+            confounded.append(Confounding(name, "noise", Likeness.NOISE))
+        elif chi2[index] < _LEAST_CHI2:
+            confounded.append(Confounding(name, "d33", Likeness.TAKEN_UP))
+    visible = [name for name in first if chi2[first[name]] >= _LEAST_CHI2]
+    for one, other in itertools.combinations(visible, 2):
+        for typical, shaped, why in ((one, other, Likeness.IMITATED), (other, one, Likeness.IMITATES)):
+            place = first[typical]
+            rivals = [index for index, name in enumerate(owners) if name == shaped and chi2[index] >= _LEAST_CHI2]
+            cosine = left[place, rivals] / np.sqrt(chi2[place] * chi2[rivals])
+            apart = (1 - cosine**2) * np.minimum(chi2[place], chi2[rivals])
+            if (np.abs(cosine) > _TWINS).any() or (apart < _LEAST_CHI2).any():
+                confounded.append(Confounding(one, other, why))
+                break
+    return confounded
+
+
+def left_open(confounded: Sequence[Confounding], answers: Sequence[Answer]) -> list[Confounding]:
+    """What cannot be told in the end: of the design's confounding all but what the recordings told all the same, and
+    the rivals that explain them as well as the leading answer does.
+
+    A mechanism of the leading set shows, whatever it would do typically; and it is told from another where the set with
+    that in its place is not probable.
+    """
+    leader = answers[0]
+    named = set(_sets([leader])[0]) if _sets([leader]) else set()
+    swapped = {}
+    for rival in _sets([answer for answer in answers[1:] if answer.probability >= _OPEN * leader.probability]):
+        gone, come = named - set(rival), set(rival) - named
+        if len(gone) == len(come) == 1:
+            swapped[frozenset(gone | come)] = (*gone, *come)
+    open_ones = []
+    for entry in confounded:
+        both = {entry.mechanism, entry.confounded_with}
+        if not both & named or frozenset(both) in swapped:
+            open_ones.append(entry)
+            swapped.pop(frozenset(both), None)
+    for one, other in sorted(swapped.values()):
+        open_ones.append(Confounding(one, other, Likeness.FITS_AS_WELL))
+    return open_ones
+
+
+def _sets(answers: Sequence[Answer]) -> list[tuple[str, ...]]:
+    """The answers that are sets of mechanisms."""
+    return [answer.names for answer in answers if answer.explanation is not None and answer.explanation.names]
+
+
+_FORMS: Mapping[str, Callable[[Floats], Floats]] = {  # of a variable from 0 to 1
+    "root": np.sqrt,
+    "linear": lambda x: x,
+    "square": np.square,
+    "exponential approach": lambda x: 1 - np.exp(-5 * x),
+    "threshold": lambda x: np.maximum(x - 0.5, 0.0),
+    "step": lambda x: (x > 0.5).astype(float),
+}
+_USUAL = 0.05  # of the force, as a root mean square: what a law changes that is taken for missing physics
+_TAKEN_UP = 1e-6  # of a law's own χ²: what is left beside the nuisances is rounding
+
+
+@dataclass(frozen=True)
+class Imitation:
+    """How many of so many unlisted laws an explanation imitates, and how probable these are beside it."""
+
+    laws: int
+    imitated: int
+    odds: float  # at most 1
+
+
+def imitation(explanation: Explanation, null: Explanation, supported: int) -> Imitation | None:
+    """Of an explanation of curves by one or more of so many supported mechanisms; None where these change nothing.
+
+    Parameters
+    ----------
+    explanation, null
+        The set of mechanisms, and the null hypothesis, at their most probable parameters.
+    supported
+        How many mechanisms the campaign supports, among which the prior is shared.
+    """
+    hypothesis, fit = explanation.best.hypothesis, explanation.point.fit
+    force, slopes, unlisted = _beside(explanation)
+    null_model = null.best.hypothesis.model
+    assert isinstance(null_model, CurveModel)
+    change = force - null_model.forces(null.point.fit[None])[0]
+    whole = information(explanation, np.concatenate([slopes, unlisted, change[None]]))
+    every = np.arange(len(fit))
+    precision = precision_of(hypothesis)
+    shown = _left(whole, every[hypothesis.own_parameters :], precision)
+    laws = shown[:-1] > _TAKEN_UP * np.diag(whole)[len(fit) : -1]
+    if not (laws.any() and shown[-1] > 0):
+        return None
+    strength = shown[-1] / shown[:-1][laws]
+    least = least_chi2(supported, least_evidence(explanation))
+    imitated = strength * _left(whole, every, precision)[:-1][laws] < least
+    for own in own_places(explanation.names, hypothesis.lines).values():
+        imitated &= strength * _left(whole, np.delete(every, own), precision)[:-1][laws] > least
+    odds = _odds(int(imitated.sum()), int(laws.sum()), guesses(explanation), supported)
+    return Imitation(int(laws.sum()), int(imitated.sum()), min(odds, 1.0))
+
+
+def unseen(null: Explanation, supported: int) -> Imitation:
+    """How many unlisted laws of a usual strength would not show beside the null hypothesis of curves."""
+    hypothesis = null.best.hypothesis
+    force, slopes, unlisted = _beside(null)
+    size = np.sqrt((unlisted**2).mean(axis=1))
+    laws = unlisted[size > 0] * (_USUAL * np.sqrt((force**2).mean()) / size[size > 0])[:, None]
+    left = _left(information(null, np.concatenate([slopes, laws])), np.arange(len(slopes)), precision_of(hypothesis))
+    hidden = int((left < least_chi2(supported, least_evidence(null))).sum())
+    return Imitation(len(laws), hidden, _odds(hidden, len(laws), 0, supported))
+
+
+def _odds(counted: int, laws: int, size: int, supported: int) -> float:
+    """Of an unlisted law beside a set of so many mechanisms; the share is of all such laws, by Jeffreys' prior: these
+    are but a sample."""
+    share = (counted + 0.5) / (laws + 1)
+    return float(PRIORS[NONE_OF_THESE] * share / np.exp(log_prior(size, supported)))
+
+
+def _beside(explanation: Explanation) -> tuple[Floats, Floats, Floats]:
+    """The force (samples,), its derivatives by the parameters (parameters, samples), and what each unlisted law changes
+    in it (laws, samples)."""
+    force, slopes, stiffness = force_and_slopes(explanation)
+    model, fit = explanation.best.hypothesis.model, explanation.point.fit
+    assert isinstance(model, CurveModel)
+    campaign = explanation.best.hypothesis.lines.campaign
+    recordings = [one for one in campaign.recordings if isinstance(one, CurveConditions)]
+    return force, slopes, _unlisted(recordings, fit[model.contact_points], force, stiffness)
+
+
+def _unlisted(
+    recordings: Sequence[CurveConditions], contact_points: Floats, force: Floats, stiffness: Floats
+) -> Floats:
+    """What each unlisted law changes in the force (laws, samples), up to its strength.
+
+    `contact_points` (recordings,) [mm]; `force` and `stiffness`, its derivative by the travel, (samples,).
+    """
+    travel = [np.asarray(one.displacement_mm) for one in recordings]
+    depth = np.concatenate([np.maximum(one - at, 0.0) for one, at in zip(travel, contact_points, strict=True)])
+    time = np.concatenate([times_of(one) - times_of(one)[0] for one in recordings])
+    back = np.concatenate([np.arange(len(one)) > int(np.argmax(one)) for one in travel]).astype(float)
+    followed = {"force": np.maximum(force, 0.0), "depth": depth, "time": time}
+    shapes = {
+        name: [form(variable / variable.max()) for form in _FORMS.values()]
+        for name, variable in followed.items()
+        if variable.max() > 0
+    }
+    factors = [back, *itertools.chain(*shapes.values())]
+    laws = [factor * shape for factor in (force, stiffness) for shape in factors]
+    return np.array([*laws, *shapes.get("time", [])])  # a force of its own follows time
+
+
+def _left(whole: Floats, places: Indices, precision: Floats) -> Floats:
+    """χ² that the parameters at `places`, with their priors' precision, leave of each change behind them (changes,)."""
+    return np.diag(beside(whole, places, precision))
+
+
+_BEGINNING = 0.1  # of each curve's displacement
+
+
+def without_seating(
+    campaign: Campaign, names: Sequence[str], table: SigmaTable
+) -> tuple[FittingProblem, Finding] | None:
+    """The rest of the curves and the finding, where the rest speaks no more for the stiffening among `names`.
+
+    A law that needs a curve's whole history, such as relaxation, cannot be fitted to the rest: nothing is tried.
+    """
+    imitated = [name for name in names if name in CATALOGUE and CATALOGUE[name].imitated_by_seating]
+    if not imitated or any(CATALOGUE[name].needs_history for name in names):
+        return None
+    if not all(_is_pressed(entry) for entry in campaign.recordings):
+        return None
+    rows = curve_lines(_without_beginning(campaign), "compression")
+    if rows.recordings < len(campaign.recordings):
+        return None
+    problem = FittingProblem(rows, table)
+    (stiffer,) = problem.explain([Request(tuple(names))])
+    (plain,) = problem.explain([Request(tuple(name for name in names if name not in imitated))])
+    assert stiffer is not None
+    assert plain is not None
+    if stiffer.log_evidence - plain.log_evidence > SHOWS:
+        return None
+    arguments = {"percent": 100 * _BEGINNING, "mechanisms": " and ".join(imitated)}
+    return problem, Finding(Reason.SEATING, "", "displacement_mm", arguments)
+
+
+def _is_pressed(entry: Recording) -> bool:
+    """Whether it is pressed, and no farther pulled."""
+    assert isinstance(entry, CompressionRecording)
+    moved = entry.displacement_mm - entry.displacement_mm[0]
+    return float(moved.max()) > -float(moved.min())
+
+
+def _without_beginning(campaign: Campaign) -> Campaign:
+    kept = []
+    for entry in campaign.recordings:
+        assert isinstance(entry, CompressionRecording)
+        moved = np.abs(entry.displacement_mm - entry.displacement_mm[0])
+        kept.append(samples_of(entry, moved > _BEGINNING * np.nanmax(moved)))
+    return replace(campaign, recordings=tuple(kept))

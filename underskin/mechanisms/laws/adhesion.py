@@ -9,8 +9,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
-from underskin.recordings.campaign import IndentationRecording
-from underskin.recordings.conditions import Conditions, IndentationConditions
+from underskin.recordings.campaign import Conditions, IndentationConditions, IndentationRecording
 from underskin.recordings.curve_course import course
 from underskin.units import to_si
 

@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated, chain, log
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
-from underskin.recordings.conditions import Conditions, frf_of
+from underskin.recordings.campaign import Conditions, frf_of
 
 _SMALL = 1e-3  # below it (1 − e^(−x))/x is taken from its series
 _LEAST = 0.05  # what is left of a response before its fall slows down

@@ -9,7 +9,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import HeavyTailed, Parameter, Uniform
-from underskin.recordings.conditions import Conditions, FrfConditions
+from underskin.recordings.campaign import Conditions, FrfConditions
 from underskin.weak_cache import cached_while_alive
 
 _CORNER = "filters against noise and aliasing, leads and probes: 300 Hz within a factor of 4.5, as the bands of skins"

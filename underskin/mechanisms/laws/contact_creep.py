@@ -12,7 +12,7 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.models.curve_timing import time_runs_with_displacement
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.recordings.conditions import CompressionConditions, Conditions, IndentationConditions
+from underskin.recordings.campaign import CompressionConditions, Conditions, IndentationConditions
 from underskin.units import Floats
 
 _RETURN = 0.05  # of the range of displacement: smaller returns are noise

@@ -6,16 +6,13 @@ import numpy as np
 
 from underskin.autodiff import Differentiated, constant
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
-from underskin.mechanisms.models.contact_stage import layer_curves, press, stiffness
-from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.contact_state import Contacts, layer_curves, press, stiffness
 from underskin.mechanisms.models.frf_design import FrfDesign, frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter
 from underskin.physics.contact_curves import CurveGrid
 from underskin.physics.elastic_layer import Layer
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.conditions import Conditions
-from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.frf.resonance import resonance
+from underskin.recordings.campaign import Conditions, FrfRecording
+from underskin.recordings.frf.estimation import lines_of, resonance
 from underskin.units import to_si
 from underskin.weak_cache import cached_while_alive
 

@@ -6,7 +6,7 @@ from underskin.autodiff import Differentiated
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.frf_design import frf_design
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 from underskin.units import to_si
 
 _LARGEST_DISTANCE = 3.0  # thicknesses; beyond it a bonded layer transmits less than a thousandth of the stress

@@ -8,7 +8,7 @@ import numpy as np
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.conditions import Conditions, IndentationConditions
+from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _REASON = (
     "an instrument is about as stiff as what it presses: stages of spheres of millimetres 10 to 1000 N/mm, those "

@@ -9,7 +9,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.conditions import Conditions, IndentationConditions
+from underskin.recordings.campaign import Conditions, IndentationConditions
 
 _THICKNESS = "layer_thickness"
 _USUAL, _SD = 5.0, 1.5  # contact radii, and of the logarithm

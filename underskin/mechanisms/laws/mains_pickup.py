@@ -7,13 +7,12 @@ from functools import partial
 import numpy as np
 
 from underskin.mechanisms.base import Kind, Mechanism, Stage
-from underskin.mechanisms.models.frf_design import FrfDesign, frequencies
-from underskin.mechanisms.models.pickup import Pickup
+from underskin.mechanisms.models.frf_design import FrfDesign, Pickup, frequencies
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.conditions import Conditions, frf_of
-from underskin.recordings.frf.estimation import Frf, lines_of
-from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
+from underskin.recordings.campaign import Conditions, FrfRecording, frf_of
+from underskin.recordings.frf.estimation import lines_of
+from underskin.recordings.frf.line_choice import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
+from underskin.recordings.frf.spectra import Frf
 from underskin.units import Floats, Indices
 from underskin.weak_cache import cached_while_alive
 

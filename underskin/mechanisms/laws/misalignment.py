@@ -8,7 +8,7 @@ from underskin.autodiff import Differentiated
 from underskin.errors import conflicting
 from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
-from underskin.recordings.conditions import Conditions, frf_of, offsets
+from underskin.recordings.campaign import Conditions, frf_of, offsets
 
 _LARGEST_MM = 2.0
 _REASON = "a tip centred by eye is off by some tenths of a millimetre to a millimetre"

@@ -4,7 +4,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 
 LARGEST_FACTOR = 4.0  # true over declared, or the inverse: beyond, another unit or material is more likely
 _REASON = "E from a durometer, a data sheet or another cure is off by tens of percent, at times by a factor of 2 to 4"

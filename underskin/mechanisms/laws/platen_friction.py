@@ -7,7 +7,7 @@ import numpy as np
 from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter, Uniform
-from underskin.recordings.conditions import CompressionConditions, Conditions
+from underskin.recordings.campaign import CompressionConditions, Conditions
 
 _ONE_SHAPE = 1.05  # of S²: samples that differ by less tell friction from the modulus no better than noise
 _FRICTIONS = (0.05, 0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95)  # even quantiles of its prior

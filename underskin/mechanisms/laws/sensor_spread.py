@@ -3,7 +3,7 @@
 from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.models.composition import SENSOR_SPREAD
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.recordings.conditions import Conditions, frf_of
+from underskin.recordings.campaign import Conditions, frf_of
 
 _REASON = "poled films and printed electrodes vary by some to 30 percent; 8 % within a factor of 2.5"
 

@@ -9,7 +9,7 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import HeavyTailed, Normal, Parameter, Uniform
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 from underskin.units import Array
 
 _STRAIN = 0.2  # of the contact, times R/a

@@ -9,11 +9,9 @@ from underskin.mechanisms.base import Kind, Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import HeavyTailed, Parameter
-from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.conditions import Conditions
-from underskin.recordings.frf.delay import common_delay
-from underskin.recordings.frf.estimation import lines_of
-from underskin.recordings.frf.stacks import stacked
+from underskin.recordings.campaign import Conditions, FrfRecording
+from underskin.recordings.frf.estimation import common_delay, lines_of
+from underskin.recordings.frf.spectra import stacked
 from underskin.weak_cache import cached_while_alive
 
 _REASON = """multiplexed converters and their filters delay by a few samples at 1 to 50 kS/s; converters of high

@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from underskin.errors import ErrorCode, InvalidInput
 from underskin.mechanisms.base import Kind, Mechanism
 from underskin.mechanisms.models.composition import Prediction, check_supported, chosen, kind_of
-from underskin.mechanisms.models.compression import CompressionModel
+from underskin.mechanisms.models.curves import CompressionModel
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.indentation import IndentationModel
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 
 __all__ = ["Model", "Prediction", "compose"]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from underskin.recordings.conditions import CurveConditions
+from underskin.recordings.campaign import CurveConditions
 
 _TURNED_BACK = 0.02  # of the span
 _UNEVEN = 0.1  # of the duration

@@ -1,4 +1,15 @@
-"""The FRF of recordings under a set of mechanisms.
+"""FRFs of one set of mechanisms, or of several sets at once.
+
+Values of parameters at points of several models, whose parameters have different places in their fit coordinates.
+
+Points of one or several FRF models of the same conditions, evaluated at once.
+
+Models differ in their mechanisms, and share most of what costs time: contacts, places, the table. Points whose models
+press the same contacts are worked out as one array, as far as what presses them has the same structure (sphere on the
+half space or on the layer, with or without adhesion, a glue line). The hook of a mechanism is called once for all
+points whose models have it. The derivatives of a point are those by its own model's parameters, in their order.
+
+The FRF of recordings under a set of mechanisms.
 
 Base model: Hertz' radius on a half space, the contact edge still, σ of the bonded finite-strain layer averaged over the
 sensor's disc at its offset; FRF = d33 · (3/2) ρ² σ (Seminara 2018, equations 7 to 16). The stages, in this order:
@@ -8,25 +19,344 @@ sensor under its own stress → neighbours' charge → ageing → dynamics of ti
 Pick-up stands beside, as a covariance.
 """
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
 
-from underskin.autodiff import Differentiated
+from underskin.autodiff import Differentiated, chain, constant, sum_rows
 from underskin.errors import ErrorCode, InvalidInput, required
 from underskin.mechanisms.base import Mechanism, Values
-from underskin.mechanisms.models.composition import Composition, Prediction
-from underskin.mechanisms.models.contact_state import Contacts
-from underskin.mechanisms.models.frf_design import FrfDesign, frf_design, largest_offset
-from underskin.mechanisms.models.frf_models import FrfModels
-from underskin.mechanisms.models.nuisances import frf_nuisances
-from underskin.mechanisms.models.off_centre_response import PROFILE_END, offset_sigma
-from underskin.mechanisms.models.pickup import Pickup, together
-from underskin.mechanisms.models.response import Response, joined
-from underskin.recordings.conditions import Conditions
+from underskin.mechanisms.models.composition import Composition, Prediction, frf_nuisances
+from underskin.mechanisms.models.contact_state import Contacts, layer_curves, press, stiffness
+from underskin.mechanisms.models.frf_design import (
+    FrfDesign,
+    Pickup,
+    Response,
+    frf_design,
+    joined,
+    largest_offset,
+    together,
+)
+from underskin.mechanisms.models.sigma_curves import (
+    PROFILE_END,
+    SigmaOfContacts,
+    as_in_the_table,
+    layer_of,
+    offset_sigma,
+)
+from underskin.mechanisms.parameter import Parameter
+from underskin.recordings.campaign import Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices, Mask, to_si
+
+
+class Seeds:
+    """Points of fit coordinates as values in their units, with derivatives by each point's own coordinates.
+
+    Attributes: `owner`, which model each point is of; `variables`, by how many the derivatives are; `position`, two
+    further variables of value 0, or none.
+    """
+
+    def __init__(self, fit: Floats, log: Mask, owner: Indices, *, slopes: bool, further: int) -> None:
+        """`log` says which coordinates (points, parameters) are logarithms; without `slopes`, derivatives are by the
+        `further` variables alone."""
+        self.owner = owner
+        self._value = np.where(log, np.exp(np.where(log, fit, 0.0)), fit)
+        self._slope = np.where(log, self._value, 1.0)
+        self._slopes = slopes
+        count = fit.shape[1] if slopes else 0
+        self.variables = count + further
+        self.position = []
+        for place in range(count, self.variables):
+            by_place = np.zeros((self.variables, 1, 1))
+            by_place[place] = 1.0
+            self.position.append(Differentiated(np.zeros((1, 1)), by_place))
+
+    def of(self, points: Indices, places: Indices) -> Differentiated:
+        """The parameters that are at these places of each model, at some of the points: (points, 1)."""
+        place = places[self.owner[points]]
+        slopes = np.zeros((self.variables, len(points), 1))
+        if self._slopes:
+            slopes[place, np.arange(len(points)), 0] = self._slope[points, place]
+        return Differentiated(self._value[points, place][:, None], slopes)
+
+
+class Acting:
+    """A mechanism with certain parameters, in those of several models that have it. Attribute: `has` (models,)."""
+
+    def __init__(self, mechanism: Mechanism, parameters: Mapping[str, Parameter], models: int) -> None:
+        """In none of so many models yet."""
+        self.mechanism = mechanism
+        self.has = np.zeros(models, dtype=bool)
+        self._places = {name: np.zeros(models, dtype=np.intp) for name in parameters}
+        self._relative = [(name, entry.relative_to) for name, entry in parameters.items() if entry.relative_to]
+        self._hooks = _overridden(type(mechanism))
+
+    def add(self, model: int, places: Mapping[str, int]) -> None:
+        """Note that a model has it, its parameters at these places."""
+        self.has[model] = True
+        for name, place in places.items():
+            self._places[name][model] = place
+
+    def on(self, *hooks: str) -> bool:
+        """Whether it has one of these hooks."""
+        return not self._hooks.isdisjoint(hooks)
+
+    def values(self, points: Indices, seeds: Seeds) -> Values:
+        """Its parameters in their units at points whose models have it."""
+        values = {name: seeds.of(points, places) for name, places in self._places.items()}
+        for name, other in self._relative:
+            values[name] = values[name] * values[other]
+        return values
+
+
+_HOOKS: dict[type[Mechanism], frozenset[str]] = {}  # what each class has of its own
+
+
+def _overridden(own: type[Mechanism]) -> frozenset[str]:
+    if own not in _HOOKS:
+        _HOOKS[own] = frozenset(name for name in dir(Mechanism) if getattr(own, name) is not getattr(Mechanism, name))
+    return _HOOKS[own]
+
+
+_POSITION = 2  # two more variables: the contact's x and y
+_MATERIAL = "on_declared", "on_material"
+
+Part = tuple[Indices, Response]  # which points, and their response
+
+
+class FrfModels:
+    """Several models of the same conditions and skin."""
+
+    def __init__(self, models: Sequence[FrfModel]) -> None:
+        """Note which of them have which mechanism, and which press the same contacts."""
+        self._models = tuple(models)
+        self._count = max(len(model.parameters) for model in models)
+        self._log = np.zeros((len(models), self._count), dtype=bool)
+        self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].places_of_nuisances}
+        mechanisms: dict[Hashable, Acting] = {}
+        self._alike: dict[Hashable, list[int]] = {}
+        for number, model in enumerate(models):
+            self._log[number, : len(model.parameters)] = [entry.scale == "log" for entry in model.parameters]
+            for name, place in model.places_of_nuisances.items():
+                self._nuisances[name][number] = place
+            for mechanism in model.mechanisms:
+                places = model.places_of(mechanism)
+                key = mechanism.name, tuple(places)
+                if key not in mechanisms:
+                    mechanisms[key] = Acting(
+                        mechanism, {name: model.parameters[at] for name, at in places.items()}, len(models)
+                    )
+                mechanisms[key].add(number, places)
+            self._alike.setdefault(model.structure, []).append(number)
+        self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
+        self._with_hook: dict[str, list[Acting]] = {}
+
+    def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
+        """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
+        some of them. Fit coordinates beyond those of a point's own model do not count.
+
+        Derivatives by the parameters and by the contact's place on request; without `lines`, no line factors.
+        """
+        seeds = Seeds(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
+        edges = np.searchsorted(owner, np.arange(len(self._models) + 1))
+        parts: list[Part] = []
+        for members in self._alike.values():
+            present = [number for number in members if edges[number + 1] > edges[number]]
+            if present:
+                rows = {number: np.arange(edges[number], edges[number + 1]) for number in present}
+                for points, contacts in self._pressed(rows, seeds):
+                    level, inside = self._level_and_inside(self._models[present[0]], points, contacts, seeds)
+                    of_lines = self._line_factor(self._models[present[0]], points, contacts, seeds) if lines else None
+                    parts.append((points, _response(level, inside, of_lines, seeds)))
+        return parts
+
+    def _pressed(self, rows: dict[int, Indices], seeds: Seeds) -> list[tuple[Indices, Contacts]]:
+        """The contacts of these models' points as declared and as their mechanisms change them, those of one structure
+        together."""
+        sets: dict[tuple[Acting, ...], list[int]] = {}
+        for number in rows:
+            key = tuple(entry for entry in self._mechanisms if entry.has[number] and entry.on(*_MATERIAL))
+            sets.setdefault(key, []).append(number)
+        alike: dict[Hashable, list[tuple[Indices, Contacts]]] = {}
+        for acting, numbers in sets.items():
+            points = np.concatenate([rows[number] for number in numbers])
+            contacts = self._contacts(self._models[numbers[0]], points, seeds)
+            own = [(entry.mechanism, entry.values(points, seeds)) for entry in acting]
+            for mechanism, values in own:
+                mechanism.on_declared(contacts, values)
+            for mechanism, values in own:
+                mechanism.on_material(contacts, values)
+            needs_layer = contacts.layered or self._models[numbers[0]].needs_stiffness
+            for some, part in _of_one_layer(contacts, len(points)) if needs_layer else [(slice(None), contacts)]:
+                layer = layer_of(part) if needs_layer else as_in_the_table(part)
+                structure = part.layered, *(x is None for x in (part.slip, part.work_of_adhesion, part.relaxed)), layer
+                alike.setdefault(structure, []).append((points[some], part))
+        return [
+            (np.concatenate([points for points, _ in group]), Contacts.stacked([part for _, part in group], lengths))
+            for group in alike.values()
+            for lengths in ([len(points) for points, _ in group],)
+        ]
+
+    def _contacts(self, model: FrfModel, points: Indices, seeds: Seeds) -> Contacts:
+        """The contacts at all force nodes, one node after another, as declared."""
+        nodes, design = len(model.force), model.design
+        of = {name: seeds.of(points, places) for name, places in self._nuisances.items() if name != "d33"}
+        return Contacts(
+            force=model.force.ravel(),
+            indenter_radius=np.tile(design.indenter_radius, nodes),
+            dwell=np.tile(design.dwell, nodes),
+            modulus=model.modulus * of["youngs_modulus"],
+            thickness=model.thickness * of["thickness"],
+            poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
+        )
+
+    def _acting(self, hook: str, points: Indices, seeds: Seeds) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
+        """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
+        and their values."""
+        if hook not in self._with_hook:
+            self._with_hook[hook] = [entry for entry in self._mechanisms if entry.on(hook)]
+        owner = seeds.owner[points]
+        for entry in self._with_hook[hook]:
+            some = np.flatnonzero(entry.has[owner])
+            if len(some) == len(points):
+                yield entry.mechanism, None, entry.values(points, seeds)
+            elif len(some):
+                yield entry.mechanism, some, entry.values(points[some], seeds)
+
+    def _level_and_inside(
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
+    ) -> tuple[Differentiated, Mask]:
+        """The FRF before the dynamics [C/N] and which recordings are inside the table, at points whose contacts have
+        one structure; `model` is one of theirs."""
+        sigma, inside = self._sigma_at_points(model, points, contacts, seeds)
+        level = self._level(model, points, contacts, sigma, seeds).spread(len(model.design.point))
+        return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
+
+    def _sigma_at_points(
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
+    ) -> tuple[list[Differentiated], Mask]:
+        """σ of each place at each force node, and which places are inside the table at all of them.
+
+        Inside means also that the sensor's disc lies within the stress profile, beyond whose end σ is 0.
+        """
+        design, table = model.design, model.sigma
+        if contacts.layered or model.needs_stiffness or not as_in_the_table(contacts):
+            of_contacts = self._of_pressed(model, contacts)
+        else:
+            of_contacts = SigmaOfContacts(table, contacts, model.sensor_radius)
+        nodes, places = len(model.force), len(design.point_contact)
+        contact = (design.point_contact + len(design.force) * np.arange(nodes)[:, None]).ravel()
+        offset = self._offset(model, points, seeds) / contacts.thickness
+        every = np.tile(np.arange(places), nodes)
+        sigma = of_contacts.at(contact, offset.spread(places)[every] if nodes > 1 else offset)
+        near = (offset.value <= table.end) & (offset.value + of_contacts.rho.value <= PROFILE_END)
+        reached = of_contacts.inside[..., contact]
+        inside = near & reached.reshape(*reached.shape[:-1], nodes, places).all(axis=-2)
+        return [sigma[places * node : places * (node + 1)] for node in range(nodes)] if nodes > 1 else [sigma], inside
+
+    def _of_pressed(self, model: FrfModel, contacts: Contacts) -> SigmaOfContacts:
+        """σ of contacts that the table is not of, or whose stiffness is asked for."""
+        table = model.sigma
+        layer = None
+        if contacts.layered or model.needs_stiffness:
+            layer = layer_curves(table.contact_grid, layer_of(contacts))
+        pressed = press(contacts, layer if contacts.layered else None)
+        if layer is not None and model.needs_stiffness:
+            contacts.stiffness = stiffness(contacts, pressed, layer)
+        return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
+
+    def _offset(self, model: FrfModel, points: Indices, seeds: Seeds) -> Differentiated:
+        """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""
+        design = model.design
+        moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
+        if not (seeds.position or moved):
+            distance = np.tile(np.hypot(design.point_x, design.point_y), (len(points), 1))
+            return Differentiated(distance, np.zeros((seeds.variables, *distance.shape)))
+        still = constant(0.0, seeds.variables, (len(points),))
+        x, y = (
+            own + shift
+            for own, shift in zip((design.point_x, design.point_y), seeds.position or 2 * [still], strict=True)
+        )
+        for some, shift in moved:
+            if shift is not None:
+                x, y = (place.plus(by, some, len(points)) for place, by in zip((x, y), shift, strict=True))
+        distance = np.hypot(x.value, y.value)
+        away = np.where(distance > 0, distance, 1.0)
+        return chain(distance, (x.value / away, x), (y.value / away, y))
+
+    def _level(
+        self, model: FrfModel, points: Indices, contacts: Contacts, sigma: list[Differentiated], seeds: Seeds
+    ) -> Differentiated:
+        """The FRF of each recording before the dynamics [C/N]."""
+        design, count = model.design, len(points)
+        own = {mechanism.name: values for mechanism, _, values in self._acting("mobility", points, seeds)}
+        oscillating = sigma[0]
+        for mechanism, nodes, weights in model.increments:
+            rate = sigma[nodes[0]] * weights[0][design.point_contact]
+            for node, weight in zip(nodes[1:], weights[1:], strict=True):
+                rate = rate + sigma[node] * weight[design.point_contact]
+            oscillating = oscillating + mechanism.mobility(own[mechanism.name]) * (rate - oscillating)
+        rho = model.sensor_radius / contacts.thickness
+        charge = oscillating * (1.5e-12 * seeds.of(points, self._nuisances["d33"]) * rho * rho)
+        for mechanism, some, values in self._acting("on_d33", points, seeds):
+            mean_stress = sigma[0] * (1.5 / np.pi * design.force[design.point_contact]) / (contacts.thickness**2.0)
+            charge = charge.times(mechanism.on_d33(mean_stress.at_points(some), values), some, count)
+        level = charge[design.point]
+        for mechanism, some, values in self._acting("neighbour_fraction", points, seeds):
+            fraction = mechanism.neighbour_fraction(values)
+            if fraction is not None:
+                neighbours = charge.at_points(some)[design.neighbour_point]
+                theirs = fraction * sum_rows(neighbours, design.neighbour_recording, len(design.point))
+                level = level.plus(theirs, some, count)
+        for mechanism, some, values in self._acting("on_recordings", points, seeds):
+            level = level.times(mechanism.on_recordings(design, values), some, count)
+        return level
+
+    def _line_factor(self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds) -> Differentiated | None:
+        """The complex factor of each distinct line; None where no mechanism has one."""
+        product: Differentiated | None = None
+        count, lines = len(points), len(model.design.line_frequency)
+        for mechanism, some, values in self._acting("on_lines", points, seeds):
+            factor = mechanism.on_lines(model.design, contacts.at_points(some), values)
+            if product is None and some is None:
+                product = factor
+            elif factor is not None:
+                one = (
+                    constant(np.ones(1, dtype=complex), seeds.variables, (count,)).spread(lines)
+                    if product is None
+                    else product
+                )
+                product = one.times(factor, some, count)
+        return product
+
+
+def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: Seeds) -> Response:
+    """With the derivatives by the contact's place apart from the others."""
+    count, place = seeds.variables - len(seeds.position), None
+    if seeds.position:
+        place = level.slopes[count:]
+    if lines is not None:
+        lines = Differentiated(lines.value, lines.slopes[:count])
+    return Response(Differentiated(level.value, level.slopes[:count]), place, lines, inside)
+
+
+def _place_in_order(entry: Acting) -> tuple[int, int, str]:
+    """Of composition."""
+    mechanism = entry.mechanism
+    return mechanism.stage.place, mechanism.order, mechanism.name
+
+
+def _of_one_layer(contacts: Contacts, points: int) -> list[tuple[slice | Indices, Contacts]]:
+    """The points' contacts, such that all of a part are on the same linear layer."""
+    layers = [x.value for x in (contacts.poisson_ratio, contacts.slip) if x is not None]
+    if all(bool((value == value.flat[0]).all()) for value in layers):
+        return [(slice(None), contacts)]
+    return [(np.array([point]), contacts.at_points(np.array([point]))) for point in range(points)]
+
 
 _ROOM = 1.01  # beyond the thickness' bounds
 FAINT = 1e-12  # of the largest response, below which a recording has no direction

@@ -1,19 +1,61 @@
-"""What the conditions of FRF recordings amount to for a model, worked out once: everything that no parameter changes.
+"""The lines of FRFs and where they were recorded, and what is predicted on them.
+
+Charge that comes from elsewhere than the skin: random on each row, so it moves the covariance and not the mean.
+
+What the conditions of FRF recordings amount to for a model, worked out once: everything that no parameter changes.
 
 Recordings share contacts (sphere, preload and what else a mechanism asks for), contacts at one place beside a sensor
 are points, and a contact at one frequency is a line. Only these distinct ones are computed.
+
+What a model of FRFs answers before it is spread over rows: a level for each recording, a factor for each line.
 """
 
 import weakref
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from underskin.autodiff import Differentiated
 from underskin.errors import required
-from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
-from underskin.units import Floats, Indices, Mask, to_si
+from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
+from underskin.units import Array, Floats, Indices, Mask, to_si
 from underskin.weak_cache import cached_while_alive
+
+
+@dataclass(frozen=True, eq=False)
+class Pickup:
+    """`deviation`: of real and of imaginary part on these rows [C/N], from the parameters by name in their units.
+
+    Parameters (…, 1) give (…, rows); where rows are `alike` (rows,), they give (…, distinct), of which each row has the
+    one named there.
+    """
+
+    rows: Indices
+    deviation: Callable[[Mapping[str, Floats]], Floats]
+    alike: Indices | None = None
+
+    def on_rows(self, distinct: Floats) -> Floats:
+        """Deviations as `deviation` gives them (…, distinct), on the rows (…, rows)."""
+        return distinct if self.alike is None else distinct[..., self.alike]
+
+
+def together(pickups: Sequence[Pickup]) -> Pickup | None:
+    """Independent charges as one: their variances add on the rows that several reach; None where there is none."""
+    if len(pickups) < 2:
+        return pickups[0] if pickups else None
+    rows = np.unique(np.concatenate([pickup.rows for pickup in pickups]))
+
+    def deviation(values: Mapping[str, Floats]) -> Floats:
+        each = [(np.searchsorted(rows, pickup.rows), pickup.on_rows(pickup.deviation(values))) for pickup in pickups]
+        variance = np.zeros((*np.broadcast_shapes(*(sd.shape[:-1] for _, sd in each)), len(rows)))
+        for places, sd in each:
+            variance[..., places] += sd**2
+        return np.sqrt(variance)
+
+    return Pickup(rows, deviation)
+
 
 NEIGHBOUR_PITCHES = 1.2
 _SPARSE = 8  # contacts times frequencies for each row, beyond which most were not measured
@@ -132,3 +174,60 @@ def _contact_key(entry: FrfConditions, fields: Collection[str]) -> tuple[float, 
 def largest_offset(design: FrfDesign, further: float) -> float:
     """The largest distance of a point's contact from its sensor's centre, plus `further` [m]."""
     return float(np.hypot(design.point_x, design.point_y).max()) + further
+
+
+@dataclass(frozen=True)
+class Response:
+    """FRFs at one or several points of the fit coordinates, in two factors: leading axes are those of the points.
+
+    `place_slopes` are by the contact's x and y, None where they were not asked for.
+    """
+
+    level: Differentiated  # (…, recordings) [C/N], real: before the dynamics
+    place_slopes: Floats | None  # (2, …, recordings) [C/N/m]
+    lines: Differentiated | None  # (…, distinct lines) complex: the dynamics' factor; None where there are none
+    inside: Mask  # (…, recordings)
+
+    def on_rows(self, design: FrfDesign) -> tuple[Array, Array]:
+        """Level times line factor on every row of a single point (rows,), and its derivatives (variables, rows).
+
+        These are by the parameters, then by the place where those were asked for.
+        """
+        place = np.zeros((0, *self.level.value.shape)) if self.place_slopes is None else self.place_slopes
+        level = self.level.value[design.recording]
+        slopes = np.concatenate([self.level.slopes, place])[:, design.recording]
+        if self.lines is None:
+            return level.astype(complex), slopes.astype(complex)
+        factor = self.lines.value[design.line]
+        slopes = slopes * factor
+        for row, of_lines in zip(slopes, self.lines.slopes, strict=False):  # which are by the parameters alone
+            if of_lines.any():
+                row += level * of_lines[design.line]
+        return level * factor, slopes
+
+    def part(self, index: int | slice | Indices) -> "Response":
+        """At some of several points."""
+
+        def of(x: Differentiated) -> Differentiated:
+            return Differentiated(x.value[index], x.slopes[:, index])
+
+        place = None if self.place_slopes is None else self.place_slopes[:, index]
+        return Response(of(self.level), place, None if self.lines is None else of(self.lines), self.inside[index])
+
+
+def joined(responses: Sequence[Response]) -> Response:
+    """Responses of one model at several sets of points, as one."""
+
+    def of(parts: Sequence[Differentiated]) -> Differentiated:
+        return Differentiated(
+            np.concatenate([part.value for part in parts]), np.concatenate([part.slopes for part in parts], axis=1)
+        )
+
+    place = [entry.place_slopes for entry in responses if entry.place_slopes is not None]
+    lines = [entry.lines for entry in responses if entry.lines is not None]
+    return Response(
+        of([entry.level for entry in responses]),
+        np.concatenate(place, axis=1) if place else None,
+        of(lines) if lines else None,
+        np.concatenate([entry.inside for entry in responses]),
+    )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from underskin.autodiff import contiguous
-from underskin.mechanisms.models.creep_kernel import memory_rows
+from underskin.mechanisms.models.sphere_kernels import memory_rows
 from underskin.units import Floats
 
 

@@ -12,8 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from underskin.recordings.conditions import Conditions, FrfConditions, frf_of
-from underskin.recordings.time_zone import time_zone
+from underskin.recordings.campaign import Conditions, FrfConditions, frf_of
+from underskin.recordings.readers.calendar_times import time_zone
 from underskin.units import Floats
 
 _SAME = 1e-9  # of the range, within which values are one level

@@ -1,25 +1,236 @@
-"""All laws of the grammar that a campaign could show, and the share of each in the prior of something unnamed.
+"""The grammar of laws that nobody listed.
+
+Laws over frequency, the same in all recordings.
+
+Minimum phase: the phase follows from the magnitude by Kramers and Kronig's relations (Bode 1945), since what is
+measured is caused by what came before. Or a pure phase: a delay that disperses, a loss angle over the measured band.
+
+All laws of the grammar that a campaign could show, and the share of each in the prior of something unnamed.
 
 The share is that of where a law enters, times that of what it follows, times that of its form; shapes of one form
 (edges of a step, periods) divide its share. All columns of `conditions` together have the share of one axis and a half,
 so that many of them are paid for.
+
+A law that was found on one campaign, on other recordings of the skin: within its range, and nowhere else.
 """
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from underskin.mechanisms.base import Mechanism
-from underskin.mechanisms.unnamed.axes import BUILT_IN, Axis, axes_of
+from underskin.autodiff import Differentiated, exp, log
+from underskin.mechanisms.base import Mechanism, Stage, Values
+from underskin.mechanisms.models.contact_state import Contacts
+from underskin.mechanisms.models.frf_design import FrfDesign
+from underskin.mechanisms.parameter import Normal, Parameter, Uniform
+from underskin.mechanisms.unnamed.axes import BUILT_IN, Axis, axes_of, every_axis
 from underskin.mechanisms.unnamed.forms import Shape, constant, shapes
-from underskin.mechanisms.unnamed.frequency_laws import FrequencyLaw, frequency_laws
-from underskin.mechanisms.unnamed.laws import LAG_KINDS, LagLaw, RecordingLaw, UnnamedLaw
-from underskin.mechanisms.unnamed.level_tables import LevelTables
+from underskin.mechanisms.unnamed.laws import LAG_KINDS, PREFIX, LagLaw, LevelTables, RecordingLaw, Spoken, UnnamedLaw
 from underskin.mechanisms.unnamed.vocabulary import ActsOn, Form
-from underskin.recordings.conditions import Conditions
+from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
-from underskin.units import Floats
+from underskin.units import Array, Floats, Mask
+
+_REASON = "nothing is known of it; as large as what is usually left out"
+_BAND = "anywhere within the measured band"
+_BELOW = 30.0  # times below the band a corner may lie whose phase still shows in it
+_BUMPS, _BUMP_WIDTH = 8, 0.55  # of a free response; width over the distance of neighbours
+
+Factor = Callable[[Floats, Values], Differentiated]  # at frequencies [Hz]
+
+
+@dataclass(frozen=True, eq=False)
+class _Law:
+    form: Form
+    variant: str
+    amplitudes: tuple[Parameter, ...]
+    bending: tuple[Parameter, ...]
+    grid: Sequence[Sequence[float]]
+    factor: Factor
+    share: float = 1.0
+
+
+class FrequencyLaw(UnnamedLaw):
+    """One of them, with the band that it was found in."""
+
+    stage = Stage.LINES
+    order = 210
+
+    def __init__(self, law: _Law, middle: float) -> None:
+        """`middle` of the band [Hz], to which powers refer."""
+        self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
+        self.spoken = Spoken("frequency_response", "frequency_hz", law.form)
+        self.variant = law.variant
+        self.share = law.share
+        self.amplitudes = tuple(entry.name for entry in law.amplitudes)
+        self.parameters_bound = (*law.amplitudes, *law.bending)
+        self.grid = np.array(law.grid, dtype=float).reshape(len(law.grid), -1)
+        self.factor = law.factor
+        self.middle_hz = middle
+
+    def on_lines(self, design: FrfDesign, contacts: Contacts, values: Values) -> Differentiated:
+        """The factor on each distinct line."""
+        return self.factor(design.line_frequency, values)
+
+    def tangents(self, frequency: Floats) -> Array:
+        """∂ ln factor by each amplitude at 0, at the grid of what bends it (points, frequencies, amplitudes)."""
+        points, count = len(self.grid), len(self.amplitudes)
+        values: dict[str, Differentiated] = {}
+        for number, entry in enumerate(self.parameters_bound):
+            slopes = np.zeros((count, points, 1))
+            value = np.zeros((points, 1))
+            if number < count:
+                slopes[number] = 1.0
+            else:
+                at = self.grid[:, number - count, None]
+                value = np.exp(at) if entry.scale == "log" else at
+            values[entry.name] = Differentiated(value, slopes)
+        answer = self.factor(frequency, values)
+        return np.moveaxis(answer.slopes / answer.value, 0, -1)
+
+
+def frequency_laws(frequency: Floats) -> list[FrequencyLaw]:
+    """All over a band of lines [Hz]."""
+    low, high = float(frequency.min()), float(frequency.max())
+    if high < 1.5 * low or len(frequency) < 6:
+        return []
+    middle = float(np.sqrt(low * high))
+    each = [*_phases(middle), *_powers(low, high, middle), *_peaks(low, high), _echo(low, high), _free(low, high)]
+    return [FrequencyLaw(law, middle) for law in each]
+
+
+def _amplitude(sd: float, name: str = "law_change") -> Parameter:
+    return Parameter(name, "-", -6 * sd, 6 * sd, Normal(0.0, sd), "linear", 0.0, _REASON)
+
+
+def _corner(low: float, high: float, name: str = "law_corner") -> Parameter:
+    return Parameter(name, "Hz", low, high, Uniform(), "log", None, _BAND)
+
+
+def _over_band(low: float, high: float, count: int) -> list[float]:
+    return np.linspace(np.log(low), np.log(high), count).tolist()
+
+
+def _phases(middle: float) -> list[_Law]:
+    """exp(−i A (f/f1)^n): 0 a loss angle, 1 a delay, others a delay that disperses; a delay alone is one more."""
+    exponent = Parameter(
+        "law_exponent", "-", 0.0, 4.0, Uniform(), "linear", None, "from a loss angle to f⁴", closed=(0.0,)
+    )
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_lag"] * exp(values["law_exponent"] * np.log(frequency / middle)) * -1j)
+
+    def late(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_lag"] * (-1j * frequency / middle))
+
+    grid = [(value,) for value in (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0)]
+    lag = _amplitude(0.2, "law_lag")
+    return [_Law("power", "phase", (lag,), (exponent,), grid, factor), _Law("linear", "delay", (lag,), (), [()], late)]
+
+
+def _powers(low: float, high: float, middle: float) -> list[_Law]:
+    """Minimum phase: (if)^n; a step from 1 to 1 + A; beyond a corner (1 + if/f1)^n; below one (1 + f1/(if))^(−n)."""
+
+    def power(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_exponent"] * (np.log(frequency / middle) + 0.5j * np.pi))
+
+    def step(frequency: Floats, values: Values) -> Differentiated:
+        ratio = 1j * frequency / values["law_corner"]
+        return 1.0 + values["law_change"] * (ratio / (1.0 + ratio))
+
+    def beyond(frequency: Floats, values: Values) -> Differentiated:
+        return exp(values["law_exponent"] * log(1.0 + 1j * frequency / values["law_corner"]))
+
+    def beneath(frequency: Floats, values: Values) -> Differentiated:
+        return exp(-values["law_exponent"] * log(1.0 + values["law_corner"] * (-1j / frequency)))
+
+    corner, lower = _corner(low, high), _corner(low / _BELOW, high)
+    grid = [(at,) for at in _over_band(low, high, 8)]
+    from_below = [(at,) for at in _over_band(low / _BELOW, high, 8)]
+    order = _amplitude(0.7, "law_exponent")
+    return [
+        _Law("power", "magnitude", (_amplitude(0.15, "law_exponent"),), (), [()], power),
+        _Law("saturating", "step", (_amplitude(0.3),), (corner,), grid, step),
+        _Law("threshold", "corner", (order,), (corner,), grid, beyond, 0.5),
+        _Law("threshold", "high_pass", (order,), (lower,), from_below, beneath, 0.5),
+    ]
+
+
+def _peaks(low: float, high: float) -> list[_Law]:
+    """A resonance at one frequency in all recordings, beside the response: 1 + A u²/(1 − u² + 2iζu), and its like."""
+    corner = _corner(0.8 * low, 1.25 * high, "law_centre")
+    damping = Parameter("law_damping", "-", 5e-3, 1.0, Normal(-2.8, 1.0), "log", None, "sharp to broad")
+    grid = [
+        (at, float(np.log(zeta)))
+        for zeta, count in ((0.03, 60), (0.1, 24), (0.35, 10))
+        for at in _over_band(low, high, count)
+    ]
+    numerators: dict[str, Callable[[Differentiated, Values], Differentiated | complex]] = {
+        "inertia": lambda u, _: u * u,
+        "loss": lambda u, values: 2j * values["law_damping"] * u,
+        "spring": lambda *_: 1.0,
+    }
+
+    def of(name: str) -> _Law:
+        def factor(frequency: Floats, values: Values) -> Differentiated:
+            u = frequency / values["law_centre"]
+            numerator = numerators[name](u, values)
+            return 1.0 + values["law_change"] * (numerator / (1.0 - u * u + 2j * values["law_damping"] * u))
+
+        return _Law("peak", name, (_amplitude(0.2),), (corner, damping), grid, factor, 1 / len(numerators))
+
+    return [of(name) for name in numerators]
+
+
+def _echo(low: float, high: float) -> _Law:
+    """1 + A e^(−2πif/f1): an echo, whose ripples recur every f1."""
+    spacing = _corner(2.2 * (high - low) / 60, 2 * (high - low), "law_period")
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        return 1.0 + values["law_change"] * exp((-2j * np.pi * frequency) / values["law_period"])
+
+    turns = np.arange(1.0, 14.0, 0.5)
+    grid = [(float(np.log((high - low) / turn)),) for turn in turns.tolist()]
+    return _Law("periodic", "echo", (_amplitude(0.15),), (spacing,), grid, factor)
+
+
+def _free(low: float, high: float) -> _Law:
+    """ln |FRF| a sum of bumps over ln f, the phase by Kramers and Kronig."""
+    centres = np.linspace(np.log(low), np.log(high), _BUMPS)
+    width = _BUMP_WIDTH * (centres[1] - centres[0])
+    names = tuple(f"law_change_{number + 1}" for number in range(_BUMPS))
+
+    def factor(frequency: Floats, values: Values) -> Differentiated:
+        total: Differentiated | None = None
+        away = (np.log(frequency) - centres[:, None]) / width
+        for name, log_magnitude, phase in zip(
+            names, np.exp(-0.5 * away**2), phase_of_bump(away, float(width)), strict=True
+        ):
+            part = values[name] * (log_magnitude + 1j * phase)
+            total = part if total is None else total + part
+        assert total is not None
+        return exp(total)
+
+    return _Law("free", "minimum_phase", tuple(_amplitude(0.1, name) for name in names), (), [()], factor)
+
+
+@lru_cache(maxsize=8)
+def _phase_table(width: float) -> tuple[Floats, Floats]:
+    """The phase of a bump of this width in ln ω, over u: φ = (1/π) ∫ dM/dx ln coth(|x − x0|/2) dx (Bode 1945)."""
+    stride = width / 60
+    x = np.arange(-6 * width, 6 * width, stride) + stride / 2
+    slope = -x / width**2 * np.exp(-0.5 * (x / width) ** 2)
+    at = np.linspace(-12 * width, 12 * width, 481)  # halfway between those, so that none meets the logarithm's pole
+    kernel = -np.log(np.tanh(np.abs(x - at[:, None]) / 2))
+    return at / width, np.asarray(kernel @ slope * stride / np.pi)
+
+
+def phase_of_bump(away: Floats, width: float) -> Floats:
+    """The phase [rad] that belongs to ln |H| = e^(−u²/2), u = ln(ω/ω0)/width, at u = `away`; 0 far off."""
+    return np.interp(away, *_phase_table(width))
+
 
 _LEAST_RECORDINGS, _LEAST_LINES = 6, 6
 _ACTS_ON: Mapping[ActsOn, float] = {
@@ -137,4 +348,47 @@ def _makes_sense(acts_on: ActsOn, axis: Axis, shape: Shape, named: Collection[st
     return True
 
 
-__all__ = ["FrequencyLaw", "Grammar", "combination"]
+_ROUNDING = 1e-9  # of the range, by which a value may lie beyond it
+OF_ONE_CAMPAIGN = ("order",)  # axes that say nothing of other recordings
+
+
+def bound_to(
+    law: UnnamedLaw, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]
+) -> tuple[UnnamedLaw, Mask]:
+    """The law on these recordings, and which of them (recordings,) lie in its range.
+
+    A recording beyond the range, or that does not say where it lies, is predicted at the range's end.
+    """
+    ids = [entry.id for entry in frf_of(conditions)]
+    if not isinstance(law, RecordingLaw | LagLaw):
+        return law, np.ones(len(ids), dtype=bool)
+    axis, inside = _on(law.axis, conditions, ids)
+    if isinstance(law, LagLaw):
+        return law.on(axis), inside
+    return law.on(axis, LevelTables(conditions, table, beside)), inside
+
+
+def _on(axis: Axis, conditions: Conditions, ids: Sequence[str]) -> tuple[Axis, Mask]:
+    known = {
+        (entry.name, entry.relative): entry
+        for entry in every_axis(conditions, axis.origin)
+        if entry.name not in OF_ONE_CAMPAIGN
+    }
+    found = known.get((axis.name, axis.relative))
+    if found is not None and axis.name == "previous_preload_n":
+        timed = all(entry.recorded_at is not None for entry in frf_of(conditions))
+        found = found if timed else None  # nothing says which came before
+    if found is None:
+        return replace(axis, values=dict.fromkeys(ids, axis.low), range=(axis.low, axis.high)), np.zeros(
+            len(ids), dtype=bool
+        )
+    if axis.words:
+        words = [found.words[round(value)] for value in found.of(ids)]
+        inside = np.array([word in axis.words for word in words])
+        places = [float(axis.words.index(word)) if word in axis.words else 0.0 for word in words]
+        return replace(axis, values=dict(zip(ids, places, strict=True)), range=(axis.low, axis.high)), inside
+    values = found.of(ids)
+    slack = _ROUNDING * axis.span
+    inside = (values >= axis.low - slack) & (values <= axis.high + slack)
+    clipped = np.clip(values, axis.low, axis.high).tolist()
+    return replace(axis, values=dict(zip(ids, clipped, strict=True)), range=(axis.low, axis.high)), inside

@@ -1,26 +1,159 @@
-"""The FRF, charge over force, from time series: for stepped sine, periodic and broadband forces.
+"""FRFs estimated from time series.
+
+The delay between force and charge: of two signals, and of the phases of FRFs.
+
+Channels of two recorders, filters and the ends of converters' pipelines delay one of them by anything from a sample to
+tenths of a second. Then Re FRF is no measure of the response, cos(ωτ) of it, and may have any sign.
+
+The FRF, charge over force, from time series: for stepped sine, periodic and broadband forces.
 
 Convention e^(+iωt): a charge that lags the force has a negative phase. Spectra are averaged over n blocks, and the FRF
 is H1, H2 or Hv of them (`estimators` has the equations), with the coherence γ² and (Bendat and Piersol, Random Data,
 chapter 9)
     var log|H| = var phase = (1 − γ²)/(2 n γ²)    var γ² = 2 γ² (1 − γ²)²/n.
+
+The resonance that the magnitude of an FRF shows.
+
+Of a mass on a spring, 1/(1 − r² + 2iζr) with r = f/f0, the inverse square magnitude (1 − r²)² + 4ζ²r² is quadratic in
+f²: a line through three unknowns, whatever turns the phase beside the resonance (Ewins, Modal Testing, 2nd ed., 2000,
+section 4.2, has the same of the complex inverse).
+
+Time series whose channels of force and charge look exchanged: the charge has the mean and the oscillation that are
+declared of the force, and the force has not.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from underskin.errors import InvalidInput, not_finite, out_of_range, too_few, unequal_lengths, unusable
+from underskin.findings.codes import Reason
+from underskin.findings.finding import Finding
 from underskin.recordings.campaign import FrfRecording
-from underskin.recordings.frf.delay import advanced, lag_between
 from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
-from underskin.recordings.frf.periodic import period_of, without_drift
-from underskin.recordings.frf.signal_checks import damaged, defects_of_pair
-from underskin.recordings.frf.spectral_average import Blocks, Frf, averaged, without_line
-from underskin.recordings.frf.stepped_sine import find_steps, settled, step_amplitudes
+from underskin.recordings.frf.spectra import (
+    Blocks,
+    Frf,
+    Stack,
+    averaged,
+    damaged,
+    defects_of_pair,
+    find_steps,
+    period_of,
+    settled,
+    step_amplitudes,
+    without_drift,
+    without_line,
+)
 from underskin.units import Complexes, Floats, Mask, to_si
 
-__all__ = ["Frf", "broadband", "estimate", "lines_of", "periodic", "stepped_sine"]
+_LARGEST = 0.25  # of a record, that a lag may be
+_STANDS_OUT = 8.0  # times the rms of a correlation: noise alone reaches that once in 1e15
+_AS_HIGH = 0.9  # of the highest peak: of a force that repeats itself the nearest of several
+# Of a block: a lag takes (2π²/3)(lag/block)² from γ² by Hann's window, as noise of a sample in 1e5 does
+_UNHARMED = 1e-3
+# Of the lines' power that is in phase at the best delay: as much as this without one, and there is none
+_IN_PHASE = 0.9
+_EXPLAINED = 0.5  # of the lines' power, in phase at the best delay: a turn by half past a resonance leaves 0.4
+_STEPS = 6  # delays that are tried for each by which the highest line turns once
+_MOST_DELAYS = 8192
+_CHUNK = 256  # delays at a time
+
+
+def lag_between(force: Floats, charge: Floats, block: int) -> int:
+    """The samples by which the charge comes late, negative where the force does.
+
+    It is where their cross-correlation is highest, drift and preload removed; 0 where no peak stands out, and where the
+    lag is so small beside a `block` (samples) that spectra over blocks do not suffer.
+
+    Source
+    ------
+    Bendat and Piersol, Random Data, 4th ed., 2010, section 9.3 (bias of a coherence by a delay).
+    """
+    from scipy.signal import correlate, detrend  # takes 0.3 s to load, which few need
+
+    likeness = np.abs(correlate(detrend(charge), detrend(force), method="fft"))
+    lags = np.arange(len(likeness)) - (len(force) - 1)
+    near = np.abs(lags) <= min(_LARGEST * len(force), len(force) - block)
+    likeness, lags = likeness[near], lags[near]
+    highest = float(likeness.max(initial=0.0))
+    if not highest > _STANDS_OUT * float(np.sqrt(np.mean(likeness**2))):
+        return 0
+    peaks = lags[likeness >= _AS_HIGH * highest]
+    lag = int(peaks[np.argmin(np.abs(peaks))])
+    return lag if abs(lag) > _UNHARMED * block else 0
+
+
+def common_delay(stacks: Sequence[Stack]) -> float:
+    """The delay [s] of the charge that all recordings share, negative where the force is late.
+
+    That which brings most lines in phase with the force, or in antiphase: the largest Σ (Re Σ w u e^(iωτ))² of the
+    lines' phase factors u with weights w. It is 0 where the lines are in phase without one, but for the sign of a
+    recording, or where none brings most of them in phase, as above a resonance, and of noise.
+    """
+    parts = [(stack, stack.weights * _phase_factors(stack.values)) for stack in stacks if len(stack.frequency) > 1]
+    whole = sum(float((stack.weights.sum(axis=1) ** 2).sum()) for stack, _ in parts)
+    if not whole > 0:
+        return 0.0
+
+    def in_phase(delays: Floats) -> Floats:
+        return (
+            sum((_power(stack.frequency, factors, delays) for stack, factors in parts), np.zeros(len(delays))) / whole
+        )
+
+    without = float(in_phase(np.zeros(1))[0])
+    if without >= _IN_PHASE:
+        return 0.0
+    highest = max(float(stack.frequency.max()) for stack, _ in parts)
+    spacing = max(float(np.median(np.diff(stack.frequency))) for stack, _ in parts)
+    count = min(int(np.ceil(_STEPS * highest / spacing)), _MOST_DELAYS)
+    step = 1 / (_STEPS * highest)
+    delays: Floats = step * np.arange(-(count // 2), count // 2 + 1).astype(np.float64)
+    for _ in range(3):
+        power = in_phase(delays)
+        best = delays[_nearest_peak(delays, power)]
+        delays = np.asarray(best + np.arange(-_STEPS, _STEPS + 1) * (step / _STEPS), dtype=np.float64)
+        step /= _STEPS
+    explained = float(power.max())
+    return float(best) if explained > _EXPLAINED and without < _IN_PHASE * explained else 0.0
+
+
+def without_delay(stacks: Sequence[Stack], delay: float) -> list[Stack]:
+    """The FRFs with that delay of the charge [s] taken off."""
+    if delay == 0.0:
+        return list(stacks)
+    return [replace(stack, values=advanced(stack.values, stack.frequency, delay)) for stack in stacks]
+
+
+def advanced(values: Complexes, frequency: Floats, delay: float) -> Complexes:
+    """An FRF (…, lines) with a delay of the charge [s] taken off."""
+    return np.asarray(values * np.exp(2j * np.pi * frequency * delay))
+
+
+def _phase_factors(values: Complexes) -> Complexes:
+    known = np.isfinite(values) & (values != 0)
+    return np.where(known, np.exp(1j * np.angle(np.where(known, values, 1.0))), 0.0)
+
+
+def _power(frequency: Floats, factors: Complexes, delays: Floats) -> Floats:
+    """Σ over recordings of (Re Σ over lines of factors · e^(2πifτ))² at each delay."""
+    return np.concatenate(
+        [((factors @ np.exp(2j * np.pi * np.outer(frequency, some))).real ** 2).sum(axis=0) for some in _chunks(delays)]
+    )
+
+
+def _chunks(delays: Floats) -> Iterator[Floats]:
+    for first in range(0, len(delays), _CHUNK):
+        yield delays[first : first + _CHUNK]
+
+
+def _nearest_peak(delays: Floats, power: Floats) -> int:
+    """Of those nearly as high as the highest the nearest to 0: a band of few lines does not tell them apart."""
+    peaks = np.flatnonzero(power >= power.max() * (1 - 1e-9))
+    return int(peaks[np.argmin(np.abs(delays[peaks]))])
+
 
 _BLOCKS = 15  # of a broadband record, half overlapping, where no resolution is asked for: 8 / its length
 
@@ -263,3 +396,69 @@ def _taper(window: str, size: int) -> Floats:
     from scipy.signal import get_window  # takes 0.3 s to load, which few need
 
     return np.asarray(get_window(window, size), dtype=np.float64)
+
+
+_PEAK_STANDS_OUT = 2.0  # times the median magnitude
+_FEWEST, _WIDTH = 7, 0.4  # lines around the highest, or all within that share of its frequency
+_LEAST_DAMPING = 1e-3
+
+
+class Resonance(NamedTuple):
+    """Natural frequency [Hz] and damping ratio ζ."""
+
+    frequency: float
+    damping: float
+
+
+def resonance(frf: Frf) -> Resonance | None:
+    """That of the highest finite line, where one stands out within the band; None where none does."""
+    finite = np.isfinite(frf.values)
+    if not finite.any():
+        return None
+    frequency, size = frf.frequency[finite], np.abs(frf.values[finite])
+    peak = int(np.argmax(size))
+    if not 0 < peak < len(size) - 1 or size[peak] < _PEAK_STANDS_OUT * np.median(size):
+        return None
+    away = np.abs(frequency - frequency[peak])
+    near = away <= max(_WIDTH * frequency[peak], np.sort(away)[min(_FEWEST, len(away)) - 1])
+    square = (frequency[near] / frequency[peak]) ** 2
+    relative = size[near] / size[peak]
+    # Σ w (1/|y|² − a − b f² − c f⁴)² with w ∝ |y|⁶, as noise of one size on all lines has it.
+    columns = np.stack([np.ones_like(square), square, square**2]) * relative**3
+    a, b, c = np.linalg.lstsq(columns.T, relative, rcond=None)[0]
+    if not (a > 0 and c > 0):
+        return None
+    natural = (a / c) ** 0.25
+    damping = 0.5 * np.sqrt(max(b / np.sqrt(a * c) + 2, 0.0))
+    return Resonance(float(frequency[peak] * natural), float(max(damping, _LEAST_DAMPING)))
+
+
+_AS_DECLARED = float(np.log(1.4))
+_PARTS = 8  # of a record, of which drift is taken off; its analysis has blocks of that length
+_TINY = 1e-300
+
+
+def exchanged_channels(entry: FrfRecording) -> Finding | None:
+    """That the two channels of a recording look exchanged, if they do."""
+    if entry.force_n is None or entry.charge_pc is None:
+        return None
+    if not _declared(entry.charge_pc, entry) or _declared(entry.force_n, entry):
+        return None
+    means = {"force_mean_n": float(np.mean(entry.force_n)), "charge_mean_pc": float(np.mean(entry.charge_pc))}
+    return Finding(Reason.CHANNELS_SWAPPED, entry.id, "force_n", {**means, "preload_n": entry.preload_n})
+
+
+def oscillation_of(force: Floats) -> Floats:
+    """√2 times the deviation of a force less its drift, and its peak [N]."""
+    parts = np.arange(0, len(force), max(len(force) // _PARTS, _PARTS))
+    from scipy.signal import detrend  # takes 0.3 s to load, which few need
+
+    drift_free = detrend(force, bp=parts)
+    return np.array([np.sqrt(2.0) * np.std(drift_free), np.max(np.abs(drift_free))])
+
+
+def _declared(signal: Floats, entry: FrfRecording) -> bool:
+    """Whether the mean of a signal is the declared preload, and what shakes it the declared dynamic force."""
+    ratios = np.append(oscillation_of(signal) / entry.dynamic_force_n, np.mean(signal) / entry.preload_n)
+    near = np.abs(np.log(np.maximum(ratios, _TINY))) < _AS_DECLARED
+    return bool(near[:-1].any() and near[-1])

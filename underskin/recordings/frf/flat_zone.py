@@ -1,4 +1,8 @@
-"""The flat zone: the band of a campaign in which no recording shows a resonance (Seminara 2018, section 3.2.2).
+"""The band in which an FRF is flat.
+
+Why a flat zone ends where it does, in words that a lab checks against its own plots.
+
+The flat zone: the band of a campaign in which no recording shows a resonance (Seminara 2018, section 3.2.2).
 
 Re FRF of each recording, over its own level, is gathered in bins of equal width in log f and averaged over the
 recordings of one condition (indenter and preload: a contact resonance moves with both). The zone is the widest run of
@@ -7,21 +11,124 @@ slowly over the whole band and is no resonance) by more than `FLATNESS`. Lines a
 stand out of their neighbours are left out, and so are lines that are not used (`line_choice`): noise that was not
 excited there may be flat, too. A delay that all recordings share is taken off before (`delay`): Re FRF is the response
 where the charge is in phase with the force.
+
+Whether the band that d33 is averaged over lies behind a high-pass or a low-pass: what its level is of the plateau's.
+
+The magnitude over frequency, gathered in bins over all recordings, is fitted by a plateau with a slight power law (a
+sensor's relaxation) and two filters,
+    ln |FRF| = a − n ln f − ½ ln(1 + (f1/f)²) − (m/2) ln(1 + (f/f2)^(2k)),   0 ≤ n ≤ `STEEPEST`,
+up to where a resonance lifts it. A filter counts where it explains the fall and the plateau lies beyond the band: then
+the band's average is no d33, however flat the band is.
+
+Whether the band that d33 is averaged over is flat enough for the interval that is told.
+
+FRFs of a campaign as a figure can show them: lines of single recordings, and the spread over recordings alike.
+
+A figure has fewer pixels than a recording lines: lines are gathered in bins of equal width in log f, of which the
+extremes are kept, so that no resonance is lost. Of a force of a few sines the lines between those are no part of it.
 """
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.ndimage import median_filter
 
 from underskin.errors import too_few
-from underskin.recordings.frf.excitation import bin_of, edges_over
-from underskin.recordings.frf.flat_zone_reason import Idle, levels_of, reason_of
-from underskin.recordings.frf.mains import HARMONIC_WIDTH_HZ, HARMONICS, MAINS_HZ
-from underskin.recordings.frf.stacks import Stack
-from underskin.units import Floats, Mask
+from underskin.recordings.frf.line_choice import (
+    HARMONIC_WIDTH_HZ,
+    HARMONICS,
+    MAINS_HZ,
+    bin_of,
+    edges_over,
+    excited_lines,
+)
+from underskin.recordings.frf.spectra import Frf, Stack, stacked
+from underskin.units import Complexes, Floats, Indices, Mask, to_lab
+
+_PEAK = 1.3  # over the level: a resonance to be named
+_NOT_EXCITED = "it was not excited: the charge hardly follows the force (low coherence), or the FRF is 0 there"
+
+
+@dataclass(frozen=True)
+class Idle:
+    """Whether lines below a zone and above it were not excited, and how many inside it."""
+
+    below: bool
+    above: bool
+    inside: int
+
+
+def reason_of(
+    low_hz: float,
+    high_hz: float,
+    middle_hz: Floats,
+    curves: Floats,
+    conditions: Sequence[tuple[float, float]],
+    bins: tuple[int, int],
+    slope: float,
+    left_out_hz: Sequence[float],
+    idle: Idle,
+) -> str:
+    """The reason for a zone over `bins` (first, last) of the `curves` (conditions and all, bins) over `middle_hz`."""
+    first, last = bins
+    departure = curves / levels_of(curves[:, first : last + 1]) - 1
+    parts = [f"{low_hz:.4g} to {high_hz:.4g} Hz: no resonance in any recording"]
+    if last + 1 < len(middle_hz):
+        parts.append(_above(high_hz, middle_hz, departure, conditions, last))
+    elif idle.above:
+        parts.append(f"above {high_hz:.4g} Hz {_NOT_EXCITED}")
+    if first > 0:
+        parts.append(_below(low_hz, float(departure[-1, first - 1])))
+    elif idle.below:
+        parts.append(f"below {low_hz:.4g} Hz {_NOT_EXCITED}")
+    if first == 0 and last + 1 == len(middle_hz) and not (idle.below or idle.above):
+        parts.append("it is the whole recorded range")
+    if abs(slope) > 0.005:
+        parts.append(f"inside, all recordings fall alike, by {100 * (1 - 10**slope):.1f} % a decade")
+    if idle.inside:
+        parts.append(f"{idle.inside} lines inside it were not excited (low coherence) and are left out")
+    if left_out_hz:
+        parts.append(f"lines left out as mains pick-up: {', '.join(f'{line:g}' for line in left_out_hz)} Hz")
+    return "; ".join(parts)
+
+
+def levels_of(curves: Floats) -> Floats:
+    """The mean of each curve over the bins that it has, (curves, 1); NaN where it has none."""
+    filled = np.isfinite(curves).sum(axis=1, keepdims=True)
+    return np.nansum(curves, axis=1, keepdims=True) / np.where(filled, filled, np.nan)
+
+
+def _above(
+    high_hz: float, middle_hz: Floats, departure: Floats, conditions: Sequence[tuple[float, float]], last: int
+) -> str:
+    beyond = departure[:-1, last + 1 :]
+    peaks = {
+        number: float(middle_hz[last + 1 + int(np.nanargmax(row))])
+        for number, row in enumerate(beyond)
+        if np.isfinite(row).any() and np.nanmax(row) > _PEAK - 1
+    }
+    if peaks:
+        lowest, highest = min(peaks, key=lambda number: peaks[number]), max(peaks.values())
+        radius, preload = conditions[lowest]
+        where = f"{peaks[lowest]:.3g} Hz" + (
+            f" to {highest:.3g} Hz, moving with the contact" if highest > 1.2 * peaks[lowest] else ""
+        )
+        return (
+            f"above, the response rises to a resonance (peak at {where}; lowest with the sphere of {radius:g} mm "
+            f"radius at {preload:g} N)"
+        )
+    side = "rises" if float(departure[-1, last + 1]) > 0 else "falls"
+    return f"above {high_hz:.4g} Hz the response {side} or scatters by more than 2 %, without a peak in range"
+
+
+def _below(low_hz: float, departure: float) -> str:
+    if departure < 0:
+        return f"below {low_hz:.4g} Hz the response falls off, as behind a high-pass"
+    return f"below {low_hz:.4g} Hz the response rises"
+
 
 FLATNESS = 0.02
 STEEPEST = 0.1  # fall of ln FRF with ln f that relaxation may have (a loss tangent of 0.16)
@@ -283,3 +390,237 @@ def _is_flat(log_frequency: Floats, curves: Floats, noise: Floats, slope: float)
     shape = curves / law
     departure = np.abs(shape / levels_of(shape) - 1) - _BEYOND_NOISE * noise
     return not bool(np.any(departure > FLATNESS))
+
+
+_FEWEST_BINS = 6
+_CORNERS = 60  # of each filter, that are tried
+_BELOW, _ABOVE = 30.0, 10.0  # times the band's ends: how far off corners are tried
+_LOW_PASSES = ((1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (1, 4))  # k and m: Butterworth's of order k, m times in a row
+_ONE_POLE = (1, 1)
+_SLOPES = np.linspace(0.0, STEEPEST, 6)
+_LEAST_NOISE = 0.003  # of a bin's magnitude
+_SEVERAL, _USUAL_NOISE = 4, 0.02  # lines of a bin that tell their scatter, and one where none does
+_LIFTED = 1.05  # of the plateau: a resonance
+_LEAST_SHARE = 0.02  # of the plateau, that is worth saying
+_SPEAKS = 25.0  # χ² that a filter must explain
+_EXPLAINED = 0.2  # of the rms about a plateau, that may be left
+
+
+@dataclass(frozen=True)
+class RollOff:
+    """The corners [Hz] of the filters, 0 and ∞ where there is none, and by how much the band's level lies below the
+    plateau, as a share of that."""
+
+    high_pass_hz: float
+    low_pass_hz: float
+    share: float
+
+
+def roll_off(stacks: Sequence[Stack], zone: FlatZone, level: Floats) -> RollOff | None:
+    """The filters that the band lies behind; None where it reaches their plateau. `level` (recordings,) is the average
+    over the zone [C/N]."""
+    frequency, magnitude, noise = _curve(stacks, level)
+    inside = (frequency >= zone.low_hz) & (frequency <= zone.high_hz)
+    lifted = np.flatnonzero(magnitude > _LIFTED * np.median(magnitude[inside])) if inside.any() else np.zeros(0, int)
+    lifted = lifted[frequency[lifted] > zone.high_hz]
+    if len(lifted) and not _falls_after(magnitude, int(lifted[0])):
+        lifted = lifted[:0]  # a high-pass that goes on rising
+    end = int(lifted[0]) if len(lifted) else len(frequency)
+    if end < _FEWEST_BINS:
+        return None
+    x, y, weight = np.log(frequency[:end]), np.log(magnitude[:end]), noise[:end] ** -2.0
+    plain = _fitted(x, y, weight, 0.0, np.inf)
+    if plain[0] < _SPEAKS:
+        return None
+    highs = [0.0, *np.geomspace(frequency[0] / _BELOW, frequency[end - 1] * _ABOVE, _CORNERS).tolist()]
+    lows = [np.inf, *np.geomspace(frequency[0] / _ABOVE, frequency[end - 1] * _BELOW, _CORNERS).tolist()]
+    single = [(high, np.inf, _ONE_POLE) for high in highs] + [
+        (0.0, low, order) for low in lows for order in _LOW_PASSES
+    ]
+    best = min(single, key=lambda one: _fitted(x, y, weight, *one)[0])
+    in_order = [(high, low, _ONE_POLE) for high, low in product(highs[1::2], lows[1::2]) if high < low]
+    both = min(in_order, key=lambda one: _fitted(x, y, weight, *one)[0])
+    if _fitted(x, y, weight, *best)[0] - _fitted(x, y, weight, *both)[0] > _SPEAKS:
+        best = both
+    misfit, plateau = _fitted(x, y, weight, *best)
+    share = 1 - float(np.exp(-plateau))
+    is_explained = plain[0] - misfit >= _SPEAKS and misfit <= _EXPLAINED**2 * plain[0] + len(x)
+    return RollOff(best[0], best[1], share) if is_explained and share >= _LEAST_SHARE else None
+
+
+def _falls_after(magnitude: Floats, place: int) -> bool:
+    """Whether the magnitude has a peak beyond a place rather than a plateau."""
+    return bool(magnitude[-1] < 0.8 * magnitude[place:].max())
+
+
+def _fitted(
+    x: Floats, y: Floats, weight: Floats, high: float, low: float, kind: tuple[int, int] = _ONE_POLE
+) -> tuple[float, float]:
+    """χ² of the best plateau and slope with these corners and this kind of low-pass (k, m), and the logarithm of the
+    plateau where the slope is that of none: at the band's middle."""
+    frequency = np.exp(x)
+    order, times = kind
+    filters = -0.5 * (np.log1p((high / frequency) ** 2) + times * np.log1p((frequency / low) ** (2 * order)))
+    laws = filters - np.outer(_SLOPES, x - x.mean())
+    plateaus = (weight * (y - laws)).sum(axis=1) / weight.sum()
+    misfits = (weight * (y - laws - plateaus[:, None]) ** 2).sum(axis=1)
+    best = int(np.argmin(misfits))
+    return float(misfits[best]), float(plateaus[best])
+
+
+def _curve(stacks: Sequence[Stack], level: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of bins of equal width in ln f that hold lines with a magnitude: the middle [Hz], the median over recordings of
+    the magnitude over their level, and its relative noise."""
+    lines = [stack.frequency[stack.used.any(axis=0)] for stack in stacks]
+    edges = edges_over(np.unique(np.concatenate(lines)))
+    ratios: list[list[float]] = [[] for _ in edges[1:]]
+    spreads: list[list[tuple[float, int]]] = [[] for _ in edges[1:]]
+    for stack in stacks:
+        bins = bin_of(stack.frequency, edges)
+        for row, number in enumerate(stack.rows.tolist()):
+            if not (np.isfinite(level[number]) and level[number] != 0):
+                continue
+            size = np.abs(stack.values[row]) / abs(level[number])
+            for place in np.unique(bins[stack.used[row]]).tolist():
+                of_bin = size[stack.used[row] & (bins == place)]
+                ratios[place].append(float(np.median(of_bin)))
+                spreads[place].append((float(np.std(of_bin)), len(of_bin)))
+    known = [place for place, of_bin in enumerate(ratios) if of_bin and np.median(of_bin) > 0]
+    middle = np.sqrt(edges[1:] * edges[:-1])[known]
+    magnitude = np.array([float(np.median(ratios[place])) for place in known])
+    several = [deviation for of_bin in spreads for deviation, count in of_bin if count >= _SEVERAL]
+    usual = float(np.median(several)) if several else _USUAL_NOISE
+    noise = np.array([_noise_of(spreads[place], usual) for place in known])
+    return middle, magnitude, np.maximum(noise / magnitude, _LEAST_NOISE)
+
+
+def _noise_of(spreads: Sequence[tuple[float, int]], usual: float) -> float:
+    """Of a median over recordings, by the standard deviation and number of their lines in a bin; a bin of few lines has
+    the `usual` deviation at least."""
+    each = [max(deviation, usual if count < _SEVERAL else 0.0) / count**0.5 for deviation, count in spreads]
+    return 1.25 * float(np.median(each)) / len(each) ** 0.5
+
+
+_HALVES_BEYOND_NOISE = 3.0
+_LEAST_CHANGE = 0.003
+_OF_A_MEDIAN = 1.25  # its standard error over that of a mean
+
+
+def lower_half(stacks: Sequence[Stack], zone: FlatZone, level: Floats, noise: Floats) -> str:
+    """In words, by how much d33 would differ if it were of the zone's lower half, in log f; empty within the noise.
+
+    A contact resonance above the zone raises its upper end first, and a high-pass lowers its lower end. `level` and
+    `noise` (recordings,) are those of the whole zone, as `band_average` has them.
+    """
+    half = replace(zone, high_hz=float(np.sqrt(zone.low_hz * zone.high_hz)))
+    lower, lower_noise, _ = band_average(stacks, half)
+    with np.errstate(divide="ignore", invalid="ignore"):  # of a dead sensor
+        change, unsure = lower / level - 1, np.hypot(noise, lower_noise) / np.abs(level)
+    known = np.isfinite(change) & np.isfinite(unsure)
+    if not known.any():
+        return ""
+    typical = float(np.median(change[known]))
+    by_noise = _OF_A_MEDIAN * float(np.median(unsure[known])) / np.sqrt(known.sum())
+    if abs(typical) < max(_HALVES_BEYOND_NOISE * by_noise, _LEAST_CHANGE):
+        return ""
+    way = "higher" if typical > 0 else "lower"
+    return f"; averaged over its lower half alone, d33 would be {100 * abs(typical):.1f} % {way}"
+
+
+MOST_LINES = 240  # of one recording
+MOST_BINS = 80  # of a spread
+
+
+@dataclass(frozen=True)
+class FrfLines:
+    """One recording: frequency [Hz], magnitude [pC/N], phase [°], coherence γ² (NaN where not recorded)."""
+
+    name: str
+    frequency_hz: Floats
+    magnitude_pc_per_n: Floats
+    phase_deg: Floats
+    coherence: Floats
+
+
+@dataclass(frozen=True)
+class FrfSpread:
+    """Recordings of one condition: lowest, median and highest value in each bin, each (bins,)."""
+
+    indenter_radius_mm: float
+    preload_n: float
+    recordings: int
+    frequency_hz: Floats
+    magnitude_pc_per_n: tuple[Floats, Floats, Floats]
+    phase_deg: tuple[Floats, Floats, Floats]
+    coherence: tuple[Floats, Floats, Floats]
+
+
+def lines_of(name: str, frf: Frf) -> FrfLines:
+    """A recording's lines, thinned to MOST_LINES: of each bin those of the smallest and the largest magnitude."""
+    (stack,) = stacked([frf])
+    stack = _of_sines(stack.at(stack.frequency > 0))
+    magnitude, phase = _polar(stack.values[0])
+    chosen = _extremes(stack.frequency, magnitude)
+    return FrfLines(name, stack.frequency[chosen], magnitude[chosen], phase[chosen], stack.coherence[0, chosen])
+
+
+def spreads(frfs: Sequence[Frf], conditions: Sequence[Condition]) -> list[FrfSpread]:
+    """The spread over the recordings of each condition, by indenter and preload; one more for each grid of lines."""
+    every = []
+    keys = np.array(conditions)
+    for whole in stacked(frfs):
+        stack = _of_sines(whole.at(whole.frequency > 0))
+        for condition in np.unique(keys[stack.rows], axis=0):
+            alike = (keys[stack.rows] == condition).all(axis=1)
+            every.append(_spread(stack, alike, condition))
+    return sorted(every, key=lambda spread: (spread.indenter_radius_mm, spread.preload_n))
+
+
+def _spread(stack: Stack, alike: Mask, condition: Floats) -> FrfSpread:
+    frequency, start = _bins(stack.frequency, MOST_BINS)
+    magnitude, phase = _polar(stack.values[alike])
+    columns = [_levels(part, start) for part in (magnitude, phase, stack.coherence[alike])]
+    return FrfSpread(float(condition[0]), float(condition[1]), int(alike.sum()), frequency, *columns)
+
+
+def _of_sines(stack: Stack) -> Stack:
+    """Where the force excited fewer than half of the lines from its first to its last, those; else all lines."""
+    if len(stack.frequency) < 2:
+        return stack
+    excited = excited_lines([stack], stack.frequency)
+    first, last = np.flatnonzero(excited)[[0, -1]]
+    return stack.at(excited) if excited.sum() < (last - first + 1) / 2 else stack
+
+
+def _levels(values: Floats, start: Indices) -> tuple[Floats, Floats, Floats]:
+    """Lowest, median over recordings (mean of a bin's lines), and highest of each bin; `values` (recordings, lines)."""
+    low = np.minimum.reduceat(values, start, axis=1).min(axis=0)
+    high = np.maximum.reduceat(values, start, axis=1).max(axis=0)
+    count = np.diff([*start, values.shape[1]])
+    return low, np.median(np.add.reduceat(values, start, axis=1) / count, axis=0), high
+
+
+def _bins(frequency: Floats, most: int) -> tuple[Floats, Indices]:
+    """The middle of each bin that holds lines, and its first line."""
+    if len(frequency) <= most:
+        return frequency, np.arange(len(frequency))
+    edges = np.geomspace(frequency[0], frequency[-1], most + 1)[1:-1]
+    start = np.unique(np.concatenate([[0], np.searchsorted(frequency, edges)]))
+    start = start[start < len(frequency)]
+    count = np.diff([*start, len(frequency)])
+    return np.exp(np.add.reduceat(np.log(frequency), start) / count), start
+
+
+def _extremes(frequency: Floats, magnitude: Floats) -> Indices:
+    if len(frequency) <= MOST_LINES:
+        return np.arange(len(frequency))
+    _, start = _bins(frequency, MOST_LINES // 2)
+    parts = np.split(np.arange(len(frequency)), start[1:])
+    chosen = [part[[np.argmin(magnitude[part]), np.argmax(magnitude[part])]] for part in parts]
+    return np.unique(np.concatenate(chosen))
+
+
+def _polar(values: Complexes) -> tuple[Floats, Floats]:
+    """Magnitude [pC/N], and phase [°] from −270 to 90: past a resonance it falls to −180, where noise must not jump."""
+    phase = np.mod(np.degrees(np.angle(values)) + 270.0, 360.0) - 270.0
+    return to_lab("frf_pc_per_n", np.abs(values)), phase

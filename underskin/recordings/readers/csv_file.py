@@ -1,6 +1,6 @@
 """Tables that instruments write as text: some lines about the measurement, a line of headings, rows of numbers.
 
-The rows and the headings are found by table_rows.py and table_headings.py. Headings name the channels and, in brackets
+The rows and the headings are found by cells.py and tables.py. Headings name the channels and, in brackets
 or behind the last underscore, their units. Columns of text are left out, with a warning. Lines above the headings and
 under the numbers that hold a name and a value become properties, unless the name has two values. Where the headings
 come again, what follows is a part of its own. A cell in quotes may hold the separator. See Also csv_template.py, our
@@ -13,12 +13,10 @@ from typing import BinaryIO
 
 from underskin.errors import FileError
 from underskin.recordings.channels import Block, Channel, Contents, with_distinct_names
-from underskin.recordings.readers import table_headings, table_rows, text
-from underskin.recordings.readers.cell_bytes import BLANKS
-from underskin.recordings.readers.table_headings import Headings
-from underskin.recordings.readers.table_rows import Table
-from underskin.recordings.readers.table_sections import Lines, Section, SectionReader
-from underskin.recordings.readers.text_blocks import BlockText
+from underskin.recordings.readers import cells as table_rows
+from underskin.recordings.readers import tables, text
+from underskin.recordings.readers.cells import BLANKS, BlockText, Table
+from underskin.recordings.readers.tables import Headings, Lines, Section, SectionReader
 from underskin.recordings.readers.unit_labels import unit
 
 _STATED = re.compile(r"(?P<name>[^\W\d_][^:=\t;]*?)\s*[:=]\s*(?P<value>[^\s:=].*)")
@@ -37,7 +35,7 @@ def read(stream: BinaryIO, file: str) -> Contents:
     """The channels of a text table; raises FileError that names the line, NoTable where there is no table."""
     source = BlockText(stream, file)
     head, table = _table(source, file)
-    headings = table_headings.find(head, table, file)
+    headings = tables.find(head, table, file)
     repeated = frozenset(head[line].strip() for line in headings.lines)
     reader = SectionReader(table, repeated, file)
     reader.take_all(source)

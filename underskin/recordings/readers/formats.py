@@ -13,7 +13,8 @@ from typing import BinaryIO
 from underskin import extensions
 from underskin.errors import FileError
 from underskin.recordings.channels import Contents, Document
-from underskin.recordings.readers import csv_template, cut_end, lvm_file, text
+from underskin.recordings.readers import csv_template, lvm_file, text
+from underskin.recordings.readers import text as cut_end
 
 MODULES = {
     "JSON": "json_file",

@@ -12,7 +12,7 @@ import numpy as np
 import orjson
 
 from underskin.errors import FileError
-from underskin.recordings.readers.repeated_keys import repeated_key
+from underskin.recordings.readers.json_file import repeated_key
 from underskin.units import Floats
 
 _BOM = b"\xef\xbb\xbf"

@@ -13,7 +13,7 @@ import scipy.io
 
 from underskin.errors import damage_said
 from underskin.recordings.channels import Block, Channel, Contents, as_values
-from underskin.recordings.readers import hdf5_input
+from underskin.recordings.readers import hdf5_file
 
 MAGIC_73 = b"MATLAB 7.3 MAT-file"
 _MOST_COLUMNS = 1000
@@ -60,7 +60,7 @@ def _channels(name: str, value: Any) -> Iterator[Channel]:
 
 def _variables_73(stream: BinaryIO, file: str) -> dict[str, Any]:
     with h5py.File(stream, "r") as source:
-        hdf5_input.refuse_outside(source, file)
+        hdf5_file.refuse_outside(source, file)
         return {
             name: {inner: _value(value[inner]) for inner in value} if isinstance(value, h5py.Group) else _value(value)
             for name, value in source.items()

@@ -1,20 +1,126 @@
-"""Units as instruments label them: `[mV]`, `Load (N)`, `height_m`, `m/s^2`, `Force (lbs)`, `Newtons`, `dB re 1 pC/N`.
+"""Units as files write them.
 
-A symbol counts as it is written (mN is not MN). A label that is no symbol may be a word (unit_words.py); one in the
+Units written out: the words of several languages, and common abbreviations, for the units of `unit_labels`.
+
+A word is looked up in small letters. An SI unit's word may have a prefix in words before it (`millinewtons`).
+
+Units as instruments label them: `[mV]`, `Load (N)`, `height_m`, `m/s^2`, `Force (lbs)`, `Newtons`, `dB re 1 pC/N`.
+
+A symbol counts as it is written (mN is not MN). A label that is no symbol may be a word; one in the
 wrong letters, `MHZ`, has every meaning that its letters have.
+
+Products and quotients of units, as arithmetic on channels makes them: N/m times m is N.
 """
 
 import math
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
 
-from underskin.recordings.readers.unit_words import DECIBEL, STANDARD_GRAVITY, dictionary
-from underskin.recordings.shown_values import LONGEST_NAME
+from underskin.recordings.validation import LONGEST_NAME
 from underskin.units import LAB
+
+STANDARD_GRAVITY = 9.80665  # m/s²
+_POUND = 4.4482216152605  # N, of a pound-force
+_INCH = 25.4e-3  # m
+
+# Of each SI unit, in English, French, German, Italian, Spanish, Russian, Chinese and Japanese where they differ.
+_SI_WORDS: Mapping[str, str] = {
+    "m": "meter meters metre metres mètre mètres metro metri metros метр м 米",
+    "N": "newton newtons newtones ньютон ньютоны н niuton niutony 뉴턴 牛顿 牛 ニュートン",
+    "Pa": "pascal pascals pascales паскаль па 帕斯卡 帕",
+    "C": "coulomb coulombs culombio culombios кулон кл 库仑 库",
+    "s": "sec secs second seconds seconde secondes sekunde sekunden secondo secondi segundo segundos секунда секунды "
+    "сек с sekunda sekundy 초 秒",
+    "Hz": "hertz герц гц 赫兹 赫 ヘルツ",
+    "V": "volt volts voltio voltios вольт вольты в wolt wolty 볼트 伏特 伏 ボルト",
+    "A": "amps ampere amperes ampère ampères amperio amperios ампер",
+}
+_PREFIX_WORDS: Mapping[str, float] = {
+    "pico": 1e-12,
+    "piko": 1e-12,
+    "nano": 1e-9,
+    "micro": 1e-6,
+    "mikro": 1e-6,
+    "milli": 1e-3,
+    "mili": 1e-3,
+    "zenti": 1e-2,
+    "centi": 1e-2,
+    "kilo": 1e3,
+    "chilo": 1e3,
+    "mega": 1e6,
+    "giga": 1e9,
+    "пико": 1e-12,
+    "нано": 1e-9,
+    "микро": 1e-6,
+    "милли": 1e-3,
+    "кило": 1e3,
+    "мега": 1e6,
+    "п": 1e-12,
+    "н": 1e-9,
+    "мк": 1e-6,
+    "к": 1e3,
+    "皮": 1e-12,
+    "纳": 1e-9,
+    "微": 1e-6,
+    "毫": 1e-3,
+    "厘": 1e-2,
+    "千": 1e3,
+    "兆": 1e6,
+    "ミリ": 1e-3,
+    "キロ": 1e3,
+}
+_OTHERS: Mapping[tuple[str, float], str] = {
+    ("force", _POUND): "lb lbs lbf lbsf lb-f pound pounds pound-force pounds-force pfund libra libras livre livres",
+    ("force", _POUND / 16): "oz ozf ounce ounces",
+    ("force", 1e-5): "dyne dynes",
+    ("force", STANDARD_GRAVITY): "kg kgf kp kilopond kilogram kilograms kilogram-force kilogramm",
+    ("force", 1e-3 * STANDARD_GRAVITY): "gf gram grams gramm gram-force pond",
+    ("length", _INCH): "in inch inches zoll pouce pouces pulgada pulgadas pollice pollici",
+    ("length", 12 * _INCH): "ft foot feet",
+    ("length", 1e-3 * _INCH): "mil mils thou",
+    ("length", 1e-6): "micron microns mikron мкм",
+    ("length", 1e-3): "мм",
+    ("pressure", _POUND / _INCH**2): "psi",
+    ("pressure", 1e3 * _POUND / _INCH**2): "ksi",
+    ("pressure", 1e5): "bar bars",
+    ("pressure", 1e2): "mbar millibar",
+    ("pressure", 101325.0): "atm",
+    ("pressure", 133.322387415): "mmhg torr",
+    ("time", 1e-3): "msec msecs мс",
+    ("time", 1e-6): "usec usecs µsec мкс",
+    ("time", 60.0): "min mins minute minutes minuten minuto minutos minuti мин 分",
+    ("time", 3600.0): "h hr hrs hour hours stunde stunden heure heures hora horas ora ore час 小时",
+    ("force", 1e-3): "мн",
+    ("voltage", 1e-3): "мв",
+    ("pressure", 1e6): "мпа",
+    ("length", 1e-10): "å angstrom angstroms",
+    ("frequency", 1 / 60): "rpm r/min cpm 1/min",
+    ("angle", 1.0): "rad rads radian radians radiant",
+    ("angle", 1e-3): "mrad milliradian milliradians",
+    ("angle", 6.283185307179586): "rev revs revolutions turns cycles",
+    ("angle", 3.141592653589793 / 180): "deg degs degree degrees grad ° degré degrés gradi grado grados",
+}
+DECIBEL = "decibel"  # the dimension of a logarithm, which no field has
+
+
+def _words(dimensions: Mapping[str, str]) -> Iterator[tuple[str, tuple[str, float]]]:
+    for symbol, words in _SI_WORDS.items():
+        for word in words.split():
+            yield word, (dimensions[symbol], 1.0)
+            for prefix, size in _PREFIX_WORDS.items():
+                yield f"{prefix}{word}", (dimensions[symbol], size)
+    for unit, words in _OTHERS.items():
+        yield from ((word, unit) for word in words.split())
+
+
+def dictionary(dimensions: Mapping[str, str]) -> dict[str, tuple[str, float]]:
+    """Dimension and factor to SI by each word in small letters; `dimensions` are those of the SI units."""
+    return dict(_words(dimensions))
+
 
 _PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "μ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
 _BASES = {
@@ -262,3 +368,70 @@ def lab_field(heading: str) -> tuple[str, float] | None:
 def _stem(field: str) -> str:
     suffix = LAB[field].unit.lower().replace("/", "_per_")
     return field.removesuffix(f"_{suffix}")
+
+
+Exponents = tuple[int, int, int, int]  # of length, force, charge and time
+
+NO_DIMENSION: Exponents = (0, 0, 0, 0)
+_EXPONENTS: dict[str, Exponents] = {
+    "length": (1, 0, 0, 0),
+    "force": (0, 1, 0, 0),
+    "charge": (0, 0, 1, 0),
+    "time": (0, 0, 0, 1),
+    "pressure": (-2, 1, 0, 0),
+    "frequency": (0, 0, 0, -1),
+    "voltage": (1, 1, -1, 0),
+    "current": (0, 0, 1, -1),
+    "acceleration": (1, 0, 0, -2),
+}
+_SI = ("m", "N", "C", "s", "Pa", "Hz", "V", "A", "m/s^2")
+_PARTS = ("m", "N", "C", "s", "V")
+_FRF = "C/N"  # before m/V, which has the same dimension
+_SI_RATIOS = (_FRF, *(f"{above}/{below}" for above, below in product(_PARTS, _PARTS) if above != below))
+
+
+def times(first: Exponents, second: Exponents, sign: int = 1) -> Exponents:
+    """The exponents of a product; of the quotient where `sign` is -1."""
+    length, force, charge, time = (one + sign * other for one, other in zip(first, second, strict=True))
+    return length, force, charge, time
+
+
+def exponents(label: str) -> Exponents | None:
+    """Those of a unit, `1` for a number without one; None where the unit is not known here."""
+    if label == "1":
+        return NO_DIMENSION
+    known = unit(label)
+    if known is None:
+        return None
+    parts = [_EXPONENTS.get(part) for part in known.dimension.split("/")]
+    result, *below = parts
+    for part in below:
+        result = None if result is None or part is None else times(result, part, -1)
+    return result
+
+
+def ratio_of(label: str, signal: str, quantity: str) -> Exponents | None:
+    """The exponents of label/signal · quantity; None where a unit is not known here."""
+    given, divided, measured = exponents(label), exponents(signal), exponents(quantity)
+    if given is None or divided is None or measured is None:
+        return None
+    return times(times(given, divided, -1), measured)
+
+
+def label_of(dimension: Exponents, preferred: Iterable[str]) -> str | None:
+    """A unit of these exponents: the first preferred one that has them, else that of SI; empty where they are all 0.
+
+    None where no single unit, and no quotient of two, has them.
+    """
+    if dimension == NO_DIMENSION:
+        return ""
+    return next((label for label in (*preferred, *_SI, *_SI_RATIOS) if exponents(label) == dimension), None)
+
+
+def described(dimension: Exponents) -> str:
+    """In words for an error: `m`, `N·m^-2`, "no unit"."""
+    label = label_of(dimension, ())
+    if label is not None:
+        return f"the unit {label}" if label else "no unit"
+    powers = [f"{base}^{power}" if power != 1 else base for base, power in zip(_SI, dimension, strict=False) if power]
+    return f"the unit {'·'.join(powers)}"

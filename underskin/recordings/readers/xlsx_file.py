@@ -1,18 +1,149 @@
-"""Workbooks (.xlsx, .xlsm): each sheet is read as the CSV that it would be saved as.
+"""The sheets of a workbook (.xlsx, .xlsm) as tables of text: a line a row, cells separated by tabs.
+
+Formulas count by the value that the spreadsheet program kept; nothing is computed, no macro and no link is followed.
+Dates are in the lab's time zone. A workbook is a ZIP archive of XML: what it unfolds to is limited, and XML that
+declares entities is refused.
+
+Workbooks (.xlsx, .xlsm): each sheet is read as the CSV that it would be saved as.
 
 One sheet may be the campaign of csv_template.py, or what stands above its table, and another the table. Otherwise each
 sheet with a table of numbers is a block by the sheet's name, as csv_file.py reads it; others are left out, with a
 warning.
 """
 
+import re
+import warnings
+import zipfile
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from datetime import date, datetime, time
 from io import BytesIO
 from typing import Any, BinaryIO
 
-from underskin.errors import FileError
+import openpyxl
+
+from underskin.errors import FileError, damage_said
 from underskin.recordings.channels import Contents, Document
-from underskin.recordings.readers import csv_file, csv_template
-from underskin.recordings.readers.workbook_sheets import WorkbookSheets
+from underskin.recordings.readers import csv_file, csv_template, text
+from underskin.recordings.readers.calendar_times import time_zone
+from underskin.recordings.readers.parsing_limits import EXPANSION, ParsingLimits
+
+SEPARATOR = "\t"
+_WORKBOOK = "xl/workbook.xml"
+_OTHERS = {
+    "xl/workbook.bin": "is a binary workbook (.xlsb): save it as .xlsx or CSV",
+    "content.xml": "is an OpenDocument file: save the table as .xlsx or CSV",
+    "word/document.xml": "is a Word document: save the table as .xlsx or CSV",
+    "ppt/presentation.xml": "is a presentation: save the table as .xlsx or CSV",
+}
+_SHEETS = re.compile(r"xl/worksheets/[^/]+\.xml")
+_FORMULA = re.compile(rb"<(\w+:)?f[\s/>]")
+_DECLARATION = re.compile(rb"<!(DOCTYPE|ENTITY)|<\0!\0(D\0O\0C|E\0N\0T)|\0<\0!\0(D\0O\0C|E\0N\0T)")
+_BLOCK, _OVERLAP = 1 << 20, 32
+_BLANKS = re.compile(r"\s+")
+
+
+class WorkbookSheets:
+    """The visible sheets of an open workbook; `notes`: what the user should know.
+
+    Raises FileError where it is none, is damaged, or unfolds to more than the settings allow.
+    """
+
+    def __init__(self, stream: BinaryIO, file: str) -> None:
+        self._file = file
+        self._zone = time_zone()
+        self.notes: list[str] = []
+        with damage_said(file, "", lambda error: f"is a damaged workbook or ZIP archive: {error}"):
+            with zipfile.ZipFile(stream) as archive:
+                has_formulas = self._inspected(archive, stream.seek(0, 2))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # about what is not read
+                self._books = [self._opened(stream, values=True)]
+                if has_formulas:
+                    self._books.append(self._opened(stream, values=False))
+
+    @staticmethod
+    def _opened(stream: BinaryIO, *, values: bool) -> Any:
+        return openpyxl.load_workbook(stream, read_only=True, data_only=values, keep_links=False)
+
+    def _inspected(self, archive: zipfile.ZipFile, size: int) -> bool:
+        """Whether any sheet has a formula; every part is unfolded once, before anything understands it."""
+        names = archive.namelist()
+        if _WORKBOOK not in names:
+            known = (what for name, what in _OTHERS.items() if name in names)
+            raise FileError(self._file, "", next(known, "is a ZIP archive: send the files in it"))
+        left = most = ParsingLimits.from_environment().content_bytes(size)
+        formulas = False
+        for name in names:
+            with archive.open(name) as part:
+                end = b""
+                while data := part.read(_BLOCK):
+                    left -= len(data)
+                    if left < 0:
+                        reason = f"it unfolds to more than {most / 1e6:.0f} MB, too much for a file of its size"
+                        raise FileError(self._file, name, f"{reason} ({EXPANSION})")
+                    seen, end = end + data, data[-_OVERLAP:]
+                    if _DECLARATION.search(seen):
+                        raise FileError(self._file, name, "declares a document type or entities, as no workbook does")
+                    formulas = formulas or (bool(_SHEETS.fullmatch(name)) and bool(_FORMULA.search(seen)))
+        return formulas
+
+    def texts(self) -> Iterator[tuple[str, str]]:
+        """Each visible sheet that has any cell: its name and its text; raises FileError that names sheet and cell."""
+        for number, sheet in enumerate(self._books[0].worksheets):
+            if sheet.sheet_state != "visible":
+                self.notes.append(f"sheet {sheet.title!r} is hidden, and is left out")
+                continue
+            with (
+                warnings.catch_warnings(),
+                damage_said(self._file, f"sheet {sheet.title!r}", lambda error: f"is damaged: {error}"),
+            ):
+                warnings.simplefilter("ignore")
+                sheets = [book.worksheets[number] for book in self._books]
+                lines = [SEPARATOR.join(map(self._text, row)).rstrip(SEPARATOR) for row in self._rows(sheets)]
+            while lines and not lines[-1]:
+                lines.pop()
+            if lines:
+                yield sheet.title, "\n".join(lines)
+
+    def _rows(self, sheets: Sequence[Any]) -> Iterator[Sequence[Any]]:
+        """The values of each row of a sheet; `sheets`: the sheet, and where there are formulas the same with them."""
+        for sheet in sheets:
+            sheet.reset_dimensions()  # what is declared may be wrong
+        if len(sheets) == 1:
+            yield from sheets[0].iter_rows(values_only=True)
+            return
+        for row, written in zip(*(sheet.iter_rows() for sheet in sheets), strict=True):
+            for cell, as_written in zip(row, written, strict=True):
+                # A text formula may well have kept an empty text.
+                if cell.value is None and as_written.data_type == "f" and cell.data_type != "str":
+                    reason = "holds a formula without a value: open the workbook in a spreadsheet program and save it"
+                    raise FileError(self._file, f"sheet {cell.parent.title!r}, cell {cell.coordinate}", reason)
+            yield [cell.value for cell in row]
+
+    def _text(self, value: Any) -> str:
+        """A cell as the CSV would have it."""
+        match value:
+            case None:
+                return ""
+            case bool():
+                return str(value).lower()
+            case int() | float():
+                return repr(value)
+            case datetime():
+                return self._zoned(value)
+            case date() | time():
+                return value.isoformat()
+        written = _BLANKS.sub(" ", str(value)).strip()
+        if "," in written and not text.is_grouped(written) and text.number(written, ",") is not None:
+            return written.replace(",", ".")  # as numbers are written here
+        return f'"{written.replace(chr(34), chr(34) * 2)}"' if '"' in written else written
+
+    def _zoned(self, moment: datetime) -> str:
+        told = f"times in cells are taken to be in the zone {self._zone} (UNDERSKIN_TIME_ZONE)"
+        if told not in self.notes:
+            self.notes.append(told)
+        return moment.replace(microsecond=0, tzinfo=self._zone).isoformat()
 
 
 def read(stream: BinaryIO, file: str) -> Contents | Document:
@@ -80,9 +211,9 @@ def _tables(sheets: dict[str, str], file: str) -> Contents:
     """The tables of all sheets; raises FileError where none holds one."""
     tables: dict[str, Contents] = {}
     errors: list[FileError] = []
-    for name, text in sheets.items():
+    for name, sheet in sheets.items():
         try:
-            tables[name] = csv_file.read(BytesIO(text.encode()), file)
+            tables[name] = csv_file.read(BytesIO(sheet.encode()), file)
         except csv_file.NoTable as error:
             errors.append(_on_sheet(name, error))
         except FileError as error:

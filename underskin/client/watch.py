@@ -1,0 +1,420 @@
+"""A folder watched for campaigns, which are sent to the service.
+
+Which files of a folder are complete: instruments write for a while, and leave temporary files beside.
+
+The journal of a watched folder: what became of each content that was sent, kept in the folder itself.
+
+`.underskin-watch.json` has a line for its schema, and one for each entry, which is appended; a last line that a power
+cut left unfinished is ignored. A file without an entry is sent again, which the service answers as before and keeps
+once, as long as name, rig and estimator are the same.
+
+Sending what is complete in a folder: once each, again after an outage, never again what was refused.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import stat
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any, TextIO
+
+from underskin.client.campaigns import content_key, content_sha256
+from underskin.client.service_client import Client
+from underskin.errors import FileError, ServiceError, UnderskinError, Unreachable
+from underskin.recordings.frf.estimators import Estimator
+from underskin.recordings.readers.parsing_limits import MEMORY_MB, SECONDS
+from underskin.recordings.reading import read_contents
+
+_PATIENCE = 12  # times as long as a file must be unchanged, before one that no reader opens is taken as it is
+_RETRIES, _LONGER = (
+    5,
+    4,
+)  # of a file whose refusal may pass, and how many times as long the wait is from one to the next
+_TEMPORARY = (".part", ".partial", ".tmp", ".temp", ".crdownload", ".lock", "~")
+_BESIDE = (".tdms_index",)  # LabVIEW's index of a file, which holds nothing of its own
+
+
+@dataclass
+class _Seen:
+    """A file as it was: size, time of change, since when (monotonic, s), whether a reader opens it as it is, how often
+    it was postponed, and until when."""
+
+    size: int
+    changed_ns: int
+    since: float
+    opens: bool | None = None
+    retries: int = 0
+    not_before: float = 0.0
+    done: bool = False
+
+
+class WatchedFolder:
+    """The files of a folder and of the folders in it; hidden, temporary and empty ones are left out.
+
+    A file is complete when its size and its time have not changed for `settle_s` and a reader of its format opens it;
+    one that none opens is complete after a further while, for the service to say what is wrong with it.
+    """
+
+    def __init__(self, path: Path, settle_s: float) -> None:
+        self.path = path
+        self._settle_s = settle_s
+        self._seen: dict[Path, _Seen] = {}
+        self.unreadable: dict[Path, OSError] = {}  # what `settled` could not look at, and left out
+
+    def settled(self) -> list[Path]:
+        """Files that do not change any more and are not done, the oldest first; OSError where the folder is gone."""
+        now = time.monotonic()
+        seen = {}
+        self.unreadable = {}
+        for path, status in self._files():
+            known = self._seen.get(path)
+            if known is None or (known.size, known.changed_ns) != (status.st_size, status.st_mtime_ns):
+                known = _Seen(status.st_size, status.st_mtime_ns, now)
+            seen[path] = known
+        self._seen = seen
+        settled = [
+            path
+            for path, one in seen.items()
+            if not one.done and now - one.since >= self._settle_s and now >= one.not_before
+        ]
+        return sorted(settled, key=lambda path: seen[path].changed_ns)
+
+    def is_complete(self, path: Path) -> bool:
+        """Whether a settled file is complete."""
+        seen = self._seen[path]
+        if seen.opens is None:
+            seen.opens = _opens(path)
+        return seen.opens or time.monotonic() - seen.since >= (1 + _PATIENCE) * self._settle_s
+
+    def is_unchanged(self, path: Path) -> bool:
+        """Whether a file still is as it was when it was found settled."""
+        try:
+            status = path.stat()
+        except OSError:
+            return False
+        seen = self._seen[path]
+        return (status.st_size, status.st_mtime_ns) == (seen.size, seen.changed_ns)
+
+    def done(self, path: Path) -> None:
+        """A file is of no more interest until it changes."""
+        self._seen[path].done = True
+
+    def postpone(self, path: Path) -> None:
+        """Take a file for one that has just changed."""
+        self._seen[path].since = time.monotonic()
+
+    def retry_later(self, path: Path) -> float | None:
+        """Leave a file for a while, longer each time; the while (s), or None after the last time: the file is done."""
+        seen = self._seen[path]
+        if seen.retries == _RETRIES:
+            self.done(path)
+            return None
+        wait_s = self._settle_s * _PATIENCE * float(_LONGER**seen.retries)
+        seen.retries += 1
+        seen.not_before = time.monotonic() + wait_s
+        return wait_s
+
+    def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
+        for folder, folders, names in os.walk(self.path, onerror=self._leave_out):
+            folders[:] = [name for name in folders if not name.startswith(".")]
+            for name in names:
+                if name.startswith(".") or name.lower().endswith((*_TEMPORARY, *_BESIDE)):
+                    continue
+                path = Path(folder, name)
+                try:
+                    status = path.stat()
+                except FileNotFoundError:  # renamed meanwhile
+                    continue
+                except OSError as error:  # such as a link to itself
+                    self._leave_out(error)
+                    continue
+                if stat.S_ISREG(status.st_mode) and status.st_size:
+                    yield path, status
+
+    def _leave_out(self, error: OSError) -> None:
+        """Go on without a file or folder; raises the error where it is of the watched folder itself."""
+        path = Path(error.filename)
+        if path == self.path:
+            raise error
+        if not isinstance(error, FileNotFoundError):  # a folder that was renamed meanwhile
+            self.unreadable[path] = error
+
+
+def _opens(path: Path) -> bool:
+    try:
+        read_contents(path, path.name)
+    except FileError:
+        return False
+    return True
+
+
+NAME = ".underskin-watch.json"
+_LOCK = ".underskin-watch.lock"
+_SCHEMA = "watch/2"
+_FIRST_SCHEMA = "watch/1"  # one JSON document with all entries
+_HEADING = json.dumps({"schema": _SCHEMA}) + "\n"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What became of a content (its SHA-256) at a service, for a skin: the campaigns that it is kept as, none where it
+    was refused. `terms` is a digest of what else was said of it: another rig may make sense of what was refused."""
+
+    sha256: str
+    file: str
+    url: str
+    skin: str
+    terms: str
+    campaigns: Sequence[str]
+    at: str
+
+    @property
+    def is_sent(self) -> bool:
+        """Whether the service keeps it."""
+        return bool(self.campaigns)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where contents go, and what is said of them, as `Entry` has it."""
+
+    url: str
+    skin: str
+    terms: str
+
+
+class Journal:
+    """The journal of one folder, locked against a second process; raises UnderskinError where it cannot be used."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / NAME
+        try:
+            self._lock = (folder / _LOCK).open("w")
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            raise UnderskinError(f"{folder} is watched by another process already") from None
+        except OSError as error:
+            raise UnderskinError(f"{folder / _LOCK} cannot be written and locked: {error.strerror}") from error
+        self._has_whole_lines = False  # of this schema, so that a line can be appended
+        self._entries = self._read()
+
+    def close(self) -> None:
+        """Let another process watch the folder."""
+        self._lock.close()
+
+    def known(self, target: Target, sha256: str) -> Entry | None:
+        """What became of a content: sent for this skin, or refused on these terms."""
+        for entry in reversed(self._entries):
+            same = (entry.sha256, entry.url, entry.skin) == (sha256, target.url, target.skin)
+            if same and (entry.is_sent or entry.terms == target.terms):
+                return entry
+        return None
+
+    def add(self, target: Target, sha256: str, file: str, campaigns: Sequence[str]) -> None:
+        """Keep what became of a content; it is on the disk afterwards. Raises UnderskinError."""
+        at = datetime.now(UTC).isoformat(timespec="seconds")
+        self._entries.append(Entry(sha256, file, target.url, target.skin, target.terms, list(campaigns), at))
+        try:
+            if self._has_whole_lines and self._path.exists():
+                with self._path.open("a", encoding="utf-8") as journal:
+                    _write(journal, [_line(self._entries[-1])])
+            else:
+                self._replace()
+                self._has_whole_lines = True
+        except OSError as error:
+            raise UnderskinError(f"the journal {self._path} cannot be written: {error.strerror}") from error
+
+    def _replace(self) -> None:
+        part = self._path.with_name(f"{NAME}.part")
+        with part.open("w", encoding="utf-8") as journal:
+            _write(journal, [_HEADING, *map(_line, self._entries)])
+        part.replace(self._path)
+        folder = os.open(self._path.parent, os.O_RDONLY)
+        try:
+            with suppress(OSError):  # of a network share, which may not have it
+                os.fsync(folder)  # which holds the name
+        finally:
+            os.close(folder)
+
+    def _read(self) -> list[Entry]:
+        try:
+            text = self._path.read_text(encoding="utf-8")
+            if text.startswith(_HEADING):
+                *lines, unfinished = text.removeprefix(_HEADING).split("\n")
+                self._has_whole_lines = not unfinished
+                return [Entry(**json.loads(line)) for line in lines]
+            document: Any = json.loads(text)
+            if document["schema"] != _FIRST_SCHEMA:
+                raise ValueError(f"it is {document['schema']}, not {_SCHEMA}")
+            return [Entry(**entry) for entry in document["entries"]]
+        except FileNotFoundError:
+            return []
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            self.close()
+            again = "move it away; what was sent is sent again then, and kept once"
+            raise UnderskinError(f"the journal {self._path} cannot be read: {error}; {again}") from error
+
+
+def _line(entry: Entry) -> str:
+    return json.dumps(asdict(entry)) + "\n"  # in ASCII: a name may hold letters that have no encoding
+
+
+def _write(journal: TextIO, lines: Iterable[str]) -> None:
+    """Write lines, onto the disk."""
+    journal.writelines(lines)
+    journal.flush()
+    os.fsync(journal.fileno())
+
+
+LOOK_S = 1.0  # between two looks at the folder
+_LONGEST_WAIT_S = 60.0  # between two tries of an outage
+# Answers that are about what was sent; any other failure is the service's, the network's or the key's, and may pass.
+_OF_THE_FILE = frozenset(
+    {
+        HTTPStatus.BAD_REQUEST,
+        HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+        HTTPStatus.UNSUPPORTED_MEDIA_TYPE,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+    }
+)
+
+Results = Sequence[Mapping[str, Any]]
+
+
+class Watcher:
+    """Sends the complete files of a folder to a service, for a skin.
+
+    `kept` is called with the file's name and the results once they are in the journal, `told` with what else happens:
+    whether it is well, and the words. All methods raise UnderskinError where the journal cannot be written.
+    """
+
+    def __init__(
+        self,
+        client: Client,
+        folder: WatchedFolder,
+        journal: Journal,
+        *,
+        url: str,
+        skin: str,
+        rig: Path | None,
+        estimator: Estimator | None,
+        kept: Callable[[str, Results], object],
+        told: Callable[[bool, str], object],
+    ) -> None:
+        self._client, self._folder, self._journal = client, folder, journal
+        self._url, self._skin, self._rig, self._estimator = url, skin, rig, estimator
+        self._kept, self._told = kept, told
+        self._outage_s = 0.0  # to wait before the next try; 0 while all is well
+        self._unopened: set[Path] = set()  # of which was told that they cannot be opened or looked at
+
+    def step(self) -> float:
+        """Send what is complete; the seconds to wait until the next step."""
+        try:
+            target = self._target()
+            settled = self._folder.settled()
+            for path, reason in self._folder.unreadable.items():
+                self._cannot_be("read", path, reason)
+            for path in settled:
+                if self._rig is None or path.resolve() != self._rig.resolve():
+                    self._take(path, target)
+        except (ServiceError, Unreachable, OSError) as error:
+            return self._outage(error)
+        self._goes_on()
+        return LOOK_S
+
+    def _take(self, path: Path, target: Target) -> None:
+        """Send one file, if it is complete and new; raises ServiceError, Unreachable for an outage."""
+        name = str(path.relative_to(self._folder.path))
+        try:
+            sha256 = content_sha256(path)
+            known = self._journal.known(target, sha256)
+            if known is not None:
+                if known.file != name:
+                    self._told(True, f"{name}: has the content of {known.file}, and is not sent")
+                self._folder.done(path)
+            elif self._folder.is_complete(path):
+                self._send(path, name, target, sha256)
+        except FileNotFoundError:  # renamed meanwhile: found by its new name
+            return
+        except OSError as error:
+            self._cannot_be("opened", path, error)
+            self._folder.postpone(path)
+
+    def _send(self, path: Path, name: str, target: Target, sha256: str) -> None:
+        terms: dict[str, Any] = {
+            "skin": self._skin,
+            "rig": self._rig,
+            "estimator": self._estimator,
+            "all_or_nothing": False,
+            "together": None,
+        }
+        key = content_key([path], terms)
+        if not self._folder.is_unchanged(path):  # since it was listed, others were sent and this one was read
+            return
+        results: Results = []
+        refusal = ""
+        try:
+            results = self._client.campaigns.post_files([path], **terms, idempotency_key=key)
+        except ServiceError as error:
+            if error.status not in _OF_THE_FILE:
+                raise
+            if _may_pass(error):
+                self._retry_later(path, name, error)
+                return
+            refusal = str(error)
+        self._goes_on()
+        unchanged = self._folder.is_unchanged(path)  # else what it is now is sent once it is complete
+        if unchanged:
+            self._journal.add(target, sha256, name, [result["id"] for result in results if result["id"] is not None])
+            self._folder.done(path)
+        if results:
+            self._kept(name, results)
+        elif unchanged:
+            self._told(False, f"{name}: {refusal}; it is left, and sent again once it has changed")
+
+    def _retry_later(self, path: Path, name: str, error: ServiceError) -> None:
+        """Leave a file that may be taken another time; it is not in the journal, so that a restart sends it again."""
+        self._goes_on()
+        wait_s = self._folder.retry_later(path)
+        left = "it is left, and sent again once it has changed or at the next start"
+        self._told(False, f"{name}: {error}; {left if wait_s is None else f'it is sent again in {wait_s:.0f} s'}")
+
+    def _cannot_be(self, what: str, path: Path, error: OSError) -> None:
+        """Tell once of a file or folder that cannot be read or opened."""
+        if path not in self._unopened:
+            self._unopened.add(path)
+            name = path.relative_to(self._folder.path)
+            self._told(False, f"{name}: cannot be {what}: {error.strerror}; it is tried again")
+
+    def _target(self) -> Target:
+        rig = None if self._rig is None else content_sha256(self._rig)
+        terms = hashlib.sha256(repr([rig, self._estimator]).encode()).hexdigest()
+        return Target(self._url, self._skin, terms)
+
+    def _outage(self, error: Exception) -> float:
+        """Wait longer from try to try; told at the first one."""
+        if not self._outage_s:
+            self._told(False, f"{error}; it is tried again until that is over")
+        self._outage_s = min(2 * self._outage_s, _LONGEST_WAIT_S) or LOOK_S
+        return self._outage_s
+
+    def _goes_on(self) -> None:
+        if self._outage_s:
+            self._told(True, "sending goes on")
+        self._outage_s = 0.0
+
+
+def _may_pass(error: ServiceError) -> bool:
+    """Whether a refusal of a file may be another one next time: by a proxy, for its size, or since reading it took
+    longer or more memory than a busy server had."""
+    if error.is_foreign or error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
+        return True
+    return any(setting in entry["allowed"] for entry in error.problem["errors"] for setting in (SECONDS, MEMORY_MB))

@@ -1,0 +1,699 @@
+"""Hypotheses fitted: costs and their derivatives at many points at once, begun, settled and improved.
+
+Mean parameters take damped Gauss–Newton steps within the bounds; each point has its own damping, and rests once it has
+converged. What only enters the covariance (gain and position scatter, line level, and a mechanism's spread or pick-up)
+follows by Newton steps on the likelihood of the predictions at hand, which cost no model evaluation.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from underskin.autodiff import contiguous
+from underskin.diagnosis.inference.hypothesis import (
+    Evaluated,
+    FitPoint,
+    Hypothesis,
+    KnowledgeOfSeveral,
+    Likelihoods,
+    Points,
+    log_likelihoods,
+    normal_equations,
+    own_places,
+)
+from underskin.diagnosis.inference.least_squares import LeastSquares
+from underskin.diagnosis.inference.products import FrfProducts, Products, joined
+from underskin.diagnosis.noise import GAIN_PRIOR, POSITION_PRIOR, START_GAIN, SeveralLevels
+from underskin.mechanisms.models.composition import SENSOR_SPREAD
+from underskin.mechanisms.models.curves import CurveModel
+from underskin.mechanisms.models.frf import FrfModels
+from underskin.recordings.campaign import curves_of
+from underskin.units import Floats, Indices, Mask
+
+GAIN, LEVEL, POSITION = 0, 1, 2  # places among the covariance's parameters, the last where there is such scatter
+SMOOTH = 2  # of curves, which have no place
+_FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
+_NUMBERS_AT_ONCE = 500_000
+_PREDICTED_AT_ONCE = 1_000_000
+_BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
+_LARGEST_D33_STEP = 1.0  # of log d33
+_POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
+_SETTLING = 20
+_OFF_SAMPLE = 1e-6  # of the gap between two samples: a contact point at a sample is past it
+_SOFTER = (1.0, 0.25, 0.06)
+_DEPTHS = (np.geomspace(1.5, 0.003, 24), np.geomspace(0.8, 1.25, 9), np.geomspace(0.96, 1.04, 7))  # of the one before
+_SMOOTH_STARTS = (np.log(1e-3), np.log(3e-2))  # of curves: close fit, and loose
+_CURVE_SETTLING = 8
+_PROMISED, _MARGIN = 10.0, 2.0  # times what the gradient says, and nats beyond, that a fit may still gain
+_SLOPE_STEP = 1e-4  # of a parameter's range, for differences of the position's slopes
+_LARGEST_MEAN_STEP = 1.0
+_CONVERGED = 0.01  # in log posterior
+_MOST_ITERATIONS = 25
+_LEAST_CURVATURE = 1e-10
+_MAY_GAIN = 60.0  # nats that a fit of curves may still gain beyond the least-squares one's
+Target = Callable[[Evaluated], Floats]  # costs (points,) that points must get below to be of any use
+
+
+class Fitter:
+    """Evaluates, begins and improves points of hypotheses of the same recordings, which have the same covariance
+    parameters."""
+
+    def __init__(self, hypotheses: Sequence[Hypothesis], held: Sequence[Collection[int]] | None = None) -> None:
+        """Prepare the names and bounds; the parameters of each hypothesis at `held` stay where a point has them, and
+        have no prior."""
+        self.hypotheses = tuple(hypotheses)
+        first = hypotheses[0]
+        self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
+        self.covariance = first.covariance
+        self._covariance_prior = np.array([entry.prior.row for entry in self.covariance])
+        self._lowest = np.array([entry.low for entry in self.covariance])
+        self._highest = np.array([entry.high for entry in self.covariance])
+        self.counts = [len(entry.model.parameters) for entry in hypotheses]
+        shape = len(hypotheses), max(self.counts)
+        self.free = np.zeros(shape, dtype=bool)
+        self.low, self.high, self._precision, self._centre = (np.zeros(shape) for _ in range(4))
+        self._freedom = np.full(shape, np.inf)
+        self._log_prior_height = np.zeros(len(hypotheses))
+        for number, hypothesis in enumerate(hypotheses):
+            places = [place for place in hypothesis.mean_places if held is None or place not in held[number]]
+            self.free[number, places] = True
+            self.low[number, : self.counts[number]], self.high[number, : self.counts[number]] = hypothesis.bounds
+            of_priors = hypothesis.priors[:, places]
+            self._precision[number, places], self._centre[number, places] = of_priors[:2]
+            self._log_prior_height[number], self._freedom[number, places] = of_priors[2].sum(), of_priors[3]
+        self._range = self.high - self.low
+        each = [entry.knowledge for entry in hypotheses]
+        self._known = KnowledgeOfSeveral(each, shape[1]) if any(one is not None for one in each) else None
+        # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
+        self.own = np.array(
+            [
+                [place for place, entry in enumerate(one.model.parameters) if entry.moves_covariance]
+                for one in hypotheses
+            ],
+            dtype=np.intp,
+        ).reshape(len(hypotheses), -1)
+        own = [first.model.parameters[place] for place in self.own[0]]
+        self._common = len(self.covariance) - len(own)
+        spreads = [self._common + place for place, entry in enumerate(own) if entry.acts_on == "gain_spread"]
+        self._spread = spreads[0] if spreads else None
+
+    @property
+    def no_bend(self) -> Floats:
+        """Log gains of the sensors that are all 0."""
+        return np.zeros(self.lines.sensors.shape[1])
+
+    def at(self, point: FitPoint) -> Points:
+        """One point of the first hypothesis."""
+        return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.bend[None])
+
+    def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
+        """Predict, with derivatives unless they are not needed, and weigh."""
+        products = self.products(points, slopes=slopes, place=self.placed)
+        return self.weighed(points, products)
+
+    def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
+        """The inner products at points."""
+        if self.lines.curves:
+            edges = np.searchsorted(points.owner, np.arange(len(self.hypotheses) + 1))
+            parts = [
+                hypothesis.curve_products(points.fit[low:high, :count], slopes=slopes)
+                for hypothesis, count, low, high in zip(
+                    self.hypotheses, self.counts, edges[:-1], edges[1:], strict=True
+                )
+                if high > low
+            ]
+            return joined(parts, max(self.counts))
+        several = self._at_once(points, max(self.counts) if slopes else 0)
+        return joined([self._frf_products(points[some], slopes, place) for some in several], max(self.counts))
+
+    def _at_once(self, points: Points, variables: int) -> list[slice]:
+        """Which points are worked out at once, so that arrays with derivatives by so many variables stay small."""
+        largest = max(hypothesis.frf_model.numbers(variables) for hypothesis in self.hypotheses)
+        count = max(_PREDICTED_AT_ONCE // largest, 1)
+        return [slice(first, first + count) for first in range(0, len(points), count)]
+
+    @cached_property
+    def _models(self) -> FrfModels:
+        return FrfModels([hypothesis.frf_model for hypothesis in self.hypotheses])
+
+    def place_slopes(self, points: Points) -> Floats:
+        """∂m/∂x and ∂m/∂y of recordings, before the dynamics (2, points, recordings)."""
+        slopes = np.empty((2, len(points), self.lines.recordings))
+        for some in self._at_once(points, 0):
+            part = points[some]
+            for rows, response in self._models.respond(part.owner, part.fit, slopes=False, place=True, lines=False):
+                slopes[:, some][:, rows] = response.place_slopes
+        return slopes
+
+    def _frf_products(self, points: Points, slopes: bool, place: bool) -> FrfProducts:
+        """The inner products at points that are worked out at once."""
+        parts = self._models.respond(points.owner, points.fit, slopes=slopes, place=place)
+        each = []
+        for rows, response in parts:
+            own = self.hypotheses[points.owner[rows[0]]]
+            each.append(FrfProducts.of(own.frf_lines, own.pickup_rows, response))
+        order = np.argsort(np.concatenate([rows for rows, _ in parts]))
+        if len(parts) == 1:  # whose points come in the order of what presses their contacts
+            return each[0] if (np.diff(order) == 1).all() else each[0][order]
+        return FrfProducts.joined(each, max(self.counts))[order]
+
+    def weighed(self, points: Points, products: Products) -> Evaluated:
+        """Points whose predictions are known, with the sensors' gains that belong to them where these are free."""
+        if self._spread is not None:
+            for _ in range(_BENDINGS):
+                levels = self.levels(points.covariance[:, None])
+                gains = Likelihoods(self.lines, self.curvature, products, levels, points.bend).sensor_gains
+                free = levels.spread[:, 0] >= _FREE_SPREAD
+                bend = np.where(free, np.clip(gains, -_LARGEST_BEND, _LARGEST_BEND), points.bend)
+                bent = np.abs(bend - points.bend).max()
+                if bent < _BENT:
+                    break
+                points = replace(points, bend=bend)
+        return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
+
+    def marginal(self, at: Evaluated) -> Likelihoods:
+        """The likelihoods at points."""
+        levels = self.levels(at.points.covariance[:, None])
+        return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.bend)
+
+    def levels(self, covariance: Floats) -> SeveralLevels:
+        """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
+        values = np.exp(covariance[..., None])
+        shape = (*covariance.shape[:-1], 1)
+        own = {entry.name: values[..., column, :] for column, entry in enumerate(self.covariance)}
+        pickup = self.hypotheses[0].model.pickup
+        return SeveralLevels(
+            gain=values[..., GAIN, :],
+            level=values[..., LEVEL, :],
+            position=values[..., POSITION, :] if self.placed else np.zeros(shape),
+            spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
+            pickup=None if pickup is None else pickup.deviation(own),
+            smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
+        )
+
+    def _costs(self, points: Points, products: Products, covariances: Floats) -> Floats:
+        """The costs (points, sets) with covariance parameters (points, sets, parameters), where points predict."""
+        from underskin.diagnosis.inference.kernels import log_priors
+
+        pickup = self.hypotheses[0].model.pickup
+        if pickup is not None or self.lines.curves:
+            rows = len(self.lines.value) if pickup is None else 4 * self.lines.recordings
+            at_once = max(_NUMBERS_AT_ONCE // (covariances.shape[1] * rows), 1)
+            if len(points) > at_once:
+                parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
+                return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
+        covariances = contiguous(covariances)
+        each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend)
+        bounds = self.free, self.low, self.high, self._precision, self._centre
+        heights = self._freedom, self._log_prior_height
+        log_priors(points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, each)
+        if self._known is not None:
+            each += self._known.log_densities(points)[:, None]
+        return -each
+
+    def costs(self, at: Evaluated, covariances: Floats) -> Floats:
+        """The costs (points, sets) at the same predictions with other covariance parameters (points, sets, …)."""
+        return self._costs(at.points, at.products, covariances)
+
+    def posterior_equations(self, at: Evaluated) -> tuple[Floats, Floats]:
+        """Information and gradient of the log posterior in the mean parameters (points, parameters, parameters).
+
+        What is held or no parameter has gradient 0 and information 1 of its own.
+        """
+        levels, bend = self.levels(at.points.covariance[:, None]), at.points.bend
+        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, bend, at.growth)
+        owner = at.points.owner
+        free = self.free[owner]
+        away = at.points.fit - self._centre[owner]
+        precision = self._prior_precision(owner, away)
+        if self._known is not None:
+            of_others, towards = self._known.equations(at.points)
+            information, gradient = information + of_others, gradient + towards
+        gradient = np.where(free, gradient - precision * away, 0.0)
+        information = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
+        diagonal = np.arange(free.shape[1])
+        information[:, diagonal, diagonal] += np.where(free, precision, 1.0)
+        return information, gradient
+
+    def _prior_precision(self, owner: Indices, away: Floats) -> Floats:
+        """What a quadratic with the prior's gradient has for its precision, so far `away` from the centres (points,
+        parameters): less and less in heavy tails."""
+        precision, freedom = self._precision[owner], self._freedom[owner]
+        with np.errstate(invalid="ignore"):
+            weight = (freedom + 1) / (freedom + precision * away**2)
+        return np.where(np.isfinite(freedom), weight, 1.0) * precision
+
+    def with_covariance(self, points: Points, covariance: Floats) -> Points:
+        """The points with other covariance parameters, a mechanism's own among the coordinates of the fit."""
+        fit = points.fit.copy()
+        np.put_along_axis(fit, self.own[points.owner], covariance[:, self._common :], axis=1)
+        return replace(points, covariance=covariance, fit=fit)
+
+    def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
+        """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
+
+        Several of a mechanism's own hang together, so that steps of one at a time would creep.
+        """
+        if isinstance(at.products, FrfProducts) and not self.own.size and self.hypotheses[0].model.pickup is None:
+            return self._settled_apart(at, at.products, steps, held)
+        from underskin.diagnosis.inference.kernels import LARGEST_STEP, LEAST_GAIN, SHORTER, TRIES
+
+        low, high = self._lowest, self._highest
+        points, cost, moving = at.points, at.cost.copy(), np.arange(len(at))
+        products = at.products.values
+        for _ in range(steps):
+            part = Evaluated(points, products, cost.copy()).some(moving)
+            gradient, hessian = self.covariance_equations(part, first_mixed=self._common)
+            if held is not None:
+                hessian[:, held, :] = hessian[:, :, held] = gradient[:, held] = 0.0
+            eigenvalues, vectors = np.linalg.eigh(hessian)
+            along = np.einsum("nij,ni->nj", vectors, gradient) / np.maximum(np.abs(eigenvalues), 1.0)
+            step = -np.einsum("nij,nj->ni", vectors, along)
+            here = part.points.covariance
+            outwards = ((here <= low) & (step < 0)) | ((here >= high) & (step > 0))
+            step = np.where(outwards, 0.0, step)
+            step *= np.minimum(1.0, LARGEST_STEP / np.maximum(np.abs(step).max(axis=1), 1e-12))[:, None]
+            covariance, reached, gained = here.copy(), part.cost.copy(), np.zeros(len(part))
+            trying = np.arange(len(part))
+            for _ in range(TRIES):
+                tried = np.clip(here[trying] + step[trying], low, high)
+                costs = self.costs(part.some(trying), tried[:, None])[:, 0]
+                lower = costs < part.cost[trying]
+                better = trying[lower]
+                covariance[better], reached[better] = tried[lower], costs[lower]
+                gained[better] = part.cost[better] - costs[lower]
+                trying = trying[~lower]
+                if not len(trying):
+                    break
+                step = step / SHORTER
+            whole = points.covariance.copy()
+            whole[moving] = covariance
+            points = self.with_covariance(points, whole)
+            cost[moving] = reached
+            moving = moving[gained >= LEAST_GAIN]
+            if not len(moving):
+                break
+        return Evaluated(points, at.products, cost, at.growth)
+
+    def _settled_apart(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
+        """The same where no mechanism acts on the covariance: each parameter moves on its own."""
+        from underskin.diagnosis.inference.kernels import settle
+
+        covariance, cost = at.points.covariance.copy(), at.cost.copy()
+        about_means, numbers = self.lines.about_means
+        place = products.place_slopes
+        size = np.zeros((len(at), 0)) if place is None or not self.placed else place[0] ** 2 + place[1] ** 2
+        settle(
+            *map(contiguous, (products.level, products.uu, products.uy, products.yy, size)),
+            self.lines.sensor,
+            contiguous(at.points.bend),
+            self.curvature.laplacian,
+            self.curvature.square,
+            about_means,
+            float(numbers),
+            SENSOR_SPREAD,
+            self.placed,
+            self._covariance_prior,
+            self._lowest,
+            self._highest,
+            steps,
+            -1 if held is None else held,
+            covariance,
+            cost,
+        )
+        return replace(at, points=replace(at.points, covariance=covariance), cost=cost)
+
+    def covariance_equations(self, at: Evaluated, *, first_mixed: int = 0) -> tuple[Floats, Floats]:
+        """Gradient and Hessian of the costs in the covariance parameters, by differences; without mixed terms of the
+        parameters before the `first_mixed`."""
+        from underskin.diagnosis.inference.kernels import STEP
+
+        here = at.points.covariance
+        count = here.shape[1]
+        steps = STEP * np.eye(count)
+        # Far enough inside the bounds for the differences
+        centre = np.clip(here, self._lowest + 2 * STEP, self._highest - 2 * STEP)
+        pairs = [(a, b) for a in range(count) for b in range(first_mixed, a)]
+        both = [steps[a] + steps[b] for a, b in pairs]
+        shifts = np.array([np.zeros(count), *steps, *-steps, *both, *(-step for step in both)])
+        costs = self.costs(at, centre[:, None] + shifts)
+        middle, up, down = costs[:, :1], costs[:, 1 : count + 1], costs[:, count + 1 : 2 * count + 1]
+        alone = up + down - 2 * middle
+        gradient = (up - down) / (2 * STEP)
+        hessian = alone[:, :, None] / STEP**2 * np.eye(count)
+        together = costs[:, 2 * count + 1 :].reshape(len(at), 2, -1).sum(axis=1) - 2 * middle
+        for place, (a, b) in enumerate(pairs):
+            hessian[:, a, b] = (together[:, place] - alone[:, a] - alone[:, b]) / (2 * STEP**2)
+            hessian[:, b, a] = hessian[:, a, b]
+        return gradient + np.einsum("nij,nj->ni", hessian, here - centre), hessian
+
+    def start(self, own: Sequence[Floats], parents: Sequence[FitPoint | None]) -> Points:
+        """Points of each hypothesis with these coordinates of its mechanisms (points, own), and the nuisances of a
+        parent or at their centre; noise as it is usual."""
+        owner = np.repeat(np.arange(len(own)), [len(entry) for entry in own])
+        fit = np.zeros((len(owner), max(self.counts)))
+        for number, (entry, values, parent) in enumerate(zip(self.hypotheses, own, parents, strict=True)):
+            count, mechanisms = self.counts[number], entry.own_parameters
+            nuisances = [parameter.start for parameter in entry.model.parameters[mechanisms:]]
+            if parent is not None:
+                nuisances = parent.fit[len(parent.fit) - (count - mechanisms) :].tolist()
+            rows = owner == number
+            fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
+        common = [GAIN_PRIOR.middle, 0.0]
+        if self.placed:
+            common.append(POSITION_PRIOR.middle)
+        if self.lines.curves:
+            common.append(self.hypotheses[0].smooth.middle)
+        of_mechanisms = np.take_along_axis(fit, self.own[owner], axis=1)
+        covariance = np.concatenate([np.tile(common, (len(owner), 1)), of_mechanisms], axis=1)
+        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(owner), 1)))
+
+    def begin(
+        self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
+    ) -> Evaluated:
+        """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
+        points = self.start(own, parents or [None] * len(own))
+        products = self.products(points, slopes=slopes, place=self.placed)
+        if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
+            return self.weighed(points, products)
+        ratio = self._ratio(points, products)
+        if isinstance(products, FrfProducts):
+            return self.weighed(*self._scaled(points, products, ratio))
+        return self.evaluate(self._times(points, ratio)[0], slopes=slopes)
+
+    def _ratio(self, points: Points, products: Products) -> Floats:
+        """What measured recordings are of the predicted ones (points,): their mean, weighed by noise and scatter."""
+        sums = products.summed(self.levels(points.covariance[:, None]))
+        uu, uy = sums.uu[:, 0], sums.uy[:, 0]
+        level = products.level
+        weight = 1 / (1 + START_GAIN**2 * level**2 * uu)
+        return np.asarray((weight * level * uy).sum(axis=1) / np.maximum((weight * level**2 * uu).sum(axis=1), 1e-300))
+
+    def with_scatter(self, points: Points) -> Points:
+        """For each point fitted without positioning scatter, the best of a few scales of it, d33 following each.
+
+        Where the scatter is large, what was fitted without it may be far off: also from the nuisances' centres.
+        """
+        fresh = points.fit.copy()
+        for number, (hypothesis, count) in enumerate(zip(self.hypotheses, self.counts, strict=True)):
+            nuisances = slice(hypothesis.own_parameters, count)
+            starts = [entry.start for entry in hypothesis.model.parameters[nuisances]]
+            fresh[points.owner == number, nuisances] = starts
+        scales = np.log(_POSITION_STARTS)
+        gain, level, own = points.covariance[:, :1], points.covariance[:, 1:2], points.covariance[:, 2:]
+        common = np.minimum(gain, GAIN_PRIOR.middle), level
+        covariances = [np.concatenate([*common, np.full_like(gain, scale), own], axis=1) for scale in scales]
+        twice = np.repeat(np.arange(len(points)), 2)
+        is_fresh = np.tile([False, True], len(points))
+        both = points[twice]
+        both = replace(both, fit=np.where(is_fresh[:, None], fresh[twice], both.fit), covariance=covariances[0][twice])
+        products = self.products(both, slopes=True, place=True)
+        both, products = self._scaled(both, products, np.where(is_fresh, self._ratio(both, products), 1.0))
+        rows = np.repeat(np.arange(len(both)), len(scales))
+        each = np.stack(covariances, axis=1)[twice].reshape(len(rows), -1)
+        at = self._with_d33(self.weighed(self.with_covariance(both[rows], each), products[rows]))
+        sets = 2 * len(scales)
+        return at.points[at.cost.reshape(-1, sets).argmin(axis=1) + sets * np.arange(len(points))]
+
+    def _scaled(self, points: Points, products: Products, ratio: Floats) -> tuple[Points, Products]:
+        """Points with d33 so many times as large (points,), and what they predict."""
+        assert isinstance(products, FrfProducts)
+        moved, factor = self._times(points, ratio)
+        return moved, products.scaled(factor)
+
+    def _times(self, points: Points, ratio: Floats) -> tuple[Points, Floats]:
+        """With d33 so many times as large (points,), within its bounds, and by how much; as it is where not above 0."""
+        number, place = np.arange(len(points)), self._d33[points.owner]
+        fit = points.fit.copy()
+        change = np.log(np.where(ratio > 0, ratio, 1.0))
+        low, high = self.low[points.owner, place], self.high[points.owner, place]
+        fit[number, place] = np.clip(fit[number, place] + change, low, high)
+        return replace(points, fit=fit), np.exp(fit[number, place] - points.fit[number, place])
+
+    def _with_d33(self, at: Evaluated) -> Evaluated:
+        """With the d33 that the data would have at these noise levels: no further prediction."""
+        information, gradient = self.posterior_equations(at)
+        number, place = np.arange(len(at)), self._d33[at.points.owner]
+        step = np.clip(
+            gradient[number, place] / information[number, place, place], -_LARGEST_D33_STEP, _LARGEST_D33_STEP
+        )
+        return self.settle(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
+
+    @cached_property
+    def _d33(self) -> Indices:
+        """Where each hypothesis has the parameter that the prediction is proportional to."""
+        proportional = [[entry.proportional for entry in one.model.parameters] for one in self.hypotheses]
+        return np.array([own.index(True) for own in proportional])
+
+    @cached_property
+    def _moves_place(self) -> Mask:
+        """Which parameters of each hypothesis may change how σ depends on the contact's place (hypotheses, parameters),
+        relative to σ: not d33, nor those of the dynamics."""
+        moves = np.zeros(self.low.shape, dtype=bool)
+        for number, hypothesis in enumerate(self.hypotheses):
+            moves[number, : self.counts[number]] = [not entry.proportional for entry in hypothesis.model.parameters]
+            for name, own in own_places(hypothesis.model.names, self.lines).items():
+                moves[number, own] &= not self.lines.mechanisms[name].needs_lines
+        return moves
+
+    def improve(self, start: Points, target: Target | None = None) -> Evaluated:
+        """The most probable points near the starts; only roughly where their targets will not be reached."""
+        if not self.lines.curves:
+            return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
+        begun = by_least_squares(self, start)
+        as_they_are = self.settle(self.evaluate(start), _CURVE_SETTLING)
+        if as_they_are.cost.min() < begun.cost[0]:
+            begun = as_they_are[as_they_are.best()]
+        if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
+            return begun
+        return self.settle(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
+
+    def _between_samples(self, at: Evaluated) -> Self:
+        """Of what sticks, with contact points held between the samples where they are at one point."""
+        (hypothesis,) = self.hypotheses
+        if not any(self.lines.mechanisms[name].moves_contact_points for name in hypothesis.model.names):
+            return self
+        held = copy(self)
+        held.low, held.high = (
+            bound[None] for bound in between_samples(hypothesis, at.points.fit[0], self.low[0], self.high[0])
+        )
+        return held
+
+    def descend(self, best: Evaluated, settling: int, target: Target | None = None) -> Evaluated:
+        """Steps of the mean parameters, each followed by so many of the covariance's.
+
+        A point goes no further once it promises no cost below its target. What the gradient promises leaves out what
+        the noise levels may gain: where these are a curve's, or a mechanism's own, no point is left.
+        """
+        if self.lines.curves or self.own.size:
+            target = None
+        damping = np.full(len(best), 1e-3)
+        moving = np.arange(len(best))
+        for _ in range(_MOST_ITERATIONS):
+            part = best.some(moving)
+            step, slope = self._step(part, damping[moving])
+            if target is not None:
+                promising = part.cost - _PROMISED * slope - _MARGIN < target(best)[moving]
+                moving, part, step, slope = moving[promising], part[promising], step[promising], slope[promising]
+            resting = (slope < _CONVERGED) & self.grown(part)
+            going = np.ones(len(part), dtype=bool)
+            if resting.any():
+                settled = self.settle(part[resting], settling)
+                going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
+                best = self.replaced(best, moving[resting], settled)
+            stepping = ~resting
+            if stepping.any():
+                number = moving[stepping]
+                after, damping[number], going[stepping] = self._moved_on(
+                    part[stepping], step[stepping], damping[number], settling
+                )
+                best = self.replaced(best, number, after)
+            moving = moving[going]
+            if not len(moving):
+                break
+        return best
+
+    def _moved_on(self, at: Evaluated, step: Floats, damping: Floats, settling: int) -> tuple[Evaluated, Floats, Mask]:
+        """The points after steps, where these gain; their damping; and which of them are to go on.
+
+        A point that gains nothing learns first how the position's slopes change, then tries shorter steps.
+        """
+        owner = at.points.owner
+        fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
+        tried = self.settle(self.evaluate(replace(at.points, fit=fit)), settling)
+        gained = at.cost - tried.cost
+        better = gained > 0
+        after = self.replaced(at, np.flatnonzero(better), replace(tried, growth=at.growth)[better])
+        stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
+        blind = np.flatnonzero(~better & ~stuck & ~self.grown(at))
+        if len(blind):
+            after = self.replaced(after, blind, self.with_growth(at[blind]))
+        failed = ~better & ~stuck
+        failed[blind] = False
+        damping = np.where(better, np.maximum(damping / 10, 1e-6), damping)
+        damping = np.where(failed, np.maximum(damping * 10, 1e-2), damping)
+        idle = failed & (gained > -_CONVERGED) & (damping > 1)
+        return after, damping, ~(stuck | idle | (better & (gained < _CONVERGED)))
+
+    def grown(self, at: Evaluated) -> Mask:
+        """Which points know how the position's slopes change, or have no use for it."""
+        if not self.placed:
+            return np.ones(len(at), dtype=bool)
+        if at.growth is None:
+            return np.zeros(len(at), dtype=bool)
+        return np.asarray(np.isfinite(at.growth).all(axis=(1, 2)))
+
+    def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
+        """With other points in the place of some, which are in rising order."""
+        if not len(where):
+            return at
+        if len(where) == len(at) and (at.growth is None or other.growth is not None):
+            return other
+        order = np.arange(len(at))
+        order[where] = len(at) + np.arange(len(other))
+
+        def of(one: Floats, two: Floats) -> Floats:
+            return np.concatenate([one, two])[order]
+
+        one, two = at.points, other.points
+        points = Points(
+            np.concatenate([one.owner, two.owner])[order],
+            of(one.fit, two.fit),
+            of(one.covariance, two.covariance),
+            of(one.bend, two.bend),
+        )
+        growth = None
+        if at.growth is not None or other.growth is not None:
+            unknown = np.full((1, self.lines.recordings, max(self.counts)), np.nan)
+            growth = of(
+                *(np.repeat(unknown, len(one), axis=0) if one.growth is None else one.growth for one in (at, other))
+            )
+        products = joined([at.products, other.products], max(self.counts))[order]
+        return Evaluated(points, products, of(at.cost, other.cost), growth)
+
+    def with_growth(self, at: Evaluated) -> Evaluated:
+        """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position's slopes t, by differences."""
+        count = max(self.counts)
+        owner = at.points.owner
+        step = _SLOPE_STEP * (self.high - self.low)[owner]
+        step = np.where(at.points.fit + step <= self.high[owner], step, -step)
+        number, place = np.nonzero(self.free[owner] & self._moves_place[owner])
+        moved = at.points[number]
+        fit = moved.fit.copy()
+        fit[np.arange(len(fit)), place] += step[number, place]
+        here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
+        growth = np.zeros((len(at), here.shape[1], count))
+        growth[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
+        growth[number, :, place] = (there - here[number]) / step[number, place][:, None]
+        return replace(at, growth=growth)
+
+    def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
+        """Damped Gauss–Newton steps of the mean parameters within the bounds, and what the gradients say they gain."""
+        information, gradient = self.posterior_equations(at)
+        owner, fit = at.points.owner, at.points.fit
+        low, high = self.low[owner], self.high[owner]
+        free, every = self.free[owner], np.arange(fit.shape[1])
+        diagonal = information[:, every, every]
+        # Of curves, lest what changes nothing (the share of a second relaxation that is none) takes all of a step
+        least = self._range[owner] ** -2.0 if self.lines.curves else np.full(fit.shape, _LEAST_CURVATURE)
+        for _ in every:
+            matrix = np.where(free[:, :, None] & free[:, None, :], information, 0.0)
+            matrix[:, every, every] = np.where(free, diagonal * (1 + damping[:, None]) + least, 1.0)
+            step = np.linalg.solve(matrix, np.where(free, gradient, 0.0)[..., None])[..., 0]
+            scale = np.abs(step) / np.maximum(_LARGEST_MEAN_STEP, 0.3 * (high - low))
+            step /= np.maximum(1.0, scale.max(axis=1))[:, None]
+            leaving = free & (((fit <= low) & (step < 0)) | ((fit >= high) & (step > 0)))
+            if not leaving.any():
+                break
+            free = free & ~leaving
+        return step, (gradient * step).sum(axis=1)
+
+
+def softer(fitter: Fitter, at: Evaluated) -> Evaluated:
+    """Of curves whose modulus is not declared: also with smaller moduli, since what sticks looks stiff."""
+    places = [place for place, entry in enumerate(fitter.hypotheses[0].model.parameters) if entry.proportional]
+    if not places:
+        return at
+    points = at.points[np.repeat(np.arange(len(at)), len(_SOFTER))]
+    fit = points.fit.copy()
+    fit[:, places] += np.tile(np.log(_SOFTER), len(at))[:, None]
+    return fitter.evaluate(replace(points, fit=fit), slopes=False)
+
+
+def with_contact_points(fitter: Fitter, at: Evaluated) -> Evaluated:
+    """Of indentations: each one's contact point where it fits best, in ever finer steps of the depth.
+
+    Curves are independent of each other but for what they share, so that one set of depths serves all of them.
+    """
+    (entry,) = fitter.hypotheses
+    assert isinstance(entry.model, CurveModel)
+    places = entry.model.contact_points
+    travels = [one.displacement_mm for one in curves_of(fitter.lines.campaign)]
+    deepest, span = np.array([travel.max() for travel in travels]), np.array([np.ptp(one) for one in travels])
+    covariance = np.tile([GAIN_PRIOR.middle, 0.0, entry.smooth.middle, *at.points.covariance[0, 3:]], (len(at), 1))
+    levels = fitter.levels(covariance[:1, None])
+    depth = np.repeat(span[None], len(at), axis=0)
+    for ratios in _DEPTHS:
+        depths = depth[:, None] * ratios[:, None]  # (starts, ratios, curves)
+        tried = np.clip(deepest - depths, fitter.low[0, places], fitter.high[0, places]).reshape(-1, len(places))
+        points = at.points[np.repeat(np.arange(len(at)), len(ratios))]
+        fit = points.fit.copy()
+        fit[:, places] = tried
+        sums = fitter.products(replace(points, fit=fit), slopes=False, place=False).summed(levels)
+        uu, uy, yy = (part[:, 0] for part in (sums.uu, sums.uy, np.broadcast_to(sums.yy, sums.uu.shape)))
+        left = yy - 2 * uy + uu - (uu - uy) ** 2 / (START_GAIN**-2 + uu)
+        best = left.reshape(depths.shape).argmin(axis=1)[:, None]
+        depth = np.take_along_axis(depths, best, axis=1)[:, 0]
+    chosen = at.points.fit.copy()
+    chosen[:, places] = np.clip(deepest - depth, fitter.low[0, places], fitter.high[0, places])
+    return fitter.evaluate(replace(at.points, fit=chosen, covariance=covariance), slopes=False)
+
+
+def between_samples(hypothesis: Hypothesis, fit: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Bounds of fit coordinates (parameters,) that keep each contact point between the samples where it is.
+
+    Of what sticks: there the force jumps as a contact point passes a sample, and no slope says so.
+    """
+    assert isinstance(hypothesis.model, CurveModel)
+    low, high = low.copy(), high.copy()
+    curves = curves_of(hypothesis.lines.campaign)
+    for place, curve in zip(hypothesis.model.contact_points.tolist(), curves, strict=True):
+        travel = curve.displacement_mm[: int(curve.displacement_mm.argmax()) + 1]
+        before, after = travel[travel < fit[place]], travel[travel >= fit[place]]
+        if len(before) and len(after):
+            first, last = float(before.max()), float(after.min())
+            low[place] = max(low[place], first + _OFF_SAMPLE * (last - first))
+            high[place] = min(high[place], last)
+    return np.minimum(low, fit), np.maximum(high, fit)
+
+
+def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
+    """The best of the least-squares fits of one hypothesis of curves from these starts, with the noise it leaves.
+
+    A small smooth error and a close fit, or a large one and a loose fit: each may be a maximum of its own.
+    """
+    fitting = LeastSquares(fitter.hypotheses[0])
+    fits, costs = zip(*(fitting.fitted(fit) for fit in start.fit), strict=True)
+    fit = fits[int(np.argmin(costs))]
+    smooth = np.clip(_SMOOTH_STARTS, *_smooth_range(fitter))
+    covariance = np.array([[GAIN_PRIOR.middle, 0.0, value] for value in smooth])
+    both = start[np.zeros(len(smooth), dtype=np.intp)]
+    at = fitter.settle(
+        fitter.evaluate(replace(both, fit=np.tile(fit, (len(smooth), 1)), covariance=covariance)), _SETTLING
+    )
+    return at[at.best()]
+
+
+def _smooth_range(fitter: Fitter) -> tuple[float, float]:
+    """Where the logarithm of the smooth error of curves may begin."""
+    smooth = fitter.hypotheses[0].smooth
+    return smooth.low, max(smooth.high, float(np.log(3e-2)))
+
+
+def _log_size(slopes: Floats) -> Floats:
+    """log |t|² (points, recordings) of the position's slopes (2, points, recordings); least where there are none."""
+    return np.log((slopes**2).sum(axis=0) + 1e-300)

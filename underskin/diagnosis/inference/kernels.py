@@ -1,0 +1,575 @@
+"""Compiled: the likelihood of predictions, its gradient and information, and steps of noise levels.
+
+Compiled: how probable recordings are under predictions (see `hypothesis`), and priors, at many sets of noise levels.
+
+Arrays are (points, sets, recordings) where an axis may be 1 and then stands for all.
+
+Compiled: Newton steps of noise levels towards the least cost, each parameter on its own, at fixed predictions.
+
+Compiled: information on the mean parameters, and the gradient of the log likelihood (see `hypothesis`).
+
+With the direction u of a recording and J its derivatives, C⁻¹ is taken apart by Sherman and Morrison's identity, first
+for each recording, then for the sensors' columns.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.compiled import compiled
+from underskin.units import Array, Floats, Mask
+
+_TOGETHER = 8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+_NONE = 1e-300  # u*u where u is 0
+
+
+@compiled()
+def log_likelihood(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    noise: Floats,
+    mm: Floats,
+    mr: Floats,
+) -> float:
+    """Of one point and set, see `log_likelihoods`; `mm` and `mr` (sensors,) are overwritten.
+
+    With V = s'² a² + p² |t|² a recording's χ² is |y|² + ((Re u*r)²/(1 + V u*u) − (Re u*y)²)/u*u, the square completed
+    along u: |r|² less what V takes out would be rounding alone where a model predicts far more than was measured.
+    """
+    gain2, k2, p2, tau2 = noise[0] ** 2, noise[1] ** 2, noise[2] ** 2, noise[3] ** 2
+    mm[:], mr[:] = 0.0, 0.0
+    chi2 = log_determinant = 0.0
+    determinant, inverse = 1.0, 1 / k2
+    for recording in range(len(level)):
+        of = sensor[recording]
+        own = bend[of]
+        exponent = own + 0.5 * p2 * laplacian[recording]
+        factor = np.exp(exponent) if exponent != 0 else 1.0
+        a = level[recording] * factor
+        known = a * (1 - own)
+        u, u_y = uu[recording], uy[recording]
+        u_r, u_y = (u_y - known * u) * inverse, u_y * inverse
+        u = max(u * inverse, _NONE)
+        a2 = a * a
+        variance = (gain2 + 0.5 * p2 * p2 * square[recording]) * a2
+        if len(place):
+            variance += p2 * place[recording] * factor * factor
+        left = 1 + variance * u
+        part = 1 / (left * u)
+        reduced = part * u
+        chi2 += yy[recording] * inverse + (u_r * u_r - left * u_y * u_y) * part
+        mm[of] += a2 * u * reduced
+        mr[of] += a * u_r * reduced
+        determinant *= left
+        if recording % _TOGETHER == 0:
+            log_determinant += np.log(determinant)
+            determinant = 1.0
+    log_determinant += np.log(determinant)
+    for of in range(len(mm)):
+        chi2 -= tau2 / (1 + tau2 * mm[of]) * mr[of] ** 2
+        log_determinant += np.log1p(tau2 * mm[of])
+    return -0.5 * (chi2 + log_determinant)
+
+
+@compiled(
+    "void(float64[:, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, :, ::1], float64[:, ::1], int64[::1], "
+    "float64[:, ::1], float64[::1], float64[::1], float64[:, :, ::1], float64[:, ::1])"
+)
+def log_likelihoods(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    noise: Floats,
+    each: Floats,
+) -> None:
+    """−½ of what noise levels make of χ² and log|C|: added to `each` (points, sets).
+
+    Parameters
+    ----------
+    level
+        (points, recordings).
+    uu, uy, yy
+        The sums Re u*u, Re u*y and |y|².
+    place
+        (points, recordings) |t|² of the position's slopes, (points, 0) where there are none.
+    sensor
+        (recordings,).
+    bend
+        (points, sensors).
+    laplacian, square
+        (recordings,) of σ over the place, relative to it.
+    noise
+        (points, sets, 4): gain, level, position and spread.
+    """
+    mm, mr = np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    for point in range(each.shape[0]):
+        for number in range(each.shape[1]):
+            each[point, number] += log_likelihood(
+                level[point],
+                uu[min(point, uu.shape[0] - 1), min(number, uu.shape[1] - 1)],
+                uy[min(point, uy.shape[0] - 1), min(number, uy.shape[1] - 1)],
+                yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
+                place[point],
+                sensor,
+                bend[point],
+                laplacian,
+                square,
+                noise[min(point, len(noise) - 1), number],
+                mm,
+                mr,
+            )
+
+
+@compiled()
+def log_plateaus(covariance: Floats, plateaus: Floats) -> float:
+    """The log prior density of covariance parameters (parameters,)."""
+    total = 0.0
+    for place in range(len(covariance)):
+        value = covariance[place]
+        below = max((plateaus[place, 0] - value) / plateaus[place, 2], 0.0)
+        above = max((value - plateaus[place, 1]) / plateaus[place, 3], 0.0)
+        total -= 0.5 * (below + above) ** 2 + plateaus[place, 4]
+    return total
+
+
+@compiled(
+    "void(int64[::1], float64[:, ::1], boolean[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], "
+    "float64[:, ::1], float64[:, ::1], float64[::1], float64[:, :, ::1], float64[:, ::1], float64[:, ::1])"
+)
+def log_priors(
+    owner: NDArray[np.int64],
+    fit: Floats,
+    free: Mask,
+    low: Floats,
+    high: Floats,
+    precision: Floats,
+    centre: Floats,
+    freedom: Floats,
+    height: Floats,
+    covariances: Floats,
+    plateaus: Floats,
+    each: Floats,
+) -> None:
+    """The logarithms of the prior densities, added to `each` (points, sets).
+
+    Of the coordinates `fit` (points, parameters) that are free in each point's hypothesis a normal or uniform density
+    within bounds, or one of Student's t with so many degrees of `freedom`, where these are finite; of the covariance's
+    coordinates (points, sets, parameters) `plateaus`, see `Plateau`: low, high, fall_low, fall_high and the logarithm
+    of the area (parameters, 5).
+    """
+    for point in range(len(fit)):
+        of = owner[point]
+        of_mean = height[of]
+        for place in range(fit.shape[1]):
+            if free[of, place]:
+                value = fit[point, place]
+                if value < low[of, place] or value > high[of, place]:
+                    of_mean = -np.inf
+                square = precision[of, place] * (value - centre[of, place]) ** 2
+                tail = freedom[of, place]
+                of_mean -= 0.5 * (square if tail == np.inf else (tail + 1) * np.log1p(square / tail))
+        for number in range(covariances.shape[1]):
+            each[point, number] += of_mean + log_plateaus(covariances[point, number], plateaus)
+
+
+STEP = 0.05  # of the finite differences in the covariance's logarithms
+LARGEST_STEP = 0.7  # of a Newton step in a noise level's logarithm: a factor of 2
+TRIES, SHORTER, LEAST_GAIN = 4, 4.0, 1e-3  # of a step that may gain nothing; gain that ends the steps
+
+
+@compiled()
+def _cost(
+    covariance: Floats,
+    noise: Floats,
+    of_point: tuple[Array, ...],
+    sums: tuple[Floats, Floats],
+    known: tuple[float, float, bool, Floats],
+) -> float:
+    """The cost with covariance parameters (parameters,), up to what no noise level changes; `noise` and `sums` are
+    overwritten."""
+    about_means, numbers, placed, plateaus = known
+    noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
+    if placed:
+        noise[2] = np.exp(covariance[2])
+    of_lines = -numbers * covariance[1] - 0.5 * about_means / noise[1] ** 2
+    return -(of_lines + log_likelihood(*of_point, noise, *sums) + log_plateaus(covariance, plateaus))
+
+
+@compiled()
+def _inside(here: Floats, step: Floats, lowest: Floats, highest: Floats, moved: Floats) -> None:
+    """`moved` becomes where a step from here leads, within the bounds (parameters,)."""
+    for parameter in range(len(here)):
+        moved[parameter] = min(max(here[parameter] + step[parameter], lowest[parameter]), highest[parameter])
+
+
+@compiled()
+def _newton_step(
+    here: Floats,
+    lowest: Floats,
+    highest: Floats,
+    held: int,
+    noise: Floats,
+    of_point: tuple[Array, ...],
+    sums: tuple[Floats, Floats],
+    known: tuple[float, float, bool, Floats],
+    step: Floats,
+) -> None:
+    """`step` becomes that of each parameter on its own, by central differences; 0 where it would leave the bounds."""
+    centre = np.empty(len(here))
+    _inside(here, 0 * here, lowest + 2 * STEP, highest - 2 * STEP, centre)  # far enough inside for the differences
+    middle = _cost(centre, noise, of_point, sums, known)
+    largest = 1e-12
+    for parameter in range(len(here)):
+        value = centre[parameter]
+        centre[parameter] = value + STEP
+        up = _cost(centre, noise, of_point, sums, known)
+        centre[parameter] = value - STEP
+        down = _cost(centre, noise, of_point, sums, known)
+        centre[parameter] = value
+        bent = (up + down - 2 * middle) / STEP**2
+        slope = (up - down) / (2 * STEP) + bent * (here[parameter] - value)
+        step[parameter] = -slope / max(abs(bent), 1.0)
+        low, high = here[parameter] <= lowest[parameter], here[parameter] >= highest[parameter]
+        if parameter == held or (low and step[parameter] < 0) or (high and step[parameter] > 0):
+            step[parameter] = 0.0
+        largest = max(largest, abs(step[parameter]))
+    step *= min(1.0, LARGEST_STEP / largest)
+
+
+@compiled(
+    "void(float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64[::1], "
+    "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
+    "float64[::1], int64, int64, float64[:, ::1], float64[::1])"
+)
+def settle(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    about_means: float,
+    numbers: float,
+    spread: float,
+    placed: bool,
+    plateaus: Floats,
+    lowest: Floats,
+    highest: Floats,
+    steps: int,
+    held: int,
+    covariance: Floats,
+    cost: Floats,
+) -> None:
+    """Newton steps of gain, level and, where `placed`, position scatter, each on its own: `covariance` (points,
+    parameters) and `cost` (points,) are overwritten with where they end.
+
+    Parameters
+    ----------
+    level, uu, uy, place
+        (points, recordings); `place` may be (points, 0).
+    yy, sensor, laplacian, square
+        (recordings,).
+    bend
+        (points, sensors).
+    about_means, numbers
+        What lines scatter about their recordings' means, and how many numbers all lines are.
+    spread
+        Of the sensors' gains.
+    plateaus, lowest, highest
+        Prior (parameters, 5) and bounds (parameters,).
+    steps, held
+        Steps at most, and the parameter that stays; -1 for none.
+    """
+    count = covariance.shape[1]
+    noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
+    noise[3] = spread
+    sums = np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    for point in range(len(cost)):
+        if not np.isfinite(cost[point]):
+            continue
+        here = covariance[point]
+        of_point = level[point], uu[point], uy[point], yy, place[point], sensor, bend[point], laplacian, square
+        known = about_means, numbers, placed, plateaus
+        best = begun = _cost(here, noise, of_point, sums, known)
+        for _ in range(steps):
+            _newton_step(here, lowest, highest, held, noise, of_point, sums, known, step)
+            gained = 0.0
+            for _ in range(TRIES):
+                _inside(here, step, lowest, highest, tried)
+                reached = _cost(tried, noise, of_point, sums, known)
+                if reached < best:
+                    gained = best - reached
+                    best = reached
+                    here[:] = tried
+                    break
+                step /= SHORTER
+            if gained < LEAST_GAIN:
+                break
+        cost[point] += best - begun
+
+
+_FROM_SLOPES = 1e-3  # m: a recording whose response changes by more than itself over this way is led by its slopes
+_OF_PARAMETERS, _OF_PAIRS = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
+
+
+_TERMS = 8
+_FACTOR, _A, _KNOWN, _UU, _UR, _REDUCED, _AS_MODEL, _MOVED = range(_TERMS)  # of each recording
+
+
+@compiled()
+def _scatter(
+    level: Floats,
+    uu: Floats,
+    uy: Floats,
+    place: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    levels: Floats,
+    terms: Floats,
+) -> None:
+    """What each recording's scatter makes of it: `terms` (recordings, 8), with V = s'² a² + p² |t|²."""
+    gain2, k2, p2, _ = levels
+    for r in range(len(level)):
+        own = bend[sensor[r]]
+        factor = np.exp(own + 0.5 * p2 * laplacian[r])
+        a = level[r] * factor
+        known = a * (1 - own)
+        as_model = gain2 + 0.5 * p2 * p2 * square[r]
+        moved = p2 * place[r] * factor * factor if len(place) else 0.0
+        u = uu[r] / k2
+        terms[r, _FACTOR], terms[r, _A], terms[r, _KNOWN] = factor, a, known
+        terms[r, _UU], terms[r, _UR] = u, (uy[r] - known * uu[r]) / k2
+        terms[r, _REDUCED] = 1 / (1 + (as_model * a * a + moved) * u)  # 1 − (share of u taken out)
+        terms[r, _AS_MODEL], terms[r, _MOVED] = as_model, moved
+
+
+@compiled()
+def _shrink(terms: Floats) -> float:
+    """V/(1 + V u*u)."""
+    return (terms[_AS_MODEL] * terms[_A] ** 2 + terms[_MOVED]) * terms[_REDUCED]
+
+
+@compiled()
+def _along(level_slopes: Floats, uv: Floats, vy: Floats, inverse: float, terms: Floats, uj: Floats, jr: Floats) -> None:
+    """Re u*J and, with a recording's own scatter taken out, Re J*r, both over κ² (recordings, P)."""
+    leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
+    for r in range(len(terms)):
+        of = terms[r]
+        for p in range(uj.shape[1]):
+            along = with_r = 0.0
+            if leveled:
+                along += level_slopes[r, p] * of[_FACTOR] * of[_UU]
+                with_r += level_slopes[r, p] * of[_FACTOR] * of[_UR]
+            if turned:
+                along += of[_A] * uv[r, p] * inverse
+                with_r += of[_A] * (vy[r, p] - of[_KNOWN] * uv[r, p]) * inverse
+            uj[r, p] = along
+            jr[r, p] = with_r - along * _shrink(of) * of[_UR]
+
+
+@compiled()
+def _over_sensors(
+    sensor: NDArray[np.int64],
+    tau2: float,
+    terms: Floats,
+    uj: Floats,
+    mj: Floats,
+    of_sensors: Floats,
+    by_sensor: Floats,
+) -> None:
+    """mᵀC⁻¹J of recordings and of sensors; of sensors mᵀC⁻¹m, mᵀC⁻¹r, τ²/(1 + τ² mᵀC⁻¹m) and the most probable b."""
+    of_sensors[:], by_sensor[:] = 0.0, 0.0
+    for r in range(len(terms)):
+        of, own = terms[r], sensor[r]
+        weight = of[_A] * of[_REDUCED]
+        of_sensors[own, 0] += of[_A] * of[_UU] * weight
+        of_sensors[own, 1] += of[_UR] * weight
+        for p in range(uj.shape[1]):
+            mj[r, p] = uj[r, p] * weight
+            by_sensor[own, p] += mj[r, p]
+    for own in range(len(of_sensors)):
+        of_sensors[own, 2] = tau2 / (1 + tau2 * of_sensors[own, 0])
+        of_sensors[own, 3] = of_sensors[own, 2] * of_sensors[own, 1]
+
+
+@compiled()
+def _informed(
+    level_slopes: Floats, uv: Floats, vv: Floats, inverse: float, terms: Floats, uj: Floats, whole: Floats
+) -> None:
+    """Add Jᵀ C⁻¹ J, without the sensors' columns, to the lower half."""
+    leveled, turned = level_slopes.shape[1] > 0, uv.shape[1] > 0
+    for r in range(len(terms)):
+        of = terms[r]
+        shrink, f, a = _shrink(of), of[_FACTOR], of[_A]
+        for p in range(uj.shape[1]):
+            for q in range(p + 1):
+                both = -uj[r, p] * shrink * uj[r, q]
+                if leveled:
+                    both += level_slopes[r, p] * f * f * of[_UU] * level_slopes[r, q]
+                if turned:
+                    both += a * a * inverse * vv[r, p, q]
+                if leveled and turned:
+                    both += f * a * inverse * (level_slopes[r, p] * uv[r, q] + uv[r, p] * level_slopes[r, q])
+                whole[p, q] += both
+
+
+@compiled()
+def _with_sensors(
+    sensor: NDArray[np.int64],
+    terms: Floats,
+    of_sensors: Floats,
+    jr: Floats,
+    mj: Floats,
+    jr_sensor: Floats,
+    slope: Floats,
+) -> None:
+    """Add the gradient by the mean and by what follows the model in a recording, the sensors' columns in C as well."""
+    jr_sensor[:] = 0.0
+    for r in range(len(terms)):
+        of, own = terms[r], sensor[r]
+        _, _, shrink, gain = of_sensors[own]
+        weight = of[_A] * of[_REDUCED]
+        mm = of[_A] * of[_UU] * weight
+        mr_left, left = of[_UR] * weight - mm * gain, 1 - shrink * mm
+        for p in range(len(slope)):
+            with_r = jr[r, p] - mj[r, p] * gain
+            jr_sensor[own, p] += with_r
+            slope[p] += with_r + of[_AS_MODEL] * (with_r * mr_left - mj[r, p] * left)
+
+
+@compiled()
+def _of_place(
+    level: Floats,
+    level_slopes: Floats,
+    place: Floats,
+    growth: Floats,
+    uv: Floats,
+    vy: Floats,
+    inverse: float,
+    sensor: NDArray[np.int64],
+    terms: Floats,
+    of_sensors: Floats,
+    slope: Floats,
+) -> None:
+    """Add the gradient by the column that the position's slopes are."""
+    for r in range(len(terms)):
+        of = terms[r]
+        _, _, shrink, gain = of_sensors[sensor[r]]
+        weight = of[_A] * of[_REDUCED]
+        um = of[_UU] * weight
+        explained = of[_UR] * of[_REDUCED] - um * gain  # uᵀ C⁻¹ r
+        taken = of[_UU] * of[_REDUCED] - shrink * um * um  # uᵀ C⁻¹ u
+        led = _FROM_SLOPES**2 * place[r] > level[r] ** 2
+        for p in range(len(slope)):
+            grows = growth[r, p] if growth.shape[1] else np.nan
+            if np.isnan(grows):
+                grows = 0.0 if led else 2 * level_slopes[r, p] / level[r]
+            by_growth = 0.5 * (explained * explained - taken) * grows
+            if uv.shape[1]:
+                along, with_r = uv[r, p] * inverse, (vy[r, p] - of[_KNOWN] * uv[r, p]) * inverse
+                mv = along * weight
+                by_growth += (with_r - along * _shrink(of) * of[_UR] - mv * gain) * explained
+                by_growth -= along * of[_REDUCED] - shrink * um * mv
+            slope[p] += of[_MOVED] * by_growth
+
+
+@compiled(
+    f"void(float64[:, ::1], {_OF_PARAMETERS}, float64[:, ::1], float64[:, ::1], {_OF_PARAMETERS}, {_OF_PARAMETERS}, "
+    f"{_OF_PAIRS}, float64[:, ::1], {_OF_PARAMETERS}, int64[::1], float64[:, ::1], float64[::1], float64[::1], "
+    f"float64[:, ::1], {_OF_PARAMETERS}, float64[:, ::1])"
+)
+def normal_equations(
+    level: Floats,
+    level_slopes: Floats,
+    uu: Floats,
+    uy: Floats,
+    uv: Floats,
+    vy: Floats,
+    vv: Floats,
+    place: Floats,
+    growth: Floats,
+    sensor: NDArray[np.int64],
+    bend: Floats,
+    laplacian: Floats,
+    square: Floats,
+    noise: Floats,
+    information: Floats,
+    gradient: Floats,
+) -> None:
+    """Fill `information` Jᵀ C⁻¹ J (points, P, P) and `gradient` ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r) (points, P).
+
+    Parameters
+    ----------
+    level, level_slopes
+        L (points, recordings), and its derivatives (points, recordings, P), or P = 0 where L is 1.
+    uu, uy, uv, vy, vv
+        The sums Re u*u, Re u*y (points, recordings), with the derivatives v of u Re u*v, Re v*y (points, recordings,
+        P) and Re v*v (points, recordings, P, P), or P = 0 where u does not change.
+    place, growth
+        |t|² of the position's slopes (points, recordings), or (points, 0) where there are none, and ∂ log |t|²/∂θ
+        (points, recordings, P), NaN where t is taken to change as L does, or where it leads, not at all; or P = 0.
+    sensor, bend, laplacian, square
+        See `log_likelihoods`.
+    noise
+        (points, 4): gain, level, position and spread.
+    """
+    points, recordings = level.shape
+    sensors, count = bend.shape[1], gradient.shape[1]
+    terms = np.empty((recordings, _TERMS))
+    uj, jr, mj = np.empty((recordings, count)), np.empty((recordings, count)), np.empty((recordings, count))
+    of_sensors = np.empty((sensors, 4))
+    by_sensor = np.empty((2, sensors, count))
+    for point in range(points):
+        levels = noise[min(point, len(noise) - 1)] ** 2
+        at = min(point, len(place) - 1)
+        _scatter(level[point], uu[point], uy[point], place[at], sensor, bend[point], laplacian, square, levels, terms)
+        _along(level_slopes[point], uv[point], vy[point], 1 / levels[1], terms, uj, jr)
+        _over_sensors(sensor, levels[3], terms, uj, mj, of_sensors, by_sensor[0])
+        whole, slope = information[point], gradient[point]
+        whole[:], slope[:] = 0.0, 0.0
+        _informed(level_slopes[point], uv[point], vv[point], 1 / levels[1], terms, uj, whole)
+        for of in range(sensors):
+            for p in range(count):
+                for q in range(p + 1):
+                    whole[p, q] -= by_sensor[0, of, p] * of_sensors[of, 2] * by_sensor[0, of, q]
+        for p in range(count):
+            for q in range(p):
+                whole[q, p] = whole[p, q]
+        _with_sensors(sensor, terms, of_sensors, jr, mj, by_sensor[1], slope)
+        if place.shape[1]:
+            _of_place(
+                level[point],
+                level_slopes[point],
+                place[point],
+                growth[point],
+                uv[point],
+                vy[point],
+                1 / levels[1],
+                sensor,
+                terms,
+                of_sensors,
+                slope,
+            )
+        for of in range(sensors):
+            mm, mr, shrink, gain = of_sensors[of]
+            for p in range(count):
+                slope[p] += levels[3] * (
+                    by_sensor[1, of, p] * (mr - mm * gain) - by_sensor[0, of, p] * (1 - shrink * mm)
+                )

@@ -1,0 +1,395 @@
+"""Compiled: sums over the lines of FRFs, and likelihoods of processes along them.
+
+Compiled: how probable the roughness of lines is under their noise, and what each line's variance does to it. Compiled:
+products of what a dynamic factor is on each line with its derivatives, for the sums of `products`.
+
+Compiled: what sums over rows lose to mains pick-up, at many sets of noise levels.
+
+A row of variance κ² d² has κ² d² + q² with pick-up, so that its weight 1/d² in the sums (over κ²) becomes
+1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x).
+
+Compiled: what Gaussian processes of several amplitudes gain, from their features' moments.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from underskin.compiled import compiled
+from underskin.units import Array, Complexes, Floats, Indices
+
+_VARIANCES_TOGETHER = 4  # factors, of 1e-70 to 1e70 each, whose logarithm is taken of their product
+
+
+@compiled("float64(float64[::1], int64[::1], float64[::1], float64[::1], float64, float64[::1])")
+def roughness_cost(
+    variance: Floats, middle: NDArray[np.int64], share: Floats, rough: Floats, freedom: float, by_variance: Floats
+) -> float:
+    """Σ ln v + (ν/2 + 1) ln(1 + 2u/ν), u = rough/v and v = d²ⱼ + λ² d²ⱼ₋₁ + (1 − λ)² d²ⱼ₊₁: Student's likelihood.
+
+    Parameters
+    ----------
+    variance
+        d² (rows,).
+    middle, share, rough
+        The rows j that are compared with their neighbours, λ, and half the square of what they are off.
+    freedom
+        ν.
+    by_variance
+        (rows,) to which the derivatives by d² are added.
+    """
+    power = freedom / 2 + 1
+    total, of_v, of_u = 0.0, 1.0, 1.0
+    for number in range(len(middle)):
+        j = middle[number]
+        before, after = share[number] ** 2, (1 - share[number]) ** 2
+        v = variance[j] + before * variance[j - 1] + after * variance[j + 1]
+        x = 2 * rough[number] / (v * freedom)
+        of_v *= v
+        of_u *= 1 + x
+        if number % _VARIANCES_TOGETHER == 0:
+            total += np.log(of_v) + power * np.log(of_u)
+            of_v, of_u = 1.0, 1.0
+        slope = (1 - power * x / (1 + x)) / v
+        by_variance[j] += slope
+        by_variance[j - 1] += before * slope
+        by_variance[j + 1] += after * slope
+    return total + np.log(of_v) + power * np.log(of_u)
+
+
+_THREE, _FOUR = "float64[:, :, ::1]", "float64[:, :, :, ::1]"
+
+
+@compiled(f"void(complex128[:, :, ::1], {_THREE}, {_THREE}, {_THREE})")
+def line_products(each: Array, products: Floats, real: Floats, imag: Floats) -> None:
+    """Re x*y of all pairs of functions on the lines.
+
+    Parameters
+    ----------
+    each
+        The functions (points, functions, lines).
+    products
+        (points, pairs, lines) the pairs in the order of the upper triangle, to be filled.
+    real, imag
+        (points, functions, lines) the functions' parts, to be filled.
+    """
+    points, functions, lines = each.shape
+    for point in range(points):
+        for one in range(functions):
+            for line in range(lines):
+                real[point, one, line] = each[point, one, line].real
+                imag[point, one, line] = each[point, one, line].imag
+        pair = 0
+        for one in range(functions):
+            re, im = real[point, one], imag[point, one]
+            for other in range(one, functions):
+                own, re_other, im_other = products[point, pair], real[point, other], imag[point, other]
+                for line in range(lines):
+                    own[line] = re[line] * re_other[line] + im[line] * im_other[line]
+                pair += 1
+
+
+@compiled(f"void({_THREE}, {_THREE}, int64[::1], {_THREE}, {_THREE}, {_FOUR})")
+def spread_sums(both: Floats, with_y: Floats, moving: NDArray[np.int64], uv: Floats, vy: Floats, vv: Floats) -> None:
+    """The sums with derivatives at the places of their parameters.
+
+    Parameters
+    ----------
+    both
+        (points, pairs, recordings) of u and its derivatives, the pairs in the order of the upper triangle.
+    with_y
+        (points, 1 + derivatives, recordings) of each with what was measured.
+    moving
+        (derivatives,) the parameters that they are by.
+    uv, vy, vv
+        (points, recordings, parameters), twice, and (points, recordings, parameters, parameters), of which what differs
+        from 0 is filled.
+    """
+    points, _, recordings = both.shape
+    count = len(moving)
+    for point in range(points):
+        for one in range(count):
+            p = moving[one]
+            for recording in range(recordings):
+                uv[point, recording, p] = both[point, 1 + one, recording]
+                vy[point, recording, p] = with_y[point, 1 + one, recording]
+        pair = 1 + count
+        for one in range(count):
+            for other in range(one, count):
+                p, q = moving[one], moving[other]
+                for recording in range(recordings):
+                    vv[point, recording, p, q] = vv[point, recording, q, p] = both[point, pair, recording]
+                pair += 1
+
+
+_ROWS_TOGETHER = (
+    8  # factors of the determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+)
+_NONE = 1e-17  # of x, below which a row loses nothing that its sum could tell
+_SUMS = "float64[:, :, ::1]"
+_ROWS = "int64[::1], float64[::1], int64[::1], complex128[::1], int64[::1]"
+
+
+@compiled()
+def _take(taken: Floats, uu: Floats, uy: Floats, yy: Floats, point: int, recording: int) -> None:
+    """Take what a recording's rows lose (3, sets) from its sums, and begin anew."""
+    for number in range(taken.shape[1]):
+        uu[point, number, recording] -= taken[0, number]
+        uy[point, number, recording] -= taken[1, number]
+        yy[point, number, recording] -= taken[2, number]
+    taken[:] = 0.0
+
+
+@compiled(f"void(float64[:, :, ::1], {_ROWS}, complex128[:, ::1], {_SUMS}, {_SUMS}, {_SUMS}, float64[:, ::1])")
+def lost(
+    pickup: Floats,
+    alike: NDArray[np.int64],
+    precision: Floats,
+    recording: NDArray[np.int64],
+    y: Complexes,
+    line: NDArray[np.int64],
+    u: Array,
+    uu: Floats,
+    uy: Floats,
+    yy: Floats,
+    log_determinant: Floats,
+) -> None:
+    """Take from `uu`, `uy` and `yy` (points, sets, recordings) what rows lose, x/(1 + x)/d² of each, and add 2 log(1 +
+    x) to `log_determinant` (points, sets).
+
+    Parameters
+    ----------
+    pickup
+        (q/κ)² (points, distinct, sets).
+    alike, precision, recording, y, line
+        Of each row: which of the distinct q it has, 1/d², the recording, the measured value and the line.
+    u
+        The direction (points, lines).
+    """
+    points, distinct, sets = pickup.shape
+    factors, total, taken, largest = np.empty(sets), np.empty(sets), np.zeros((3, sets)), np.empty(distinct)
+    for point in range(points):
+        factors[:], total[:] = 1.0, 0.0
+        count, of = 0, 0
+        for number in range(distinct):
+            largest[number] = pickup[point, number].max()
+        for row in range(len(y)):
+            kind, weight = alike[row], precision[row]
+            if largest[kind] * weight <= _NONE:
+                continue
+            if recording[row] != of:
+                _take(taken, uu, uy, yy, point, of)
+                of = recording[row]
+            at, measured = u[point, line[row]], y[row]
+            uu_row = at.real * at.real + at.imag * at.imag
+            uy_row = at.real * measured.real + at.imag * measured.imag
+            yy_row = measured.real * measured.real + measured.imag * measured.imag
+            for number in range(sets):
+                x = pickup[point, kind, number] * weight
+                less = x / (1 + x) * weight
+                taken[0, number] += less * uu_row
+                taken[1, number] += less * uy_row
+                taken[2, number] += less * yy_row
+                factors[number] *= 1 + x
+            count += 1
+            if count == _ROWS_TOGETHER:
+                for number in range(sets):
+                    total[number] += np.log(factors[number])
+                    factors[number] = 1.0
+                count = 0
+        _take(taken, uu, uy, yy, point, of)
+        for number in range(sets):
+            log_determinant[point, number] += 2 * (total[number] + np.log(factors[number]))
+
+
+@compiled(
+    f"void(float64[:, ::1], {_ROWS}, complex128[:, ::1], complex128[:, :, ::1], {_SUMS}, {_SUMS}, "
+    "float64[:, :, :, ::1])"
+)
+def slopes_lost(
+    pickup: Floats,
+    alike: NDArray[np.int64],
+    precision: Floats,
+    recording: NDArray[np.int64],
+    y: Complexes,
+    line: NDArray[np.int64],
+    u: Array,
+    v: Array,
+    uv: Floats,
+    vy: Floats,
+    vv: Floats,
+) -> None:
+    """Take from `uv`, `vy` (points, recordings, P) and `vv` (points, recordings, P, P) what rows lose.
+
+    Parameters
+    ----------
+    pickup
+        (q/κ)² (points, distinct).
+    alike, precision, recording, y, line
+        See `lost`.
+    u, v
+        The direction (points, lines), and its derivatives (points, P, lines).
+    """
+    points, count, lines = v.shape
+    moving = np.empty(count, dtype=np.int64)
+    for point in range(points):
+        moves = 0
+        for p in range(count):
+            for at in range(lines):
+                if v[point, p, at] != 0:
+                    moving[moves] = p
+                    moves += 1
+                    break
+        for row in range(len(y)):
+            x = pickup[point, alike[row]] * precision[row]
+            if x > _NONE and moves:
+                less, of, at = x / (1 + x) * precision[row], recording[row], line[row]
+                direction, measured = u[point, at], y[row]
+                for one in range(moves):
+                    p = moving[one]
+                    of_p = v[point, p, at]
+                    uv[point, of, p] -= less * (direction.real * of_p.real + direction.imag * of_p.imag)
+                    vy[point, of, p] -= less * (measured.real * of_p.real + measured.imag * of_p.imag)
+                    for other in range(moves):
+                        q = moving[other]
+                        of_q = v[point, q, at]
+                        vv[point, of, p, q] -= less * (of_p.real * of_q.real + of_p.imag * of_q.imag)
+
+
+_PIVOTS_TOGETHER = (
+    8  # factors of a determinant whose logarithm is taken together: below 1e38 each, they do not overflow
+)
+_LOWEST, _HIGHEST = -1.0, 5.0  # of log κ
+_TOLERANCE = 1e-3
+_SECTION = 0.6180339887498949  # golden
+
+
+@compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1], float64[:, ::1])")
+def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) -> None:
+    """ln p(y) with a process less that without, ½ (a² mᵀ (I + a² G)⁻¹ m − ln |I + a² G|), by Cholesky's factors.
+
+    Parameters
+    ----------
+    grams
+        G (sets, features, features), AᵀC⁻¹A of the features A.
+    moments
+        m (sets, features), AᵀC⁻¹r of the residual r.
+    amplitudes
+        a.
+    gains
+        (sets, amplitudes), to be filled.
+    """
+    size = moments.shape[1]
+    lower, solved = np.empty((size, size)), np.empty(size)
+    for number in range(len(moments)):
+        for which in range(len(amplitudes)):
+            a2 = amplitudes[which] ** 2
+            determinant = square = 0.0
+            for i in range(size):
+                for j in range(i):
+                    total = a2 * grams[number, i, j]
+                    for k in range(j):
+                        total -= lower[i, k] * lower[j, k]
+                    lower[i, j] = total / lower[j, j]
+                total, right = 1 + a2 * grams[number, i, i], moments[number, i]
+                for k in range(i):
+                    total -= lower[i, k] ** 2
+                    right -= lower[i, k] * solved[k]
+                lower[i, i] = np.sqrt(total)
+                solved[i] = right / lower[i, i]
+                determinant += np.log(total)
+                square += solved[i] ** 2
+            gains[number, which] = 0.5 * (a2 * square - determinant)
+
+
+@compiled("void(float64[:, ::1], int64[::1], int64[::1], float64[:, ::1], float64[:, :, :, ::1])")
+def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats, grams: Floats) -> None:
+    """Take Σ sₙ sₙᵀ off products of columns, sₙ = Σ w x over the n-th sensor's recordings.
+
+    Parameters
+    ----------
+    weights
+        w at each scatter (scatters, pairs), the pairs of a sensor one after another.
+    rows, first
+        The row of `columns` of each pair, and where the pairs of each sensor begin (sensors + 1,).
+    columns
+        x (rows, sets · features).
+    grams
+        (sets, scatters, features, features), to be changed.
+    """
+    count, size = grams.shape[0], grams.shape[2]
+    width = count * size
+    sums = np.empty(width)
+    for scatter in range(len(weights)):
+        for sensor in range(len(first) - 1):
+            sums[:] = 0.0
+            for pair in range(first[sensor], first[sensor + 1]):
+                weight, row = weights[scatter, pair], rows[pair]
+                for column in range(width):
+                    sums[column] += weight * columns[row, column]
+            for number in range(count):
+                for i in range(size):
+                    for j in range(size):
+                        grams[number, scatter, i, j] -= sums[number * size + i] * sums[number * size + j]
+
+
+@compiled()
+def _log_density(
+    log_level: float, chi2: float, freedom: float, prior: Floats, eigenvalues: Floats, squares: Floats, a2: float
+) -> float:
+    """See `at_best_level`."""
+    inverse = np.exp(-2 * log_level)
+    below = max((prior[0] - log_level) / prior[2], 0.0)
+    above = max((log_level - prior[1]) / prior[3], 0.0)
+    total = -0.5 * (below + above) ** 2 - prior[4] - 0.5 * chi2 * inverse - freedom * log_level
+    determinant = 1.0
+    for number in range(len(eigenvalues)):
+        inner = 1 + a2 * eigenvalues[number] * inverse
+        total += 0.5 * a2 * squares[number] / inner * inverse * inverse
+        determinant *= inner
+        if number % _PIVOTS_TOGETHER == 0:
+            total -= np.log(determinant)
+            determinant = 1.0
+    return total - np.log(determinant)
+
+
+@compiled("void(float64, float64, float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def at_best_level(
+    chi2: float,
+    freedom: float,
+    prior: Floats,
+    eigenvalues: Floats,
+    squares: Floats,
+    amplitudes: Floats,
+    log_densities: Floats,
+) -> None:
+    """ln p(r, κ) of complex lines with a process, at the level κ of their noise that is most probable.
+
+    −½ (χ²/κ² − Σ a² sₙ/(κ⁴ (1 + a² λₙ/κ²))) − ν ln κ − Σ ln(1 + a² λₙ/κ²) + ln p(κ), by golden sections.
+
+    Parameters
+    ----------
+    chi2, freedom
+        χ² of the lines at κ = 1 without a process, and ν.
+    prior
+        Of ln κ, see `Plateau.row`.
+    eigenvalues, squares
+        λₙ of the features' products AᵀWA, and sₙ = |vₙᵀAᵀW r|² along its eigenvectors vₙ.
+    amplitudes, log_densities
+        a, and the result for each, to be filled.
+    """
+    for which in range(len(amplitudes)):
+        a2 = amplitudes[which] ** 2
+        low, high = _LOWEST, _HIGHEST
+        left, right = high - _SECTION * (high - low), low + _SECTION * (high - low)
+        at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
+        at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
+        while high - low > _TOLERANCE:
+            if at_left > at_right:
+                high, right, at_right = right, left, at_left
+                left = high - _SECTION * (high - low)
+                at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
+            else:
+                low, left, at_left = left, right, at_right
+                right = low + _SECTION * (high - low)
+                at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
+        log_densities[which] = max(at_left, at_right)

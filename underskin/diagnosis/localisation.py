@@ -1,0 +1,577 @@
+"""Where a misfit is: along which axis, in which region, of which shape and size.
+
+How large the misfit is where it lies: one number in percent, and its 95 % interval.
+
+Over the rows of the region, with weights 1/d²: rms² = (Σ|y − m|²/d² − what noise alone gives)/(Σ|m|²/d²), the noise
+being that of lines and of recordings' gains; and the mean along the model, Σ Re m*(y − m)/d² over the same. Where the
+misfit has one sign (|mean| at least 0.8 of the rms) the mean stands for it, with that sign; else the rms, which has
+none: it is above the model in part of the region and below it in others. The interval is the bootstrap's over whole
+recordings.
+
+On which axes the residual depends, by permutation.
+
+A recording's axes: its gain residual, after what the other axes explain (Freedman and Lane 1983), is permuted among
+whole recordings, within sensors or within days where there are several. For `frequency_hz` and `phase`, the real and
+the imaginary part of the lines' residuals change sign by whole recordings. Each axis' statistic is standardised by its
+own permutations; the p-values are those of the largest over all axes, (b + 1)/(B + 1) (Westfall and Young 1993). An
+axis with too few arrangements, or that the others determine, is undecidable.
+
+The smallest region of the campaign's axes that holds most of the misfit.
+
+The shape of a residual that no mechanism describes: on which axis it lies, and which simple form fits it best.
+
+Forms over an axis x: power law (x^n), step (at a level of x), periodic (sine and cosine of one period), drift (linear
+in x), over frequency also a peak (a Lorentzian, real and imaginary part free), along a curve a bump (a Lorentzian).
+They are compared by the Bayesian information criterion; a form is a description, not an explanation.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import factorial
+
+import numpy as np
+
+from underskin.diagnosis.data.dataset import Lines, recording_axes
+from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
+from underskin.diagnosis.selection.gaussian_processes import frequency_bins
+from underskin.units import Array, Floats, Indices, Mask
+
+_ONE_SIGN = 0.8
+_DRAWS, _SEED = 1000, 20180207
+
+
+@dataclass(frozen=True)
+class EffectSize:
+    """In percent of the base model's response; `signed` where all of the region lies on one side of the model."""
+
+    percent: float
+    low: float
+    high: float
+    signed: bool
+
+
+def effect(lines: Lines, predicted: Array, rows: Mask, gain: float, level: float) -> EffectSize:
+    """The size of the misfit on some rows.
+
+    Parameters
+    ----------
+    lines : Lines
+        The recordings.
+    predicted : (rows,) complex array
+        The base model's response, in the unit of the lines.
+    rows : (rows,) array of bool
+        Where the misfit lies.
+    gain : float
+        Scatter of a recording's gain, relative.
+    level : float
+        Noise of the lines over their deviations.
+
+    Returns
+    -------
+    EffectSize
+        The misfit with its 95 % interval, in percent of the base model's response.
+    """
+    weight = lines.deviation[rows] ** -2.0
+    off, model = (lines.value - predicted)[rows], predicted[rows]
+    _, recording = np.unique(lines.recording[rows], return_inverse=True)
+
+    def summed(column: Floats) -> Floats:
+        return np.bincount(recording, column).astype(float)
+
+    parts = 1 if lines.curves else 2
+    size = summed(weight * np.abs(model) ** 2)
+    noise = parts * level**2 * np.bincount(recording) + gain**2 * size
+    square = summed(weight * np.abs(off) ** 2) - noise
+    along = summed(weight * (model.conj() * off).real)
+    mean, rms = _ratios(square.sum(), along.sum(), size.sum())
+    signed = bool(abs(mean) >= _ONE_SIGN * rms)
+    drawn = np.random.default_rng(_SEED).integers(len(size), size=(_DRAWS, len(size)))
+    means, sizes = _ratios(*(column[drawn].sum(axis=1) for column in (square, along, size)))
+    low, high = np.quantile(means if signed else sizes, [0.025, 0.975])
+    return EffectSize(100 * float(mean if signed else rms), 100 * float(low), 100 * float(high), signed)
+
+
+def _ratios(square: Floats, along: Floats, size: Floats) -> tuple[Floats, Floats]:
+    return along / size, np.sqrt(np.maximum(square, 0.0) / size)
+
+
+PERMUTATIONS = 999
+SEED = 20180205
+_LEAST_ARRANGEMENTS = 40
+_ALIASED = 0.98  # share of an axis' functions that the other axes' determine
+_MOST_SENSORS = 64  # of which each has a function of its own: time grows with the square of their number
+_LEVELS = 6  # up to as many levels an axis is a set of levels, beyond it a polynomial
+SIGNIFICANT = 0.05
+_WORTH_TELLING = 0.005  # share of the misfit below which an axis is no cause to look for
+
+
+class Undecidable(StrEnum):
+    """Why it cannot be decided whether the residual depends on an axis."""
+
+    FEW_EXCHANGEABLE = "few_exchangeable"
+    FEW_RECORDINGS = "few_recordings"
+    ALIASED = "aliased"
+    FEW_SIGNS = "few_signs"
+
+
+@dataclass(frozen=True)
+class AxisResult:
+    """Whether the residual depends on an axis: the p-value, and the share of the misfit that the axis explains.
+
+    `p_value` is None where that is undecidable, for the `reason`; `determined_by` are the axes without any of which
+    the others would no longer determine it, where that is the reason.
+    """
+
+    axis: str
+    p_value: float | None
+    share: float
+    reason: Undecidable | None = None
+    determined_by: Sequence[str] = ()
+
+    @property
+    def significant(self) -> bool:
+        """Whether the residual depends on it beyond chance."""
+        return self.p_value is not None and self.p_value < SIGNIFICANT
+
+    @property
+    def telling(self) -> bool:
+        """Whether it does so, and with more than a trace of the misfit."""
+        return self.significant and self.share >= _WORTH_TELLING
+
+
+def locate(lines: Lines, residuals: Residuals) -> list[AxisResult]:
+    """On which axes the residual depends.
+
+    Parameters
+    ----------
+    lines : Lines
+        The recordings.
+    residuals : Residuals
+        Of each recording's gain and of each line, against the base model.
+
+    Returns
+    -------
+    list of AxisResult
+        Every axis that the campaign has: first those that are undecidable, then the others with p-values corrected for
+        their number.
+
+    Source
+    ------
+    Freedman and Lane 1983; Westfall and Young 1993.
+    """
+    random = np.random.default_rng(SEED)
+    bases = _bases(lines)
+    weight = 1 / residuals.gain_deviation
+    blocks = _blocks(lines, bases)
+    gain_misfit = float(((residuals.gain * weight) ** 2).sum())
+    line_misfit = max(float((residuals.line_weight * np.abs(residuals.line) ** 2).sum()) - 2 * len(residuals.line), 0.0)
+    total = gain_misfit + line_misfit
+    results = [
+        AxisResult(name, None, 0.0, Undecidable.FEW_RECORDINGS)
+        for name in recording_axes(lines.campaign)
+        if name not in bases
+    ]
+    statistics: dict[str, Floats] = {}
+    for name, basis in bases.items():
+        others = [other for key, other in bases.items() if key != name]
+        reason = _undecidable(basis, others, blocks[name])
+        if reason:
+            results.append(AxisResult(name, None, 0.0, reason, _determining(name, bases, reason)))
+        else:
+            statistics[name] = _freedman_lane(residuals.gain, weight, basis, others, blocks[name], random)
+    statistics |= _sign_flips(lines, residuals, random)
+    standardised = [_standardised(values) for values in statistics.values()]
+    highest = np.max(standardised, axis=0)[1:] if standardised else np.zeros(0)
+    for (name, explained), values in zip(statistics.items(), standardised, strict=True):
+        beyond = int((highest >= values[0] - 1e-12).sum())
+        results.append(AxisResult(name, (beyond + 1) / (PERMUTATIONS + 1), min(explained[0] / total, 1.0)))
+    if lines.recordings < 6:
+        results += [AxisResult(name, None, 0.0, Undecidable.FEW_SIGNS) for name in lines.row_axes]
+    return results
+
+
+def _standardised(values: Floats) -> Floats:
+    spread = values[1:].std()
+    return (values - values[1:].mean()) / (spread if spread > 0 else 1.0)
+
+
+def _bases(lines: Lines) -> dict[str, Floats]:
+    """Of each axis a few functions over the recordings, their mean taken off; none of too many sensors."""
+    bases = {}
+    for name, column in recording_axes(lines.campaign).items():
+        levels, level = np.unique(np.round(column, 9), axis=0, return_inverse=True)
+        if name == "sensor" and len(levels) > _MOST_SENSORS:
+            continue
+        if name == "sensor" or (len(levels) <= _LEVELS and column.shape[1] == 1):
+            basis = np.eye(len(levels))[level.reshape(-1)][:, 1:]
+        else:
+            scaled = (column - column.mean(axis=0)) / np.maximum(np.ptp(column, axis=0), 1e-12)
+            if column.shape[1] == 1:
+                basis = np.concatenate([scaled**power for power in (1, 2, 3)], axis=1)
+            else:
+                distance = np.hypot(*column.T)[:, None]
+                basis = np.concatenate([scaled, distance / distance.max(), (distance / distance.max()) ** 2], axis=1)
+        bases[name] = basis
+    return bases
+
+
+def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
+    """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
+    none = np.zeros(lines.recordings, dtype=np.intp)
+    days = none
+    times = [entry.recorded_at for entry in lines.campaign.recordings]
+    if None not in times:
+        days = np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
+    axes = recording_axes(lines.campaign)
+    blocks = {}
+    for name in bases:
+        if name == "sensor":
+            blocks[name] = none
+            continue
+        varies = [len(np.unique(axes[name][lines.sensor == number], axis=0)) > 1 for number in np.unique(lines.sensor)]
+        blocks[name] = lines.sensor if all(varies) else (days if name != "recorded_at" else none)
+    return blocks
+
+
+def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
+    arrangements = 1.0
+    for number in np.unique(blocks):
+        arrangements *= float(factorial(min(int((blocks == number).sum()), 20)))
+    if arrangements < _LEAST_ARRANGEMENTS:
+        return Undecidable.FEW_EXCHANGEABLE
+    if others:
+        design = np.column_stack([np.ones(len(basis)), *others])
+        if design.shape[1] >= len(basis):
+            return Undecidable.FEW_RECORDINGS
+        if _determined(basis, others):
+            return Undecidable.ALIASED
+    return None
+
+
+def _determined(basis: Floats, others: Sequence[Floats]) -> bool:
+    """Whether functions of other axes make nearly all of each of an axis' own."""
+    design = np.column_stack([np.ones(len(basis)), *others])
+    fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
+    centred = basis - basis.mean(axis=0)
+    left = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
+    return bool(left.max() < 1 - _ALIASED)
+
+
+def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) -> tuple[str, ...]:
+    """The axes without any of which an aliased one would not be determined."""
+    if reason is not Undecidable.ALIASED:
+        return ()
+    others = {key: basis for key, basis in bases.items() if key != name}
+    return tuple(
+        left_out
+        for left_out in others
+        if not _determined(bases[name], [basis for key, basis in others.items() if key != left_out])
+    )
+
+
+def _freedman_lane(
+    gain: Floats, weight: Floats, basis: Floats, others: list[Floats], blocks: Indices, random: np.random.Generator
+) -> Floats:
+    """The weighted square explained beyond the other axes: as observed, then under each permutation."""
+    reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
+    left, _, _ = np.linalg.svd(reduced, full_matrices=False)
+    left = left[:, : np.linalg.matrix_rank(reduced)]
+
+    def beyond(rows: Floats) -> Floats:
+        return rows - left @ (left.T @ rows)
+
+    residual = beyond((gain * weight)[:, None])
+    direction, size, _ = np.linalg.svd(beyond(basis * weight[:, None]), full_matrices=False)
+    direction = direction[:, size > 1e-8 * size.max()]
+    every = np.concatenate([residual, residual[_permutations(blocks, random), 0].T], axis=1)
+    return ((direction.T @ beyond(every)) ** 2).sum(axis=0)
+
+
+def _permutations(blocks: Indices, random: np.random.Generator) -> Indices:
+    """Orders of the recordings (permutations, recordings), each within its block."""
+    drawn = random.random((PERMUTATIONS, len(blocks)))
+    permutations = np.empty(drawn.shape, dtype=np.intp)
+    permutations[:, np.argsort(blocks, kind="stable")] = np.lexsort((drawn, np.broadcast_to(blocks, drawn.shape)))
+    return permutations
+
+
+def _sign_flips(lines: Lines, residuals: Residuals, random: np.random.Generator) -> dict[str, Floats]:
+    """For frequency (real part) and phase (imaginary part): the weighted square of the mean over recordings."""
+    if lines.recordings < 6 or len(lines.value) < 2 * lines.recordings:
+        return {}
+    line, centres = frequency_bins(lines.frequency)
+    if len(centres) < 2:
+        return {}
+    total = np.bincount(line, residuals.line_weight, len(centres))
+    signs = np.concatenate(
+        [np.ones((1, lines.recordings)), random.choice([-1.0, 1.0], (PERMUTATIONS, lines.recordings))]
+    )
+    statistics = {}
+    parts = {"frequency_hz": residuals.line.real, "phase": residuals.line.imag}
+    if lines.curves:
+        parts = {"displacement_mm": residuals.line.real}
+    for name, part in parts.items():
+        sums = np.zeros((lines.recordings, len(centres)))
+        np.add.at(sums, (lines.recording, line), residuals.line_weight * part)
+        statistics[name] = ((signs @ sums) ** 2 / total).sum(axis=1)
+    return statistics
+
+
+_MOST_OF_IT = 0.7
+
+
+def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dict[str, list[float | str]]:
+    """The smallest ranges of up to two telling axes that hold most of the misfit; of sensors or days the one where
+    it is largest.
+
+    Along the lines it is the lines' misfit that counts, over recordings their gains'.
+
+    Parameters
+    ----------
+    lines : Lines
+        The recordings.
+    residuals : Residuals
+        As for `locate`.
+    results : list of AxisResult
+        As `locate` returns them.
+
+    Returns
+    -------
+    dict
+        By axis the two ends of its range in the units of the campaign, or one text; empty where no axis tells.
+    """
+    telling = sorted((entry for entry in results if entry.telling), key=lambda entry: -entry.share)[:2]
+    if not telling:
+        return {}
+    by_line = telling[0].axis in lines.row_axes
+    gain_misfit = (residuals.gain / residuals.gain_deviation) ** 2
+    if by_line:
+        gain_misfit = (gain_misfit / np.bincount(lines.recording))[lines.recording]
+    line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
+    columns = {}
+    for entry in telling:
+        name = "frequency_hz" if entry.axis == "phase" else entry.axis
+        column = axis_values(lines, name, by_line)
+        if column is not None:
+            columns[name] = column
+    inside = np.ones(len(gain_misfit), dtype=bool)
+    ranges: dict[str, list[float | str]] = {}
+    for name, column in columns.items():
+        misfit = line_misfit if name in lines.row_axes else gain_misfit
+        chosen = _smallest_range(column[inside], misfit[inside])
+        if column.dtype.kind == "U":
+            ranges[name] = [str(chosen[0])]
+            inside &= column == chosen[0]
+        else:
+            ranges[name] = [float(chosen[0]), float(chosen[1])]
+            inside &= (column >= chosen[0]) & (column <= chosen[1])
+    return ranges
+
+
+def in_region(lines: Lines, ranges: dict[str, list[float | str]]) -> Mask:
+    """Which rows lie in a region."""
+    inside = np.ones(len(lines.value), dtype=bool)
+    for name, limits in ranges.items():
+        column = axis_values(lines, name, True)
+        assert column is not None
+        inside &= (column == limits[0]) if len(limits) == 1 else ((column >= limits[0]) & (column <= limits[1]))
+    return inside
+
+
+def reaches_all_along(lines: Lines, name: str, ends: Sequence[float | str]) -> bool:
+    """Whether a region holds every value that the campaign has of one of its axes."""
+    column = axis_values(lines, name, True)
+    assert column is not None
+    if column.dtype.kind == "U":
+        return bool((column == ends[0]).all())
+    return bool(column.min() >= float(ends[0]) and column.max() <= float(ends[1]))
+
+
+def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
+    """A field's values in lab units, of each row or of each recording; the distance in mm stands for a position."""
+    if name == "frequency_hz":
+        return lines.frequency if by_line else None
+    entries = lines.campaign.recordings
+    if name == "displacement_mm":
+        curves = [np.asarray(getattr(entry, name)) for entry in entries]
+        return np.concatenate(curves) if by_line else None
+    column: Array
+    if name == "position_mm":
+        x, y = recording_axes(lines.campaign)[name].T
+        column = np.round(np.hypot(x, y), 6)
+    elif name == "recorded_at":
+        column = np.array([str(entry.recorded_at)[:10] for entry in entries])
+    else:
+        column = np.array([getattr(entry, name) for entry in entries])
+    return column[lines.recording] if by_line else column
+
+
+def _smallest_range(column: Array, misfit: Floats) -> tuple[float | str, float | str]:
+    """The contiguous levels, fewest rows, that hold `_MOST_OF_IT` of the misfit; one level where they have no order."""
+    levels, level, counts = np.unique(column, return_inverse=True, return_counts=True)
+    held = np.bincount(level.reshape(-1), misfit, len(levels))
+    if column.dtype.kind == "U":
+        worst = str(levels[int(np.argmax(held / counts))])
+        return worst, worst
+    best = (0, len(levels) - 1)
+    fewest = int(counts.sum())
+    summed, rows = np.concatenate([[0.0], np.cumsum(held)]), np.concatenate([[0], np.cumsum(counts)])
+    for low in range(len(levels)):
+        high = int(np.searchsorted(summed, summed[low] + _MOST_OF_IT * summed[-1] - 1e-9 * summed[-1]))
+        if high <= len(levels) and high > low and rows[high] - rows[low] < fewest:
+            fewest, best = int(rows[high] - rows[low]), (low, high - 1)
+    return float(levels[best[0]]), float(levels[best[1]])
+
+
+_GRID = 40
+ALONG_CURVES = {"displacement_mm": ("the displacement", "mm"), "time_s": ("time", "s")}  # in words, and the unit
+_LOGARITHMIC = (
+    "preload_n",
+    "indenter_radius_mm",
+    "dynamic_force_n",
+    "load_cycles",
+    "dwell_s",
+    "frequency_hz",
+)
+
+
+class FormKind(StrEnum):
+    """A simple form of a residual over one axis."""
+
+    POWER_LAW = "power_law"
+    DRIFT = "drift"
+    STEP = "step"
+    PERIODIC = "periodic"
+    PEAK = "peak"
+    BUMP = "bump"
+
+
+@dataclass(frozen=True)
+class ShapeForm:
+    """A form, the value `at` which it lies (of periodic ones the period; NaN of none), and its size.
+
+    The size is in percent of the response, of curves in percent of the largest force. `axis` is a field of the
+    campaign; `component` 0 or 1 is x or y of an axis of places. `gain` is the gain in information over a constant.
+    """
+
+    kind: FormKind
+    at: float
+    size: float
+    axis: str = ""
+    component: int | None = None
+    gain: float = 0.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The best form of what remains beyond some mechanisms; None where no simple form fits."""
+
+    beyond: tuple[str, ...]
+    form: ShapeForm | None
+    of_curves: bool
+
+
+def describe(problem: FittingProblem, explanation: Explanation) -> Shape:
+    """The form on the axis where it takes away most."""
+    forms = (_along_curves if problem.lines.curves else _over_axes)(problem, explanation)
+    best = max(forms, key=lambda form: form.gain, default=None)
+    return Shape(explanation.names, best, problem.lines.curves)
+
+
+def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
+    """The best forms of the residual, relative to each curve's largest force, over displacement and over time."""
+    lines = problem.lines
+    assert lines.smooth is not None
+    relative = (lines.value - whole_prediction(problem, explanation)).real / lines.smooth.scale
+    weight = (lines.smooth.scale / lines.deviation) ** 2
+    forms = []
+    for name in ALONG_CURVES:
+        columns = [getattr(entry, name) for entry in lines.campaign.recordings]
+        if all(column is not None for column in columns):
+            forms += _best_form(np.concatenate(columns), relative[:, None], weight, name)
+    return forms
+
+
+def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
+    """The best forms over each of the recordings' axes, and over the lines'."""
+    levels = explanation.best.levels
+    left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    forms: list[ShapeForm] = []
+    for name, column in recording_axes(problem.lines.campaign).items():
+        for index in range(column.shape[1]):
+            component = None if column.shape[1] == 1 else index
+            best = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
+            forms += [replace(form, component=component) for form in best]
+    line, centres = frequency_bins(problem.lines.frequency)
+    if len(centres) >= 6:
+        total = np.bincount(line, left.line_weight, len(centres)).astype(float)
+        parts = [
+            np.bincount(line, left.line_weight * part, len(centres)) / total
+            for part in (left.line.real, left.line.imag)
+        ]
+        forms += _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
+    return forms
+
+
+def _best_form(x: Floats, values: Floats, weight: Floats, axis: str) -> list[ShapeForm]:
+    """The form of largest information criterion, where one beats a constant; values (rows, parts)."""
+    if np.ptp(x) <= 0:
+        return []
+    root = np.sqrt(weight)[:, None]
+
+    def misfit(basis: Floats) -> tuple[float, Floats]:
+        design = np.column_stack([np.ones(len(x)), basis])
+        coefficients = np.linalg.lstsq(design * root, values * root, rcond=None)[0]
+        return float((((values - design @ coefficients) * root) ** 2).sum()), coefficients
+
+    plain, _ = misfit(np.zeros((len(x), 0)))
+    best: list[ShapeForm] = []
+    price = np.log(len(x))
+    for basis, shapes, kind, at in _forms(x, axis):
+        square, coefficients = misfit(basis)
+        gain = 0.5 * (plain - square - price * (shapes + basis.shape[1] * values.shape[1]))
+        if gain > (best[0].gain if best else 0.0):
+            size = 100 * float(np.abs(basis @ coefficients[1:]).max() if basis.size else 0.0)
+            best = [ShapeForm(kind, at, size, axis, gain=float(gain))]
+    return best
+
+
+_Candidate = tuple[Floats, int, FormKind, float]
+
+
+def _forms(x: Floats, axis: str) -> Iterator[_Candidate]:
+    """Basis functions, the number of shape parameters, the form and where it lies. Logarithmic axes come as
+    logarithms."""
+    logarithmic = axis in _LOGARITHMIC
+    yield x[:, None], 0, FormKind.POWER_LAW if logarithmic else FormKind.DRIFT, np.nan
+    levels = np.unique(x)
+    for edge in (levels[1:] + levels[:-1])[:: max(1, len(levels) // _GRID)] / 2:
+        yield (x > edge).astype(float)[:, None], 1, FormKind.STEP, float(np.exp(edge) if logarithmic else edge)
+    natural = np.exp(x) if logarithmic else x
+    if len(levels) >= 6:
+        for period in np.ptp(natural) / np.linspace(0.75, min(8.0, len(levels) / 3), _GRID):
+            angle = 2 * np.pi * natural / period
+            yield np.column_stack([np.sin(angle), np.cos(angle)]), 1, FormKind.PERIODIC, float(period)
+    if axis == "frequency_hz":
+        yield from _peaks(x)
+    if axis in ALONG_CURVES:
+        yield from _bumps(x)
+
+
+def _bumps(x: Floats) -> Iterator[_Candidate]:
+    for centre in np.linspace(x.min(), x.max(), _GRID):
+        for width in (0.03, 0.1, 0.3):
+            lorentzian = 1 / (1 + ((x - centre) / (width * np.ptp(x))) ** 2)
+            yield lorentzian[:, None], 2, FormKind.BUMP, float(centre)
+
+
+def _peaks(x: Floats) -> Iterator[_Candidate]:
+    for centre in np.linspace(x.min(), x.max(), 2 * _GRID):
+        for width in (0.05, 0.1, 0.2, 0.4):
+            if width < 0.5 * np.ptp(x):
+                offset = (x - centre) / width
+                lorentzian = 1 / (1 + offset**2)
+                basis = np.column_stack([lorentzian, offset * lorentzian])
+                yield basis, 2, FormKind.PEAK, float(np.exp(centre))

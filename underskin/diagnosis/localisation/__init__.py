@@ -1,1 +1,0 @@
-"""Where recordings and model disagree, how much, and in which shape."""

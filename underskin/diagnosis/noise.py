@@ -1,0 +1,416 @@
+"""The noise of lines, curves, gains and positions, and its priors.
+
+Priors of the noise that every hypothesis shares.
+
+- gain scatter of a recording (standard deviation of its logarithm): log-uniform from 1 to 5 %, falling off outside to
+  a tenth at 0.3 and at 11 %: a careful rig is better than 1 %, a poor one worse than 5 %;
+- positioning scatter, in x and y: zero with probability 0.7, else log-uniform from 0.05 to 0.3 mm, falling off outside
+  to a tenth at 0.02 and at 0.6 mm;
+- line noise: its level as estimated from the lines' roughness, times a factor near 1.
+
+How large each kind of noise is, as the likelihood takes them: s, κ, p, τ, q and η.
+
+What the samples of a curve share under every hypothesis: what the cell adds, and that no law is exact.
+
+A cell shows its zero F0 and a drift b in time (without times, in the order of the samples) or along the travel beside
+the force (its gain is the recording's, as of FRFs): columns P with normal coefficients, whose scale is the prior's
+standard deviation. Where samples in the air show the zero, F0 is as good as free; else a tared cell is within a
+hundredth of what it measures. The drift over the curve is 2 % of the largest force, or as much as a plain drift or
+the air before a snap-in shows where that is more, and none is looked for where no air shows it.
+
+The position of the surface, friction in a stage and the idealisation of every law bend a curve a little. Neighbouring
+samples share that error too. Within each curve, with s the force (or, near the contact's beginning and in the air, 0.7
+and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size,
+
+    ε ~ N(0, η² B + P Pᵀ),  B = s s' k(x − x'),
+
+k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
+idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
+downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
+
+The noise of single lines, from how rough the lines are along frequency.
+
+Real and imaginary part each have variance d² = rel(f)² A² + floor², A the recording's amplitude around the line.
+What all recordings share at a frequency is taken off, then each line is compared with its two neighbours,
+    e_j = z_j − λ z_(j−1) − (1−λ) z_(j+1)   (linear in log f),   E|e_j|²/2 = d_j² + λ² d_(j−1)² + (1−λ)² d_(j+1)²,
+which smooth misfit hardly reaches. A steep course, such as the flank of a resonance that moves with the preload, does
+reach it: where a law describes that, its prediction (`expected`) is taken off as well (see search.py).
+log rel² is piecewise linear in log f; it and the floor are fitted with Student's likelihood, so that single wild lines
+(mains, a resonance between two lines) do not count, and the level is set by the median of |e|².
+Where `coherence` γ² is given, (1 − γ²)/γ² has the shape of (d/A)² (its n is unknown), and steadies it. It may miss
+noise that is not averaged, alike in all recordings: of many recordings it says little more than of a few.
+Where lines are known to be `uneven` (of a time series whose force has more power at one than at the next), rel is that
+much larger.
+"""
+
+import itertools
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from scipy.optimize import minimize
+
+from underskin.recordings.usual_scatter import GAIN_RANGE, POSITION_RANGE
+from underskin.units import Complexes, Floats, Indices
+
+GAIN_FALL = (0.6, 0.35)  # sd of the logarithm below and above
+POSITION_FALL = (0.4, 0.3)  # the same of positions
+
+
+@dataclass(frozen=True)
+class Plateau:
+    """A density of a logarithm: constant between two values, falling off as half Gaussians outside.
+
+    Normal where the two are one; uniform where `area`, the integral of what is 1 at the plateau, counts only the range.
+    """
+
+    low: float
+    high: float
+    fall_low: float
+    fall_high: float
+    area: float
+
+    @classmethod
+    def of(cls, limits: tuple[float, float], falls: tuple[float, float]) -> "Plateau":
+        """From the values, not their logarithms."""
+        low, high = np.log(limits).tolist()
+        return cls(low, high, *falls, high - low + float(np.sqrt(np.pi / 2)) * sum(falls))
+
+    @classmethod
+    def normal(cls, mean: float, sd: float) -> "Plateau":
+        """A normal density."""
+        return cls(mean, mean, sd, sd, sd * float(np.sqrt(2 * np.pi)))
+
+    @property
+    def middle(self) -> float:
+        """The middle of the constant part."""
+        return (self.low + self.high) / 2
+
+    @property
+    def row(self) -> tuple[float, float, float, float, float]:
+        """Its numbers, with the logarithm of the area, as compiled functions take them."""
+        return self.low, self.high, self.fall_low, self.fall_high, float(np.log(self.area))
+
+    def log_density(self, x: Floats | float) -> Floats:
+        """The logarithm of the density."""
+        outside = np.maximum((self.low - x) / self.fall_low, 0.0) + np.maximum((x - self.high) / self.fall_high, 0.0)
+        return np.asarray(-0.5 * outside**2 - np.log(self.area))
+
+
+START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
+GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
+POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
+# No rig's: something that nobody named moves the recordings
+UNUSUAL_GAIN = Plateau.of((0.12, 0.5), (0.12, 0.12))
+UNUSUAL_POSITION = Plateau.of((0.6e-3, 2e-3), (0.15, 0.15))
+
+
+def level_prior(log_level_sd: float) -> Plateau:
+    """Of the factor on the lines' deviations; wider than the estimate's own error: noise is not quite normal."""
+    return Plateau.normal(0.0, float(np.hypot(log_level_sd, 0.05)))
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """`gain` s, `level` κ, `position` p [m] (0: none), `spread` τ, `pickup` the distinct q, `smooth` η."""
+
+    gain: float
+    level: float
+    position: float
+    spread: float
+    pickup: Floats | None = None
+    smooth: float = 0.0  # of curves
+
+
+@dataclass(frozen=True)
+class SeveralLevels:
+    """Sets of noise levels (…, 1); of pick-up its distinct deviations (…, distinct)."""
+
+    gain: Floats
+    level: Floats
+    position: Floats
+    spread: Floats
+    pickup: Floats | None
+    smooth: Floats
+
+    @property
+    def at_first(self) -> "SeveralLevels":
+        """The first set at each point (points, 1, 1)."""
+        gain, level, position, spread, smooth = (
+            values[:, :1] for values in (self.gain, self.level, self.position, self.spread, self.smooth)
+        )
+        return SeveralLevels(gain, level, position, spread, None, smooth)
+
+    @property
+    def first(self) -> NoiseLevels:
+        """The first set, as numbers."""
+        gain, level, position, spread, smooth = (
+            float(values.flat[0]) for values in (self.gain, self.level, self.position, self.spread, self.smooth)
+        )
+        pickup = None if self.pickup is None else self.pickup.reshape(-1, self.pickup.shape[-1])[0]
+        return NoiseLevels(gain, level, position, spread, pickup, smooth)
+
+
+USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
+UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
+TYPICAL = 3e-3
+_LENGTHS = (0.025, 0.1, 0.4)
+USUAL_DRIFT = 0.02  # of the largest force, over the curve
+_COLUMNS = 3
+
+
+@dataclass(frozen=True)
+class CurveError:
+    """Of all rows of a campaign's curves, one curve after another."""
+
+    scale: Floats  # (rows,) [N]: the deviation is η times this
+    place: Floats  # (rows,) along the curve, 0 to 1
+    columns: Floats  # (rows, columns) [N] of each curve's own coefficients
+    count: Floats  # (rows,) raw samples that each row is the mean of
+    slope: Floats  # (rows,) [N per sample] of the straight line through these
+    about_line: Floats  # (rows,) [N²] the sum of their squares about it
+    slow: Floats  # (rows,) [N] the noise of its curve that neighbouring samples share, as the air shows it
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Of several curves."""
+        columns = [part.columns for part in parts] or [np.zeros((0, 0))]
+
+        def of(name: str) -> Floats:
+            return np.concatenate([*(getattr(part, name) for part in parts), np.zeros(0)])
+
+        return cls(
+            of("scale"), of("place"), np.concatenate(columns), *map(of, ("count", "slope", "about_line", "slow"))
+        )
+
+    def part(self, order: Indices) -> Self:
+        """Of some of the rows."""
+        rows = (self.scale, self.place, self.columns, self.count, self.slope, self.about_line, self.slow)
+        return type(self)(*(entry[order] for entry in rows))
+
+    def within(self, force: Floats, curves: Sequence[slice]) -> float:
+        """The sum of squares [N²] of raw samples about a law beyond that of their means, of whole curves.
+
+        The law's force (rows,) is straight between rows, and so are the samples of a row but for their noise.
+        """
+        middle = np.cumsum(self.count) - self.count / 2
+        slope = np.concatenate([np.gradient(force[own], middle[own]) for own in curves])
+        square = self.count * (self.count**2 - 1) / 12
+        return float((self.about_line + square * (self.slope - slope) ** 2).sum())
+
+    def covariance(self, size: float) -> Floats:
+        """Of rows that are one curve's, with η = `size` (rows, rows)."""
+        return np.asarray(size**2 * np.outer(self.scale, self.scale) * _likeness(self.place))
+
+
+def instrument_columns(displacement: Floats, time: Floats, zero: float, drift: float) -> Floats:
+    """P of one curve (rows, 3): zero, drift in time, drift along the travel; `zero` and `drift` are deviations [N]."""
+    columns = np.zeros((len(displacement), _COLUMNS))
+    columns[:, 0] = zero
+    for place, axis in ((1, time), (2, displacement)):
+        if np.ptp(axis) > 0:
+            columns[:, place] = drift * ((axis - axis[0]) / np.ptp(axis))
+    return columns
+
+
+class Whitening:
+    """κ² D + η² B as κ² times a unit matrix: each curve's rows over d, turned to where B is diagonal, and weighed."""
+
+    def __init__(self, error: CurveError, deviation: Floats, recording: Indices) -> None:
+        """Find the directions of each curve; `deviation` is D's square root (rows,)."""
+        self._deviation = deviation
+        edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+        self._spans = [slice(low, high) for low, high in pairwise(edges)]
+        self._turns, sizes = [], []
+        for span in self._spans:
+            relative = error.scale[span] / deviation[span]
+            size, turn = np.linalg.eigh(relative[:, None] * _likeness(error.place[span]) * relative)
+            self._turns.append(turn.T)
+            sizes.append(np.maximum(size, 0.0))
+        self._size = np.concatenate(sizes)
+        self.columns = self.turned(error.columns.T)  # (columns, rows)
+
+    def log_determinant(self, ratio: Floats) -> Floats:
+        """log|I + (η/κ)² D^(−½) B D^(−½)| at ratios η/κ (…, 1)."""
+        return np.asarray(np.log1p(ratio**2 * self._size).sum(axis=-1, keepdims=True))
+
+    def weight(self, ratio: Floats) -> Floats:
+        """What products of turned rows weigh at ratios η/κ (…, 1): (…, rows)."""
+        return np.asarray(1 / (1 + ratio**2 * self._size))
+
+    def turned(self, rows: Floats) -> Floats:
+        """The rows (…, rows), forces, such that their covariance is κ² diag(1/weight)."""
+        scaled = rows / self._deviation
+        parts = [scaled[..., span] @ turn.T for span, turn in zip(self._spans, self._turns, strict=True)]
+        return np.concatenate(parts, axis=-1)
+
+
+def _likeness(place: Floats) -> Floats:
+    """k between all places of a curve."""
+    total = np.zeros((len(place), len(place)))
+    for length in _LENGTHS:
+        distance = np.sqrt(3.0) * np.abs(place[:, None] - place) / length
+        total += (1 + distance) * np.exp(-distance) / len(_LENGTHS)
+    return total
+
+
+_KNOTS_PER_DECADE = 2.0
+_SMOOTH = 1.0  # sd of the second difference of log rel² between knots
+_FREEDOM = 6.0
+_TYPICAL, _TYPICAL_SD = 1e-4, 3.0  # rel², and the sd of its logarithm: where hardly any line says anything
+_SHARED = 8  # recordings at a frequency from which what they share is taken off
+_WINDOW = 5
+_BLOCK = 10_000  # windows that are copied at a time
+
+
+@dataclass(frozen=True)
+class LineNoise:
+    """`deviation` (rows,) of real and imaginary part [C/N], and how well its level is known (sd of its logarithm)."""
+
+    deviation: Floats
+    log_level_sd: float
+    floor: float
+
+
+def line_noise(
+    value: Complexes,
+    frequency: Floats,
+    recording: Indices,
+    coherence: Floats,
+    uneven: Floats,
+    expected: Complexes | None = None,
+) -> LineNoise:
+    """The noise of the rows, which run over recordings one after another, sorted by frequency within each.
+
+    `expected` (rows,) is a prediction whose course along frequency is no noise.
+    """
+    from underskin.diagnosis.kernels import roughness_cost
+
+    if len(value) == 0:
+        return LineNoise(np.zeros(0), 1.0, 0.0)
+    amplitude = local_amplitude(value, recording)
+    rest = value if expected is None else value - expected
+    middle, share, rough = _roughness(_without_shared(value, frequency, recording, rest), frequency, recording)
+    distinct, line = np.unique(frequency, return_inverse=True)
+    knots = _knots(np.log(distinct))
+    hats = _hats(np.log(distinct), knots)
+    scale = float(np.median(amplitude))
+    rough /= scale**2
+    size2 = (amplitude / scale) ** 2
+    weighed2 = size2 * uneven**2
+    known = np.isfinite(coherence) & (coherence > 0) & (coherence < 1)
+    from_coherence = np.log((1 - coherence[known]) / coherence[known]) if known.any() else None
+    certainty = 1 / (_COHERENCE_VARIANCE + _OF_ALL_VARIANCE * np.bincount(line[known], minlength=1)[line[known]])
+
+    def variance(p: Floats) -> Floats:
+        return np.exp(hats @ p[:-2])[line] * weighed2 + np.exp(p[-2])
+
+    def objective(p: Floats) -> tuple[float, Floats]:
+        relative, floor = np.exp(hats @ p[:-2])[line] * weighed2, np.exp(p[-2])
+        d2 = relative + floor
+        by_d2 = np.zeros(len(d2))
+        cost = roughness_cost(d2, middle, share, rough, _FREEDOM, by_d2)
+        if from_coherence is not None:
+            # Noisy, and with an unknown n: loose Gaussians; p[-1] is log(1/2n).
+            gap = np.log(d2[known] / size2[known]) - from_coherence - p[-1]
+            cost += 0.5 * np.sum(certainty * gap**2)
+            by_d2[known] += certainty * gap / d2[known]
+        bend = np.diff(p[:-2], 2) / _SMOOTH
+        cost += 0.5 * bend @ bend + 0.5 * np.sum(((p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2)
+        cost += 0.5 * ((p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD) ** 2 + 0.5 * (p[-1] + 3.5) ** 2
+        by_p = np.zeros(len(p))
+        by_p[:-2] = (
+            hats.T @ np.bincount(line, by_d2 * relative, len(distinct)) + (p[:-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        )
+        by_p[:-2] += np.convolve(bend, [1, -2, 1]) / _SMOOTH if len(bend) else 0.0
+        by_p[-2] = by_d2.sum() * floor + (p[-2] - np.log(_TYPICAL)) / _TYPICAL_SD**2
+        by_p[-1] = (p[-1] + 3.5) - (certainty @ gap if from_coherence is not None else 0.0)
+        return float(cost), by_p
+
+    level = np.log(max(float(np.median(rough)), 1e-14)) if len(middle) else np.log(_TYPICAL)
+    start = np.concatenate([np.full(len(knots), level - 1.0), [level - 2.0, -3.5]])
+    # SciPy leaves cycles that hold the function, and all arrays with it.
+    p = minimize(weakref.proxy(objective), start, jac=True, method="L-BFGS-B", options={"maxiter": 200}).x
+    d2 = variance(p)
+    freedom = len(middle) / 1.5  # neighbouring differences share lines
+    if len(middle) > 10:
+        of_rough = d2[middle] + share**2 * d2[middle - 1] + (1 - share) ** 2 * d2[middle + 1]
+        median = float(np.median(rough / of_rough))
+        d2 = d2 * (median / np.log(2.0)) ** (freedom / (freedom + 30.0))
+    d2 = np.maximum(d2, (1e-5) ** 2 * size2)
+    sd = float(np.hypot(0.03, 1.0 / np.sqrt(1.0 + 2.0 * freedom)))
+    return LineNoise(scale * np.sqrt(d2), sd, float(scale * np.exp(p[-2] / 2)))
+
+
+_COHERENCE_VARIANCE = 0.5  # of the logarithm of what one recording's says
+_OF_ALL_VARIANCE = 0.1  # and of what all have in common at a frequency
+
+
+def local_amplitude(value: Complexes, recording: Indices) -> Floats:
+    """|FRF| around each line: the median over five neighbours, or its own where that is larger (a sharp peak)."""
+    size = np.abs(value)
+    smooth = size.copy()
+    half = _WINDOW // 2
+    if len(size) >= _WINDOW:
+        windows = np.lib.stride_tricks.sliding_window_view(size, _WINDOW)
+        for low in range(0, len(windows), _BLOCK):
+            some = windows[low : low + _BLOCK]
+            smooth[half + low : half + low + len(some)] = np.partition(some, half, axis=1)[:, half]
+    edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+    for low, high in itertools.pairwise(edges.tolist()):
+        if high - low < _WINDOW:
+            smooth[low:high] = np.median(size[low:high])
+        else:  # windows lie within a recording; its ends have the next one's
+            smooth[low : low + half], smooth[high - half : high] = smooth[low + half], smooth[high - half - 1]
+    return np.maximum(size, smooth)
+
+
+def _interior(recording: Indices, frequency: Floats) -> Indices:
+    """Rows with a lower and a higher neighbour in their own recording."""
+    inner = np.arange(1, len(recording) - 1)
+    same = (recording[inner - 1] == recording[inner]) & (recording[inner + 1] == recording[inner])
+    apart = (frequency[inner] > frequency[inner - 1]) & (frequency[inner + 1] > frequency[inner])
+    return inner[same & apart & (frequency[inner - 1] > 0)]
+
+
+def _roughness(z: Complexes, frequency: Floats, recording: Indices) -> tuple[Indices, Floats, Floats]:
+    """The rows j with two neighbours, λ and |e_j|²/2 of each."""
+    middle = _interior(recording, frequency)
+    log_f = np.log(frequency)
+    share = (log_f[middle + 1] - log_f[middle]) / (log_f[middle + 1] - log_f[middle - 1])
+    return middle, share, np.abs(z[middle] - share * z[middle - 1] - (1 - share) * z[middle + 1]) ** 2 / 2
+
+
+def _without_shared(value: Complexes, frequency: Floats, recording: Indices, rest: Complexes) -> Complexes:
+    """`rest` (rows,), the lines or what is left of them, less each recording's level times what all recordings have of
+    it at that frequency, where many have it."""
+    edges = np.flatnonzero(np.diff(recording, prepend=-1, append=-1))
+    level = np.array([np.median(value.real[low:high]) for low, high in itertools.pairwise(edges.tolist())])
+    ratio = rest / np.where(level == 0, 1.0, level)[recording]
+    _, line, count = np.unique(np.round(frequency, 9), return_inverse=True, return_counts=True)
+    if count[line].min() < _SHARED:
+        return rest
+    shared = np.empty(len(count), dtype=complex)
+    strong = np.abs(level)[recording] > 0.3 * np.median(np.abs(level))
+    for number, rows in enumerate(np.split(np.argsort(line, kind="stable"), np.cumsum(count)[:-1])):
+        chosen = ratio[rows[strong[rows]]]
+        chosen = chosen if len(chosen) else ratio[rows]
+        shared[number] = np.median(chosen.real) + 1j * np.median(chosen.imag)
+    return rest - level[recording] * shared[line]
+
+
+def _knots(log_f: Floats) -> Floats:
+    low, high = float(log_f.min()), float(log_f.max())
+    count = max(1, int(np.ceil((high - low) / np.log(10.0) * _KNOTS_PER_DECADE)))
+    return np.linspace(low, high, count + 1) if high > low else np.array([low])
+
+
+def _hats(log_f: Floats, knots: Floats) -> Floats:
+    """The piecewise linear functions (rows, knots) that are 1 at one knot and 0 at the others."""
+    if len(knots) == 1:
+        return np.ones((len(log_f), 1))
+    place = (log_f - knots[0]) / (knots[1] - knots[0])
+    return np.clip(1 - np.abs(place[:, None] - np.arange(len(knots))), 0, None)

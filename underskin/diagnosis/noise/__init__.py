@@ -1,1 +1,0 @@
-"""The noise of lines, curves, gains and positions, and its priors."""

@@ -1,0 +1,461 @@
+"""Compiled: spheres pressed into a layer, also one that creeps.
+
+Compiled: the contact of a sphere as a function of its radius, and the radius at a travel; see sphere_contact.
+
+Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 9) holds the reduced modulus E', the
+sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, 1
+where the sphere is pressed so deep that it is no paraboloid (else 0), and the share of finite strain's correction.
+`cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
+from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has those of one cell.
+
+Compiled: fading memories, and the edge of a contact that recedes on a body that relaxes; see creeping_contact.
+
+Arrays are (points, curves, samples), memories with the pairs on a last axis; g and τ are (points, pairs).
+"""
+
+import math
+
+import numpy as np
+
+from underskin.compiled import compiled
+from underskin.physics.contact_curves import LARGEST_A_OVER_H
+from underskin.physics.sphere_law import LOAD_OF_REDUCED, WHOLE_OF_LOAD
+from underskin.units import Floats, Indices, Mask
+
+_STRAIN, _LARGEST_STRAIN = 0.2, 0.9  # representative strain over a/R, and where the law ends
+_EXPONENTIAL = 1e-6  # |q| below which the stiffening is
+_LARGEST_RATIO = math.log(100.0)  # of stiffening: Gent's law ends at its limit
+_STEPS = 60
+_TOLERANCE = 3e-7  # of the contact radius, of the last step: what remains is about its square
+_NO_CONTACT = 1e-15  # m, which stands for no radius
+_EQUATOR, _PARABOLIC = 0.9995, 0.02  # a/R beyond which a contact grows no more, and below which a series is exact
+_BENT = 0.25  # of a tangent's reach, that its curvature takes from the next start at most
+LARGEST_CBRT_LOAD = 0.15 ** (1 / 3)  # L^(1/3) where the correction ends, which then stays
+
+Own = tuple[float, float, float, float, float, float, float, float, float]  # a body's numbers
+Four = tuple[float, float, float, float]
+
+_ROWS = "float64[:, :, ::1]"
+_BODY = "float64[:, :, :, ::1], float64[:, :, :, ::1]"
+
+
+@compiled()
+def _stiffened(strain: float, coefficient: float, form: float, exponent: float) -> tuple[float, float]:
+    """Nominal stress at a compressive strain over that of a neo-Hookean solid, and its logarithm's slope.
+
+    (1 + q c J)^(1/q), J = 3 (I/3)^(m/2) of the invariant I = I1 − 3.
+    """
+    strain = max(strain, 1e-9)
+    stretch = 1.0 - strain
+    stress = 1.0 / stretch**2 - stretch
+    third = max(stretch * stretch + 2.0 / stretch - 3.0, 1e-18) / 3.0
+    growth = 3.0 * coefficient * third ** (0.5 * exponent)
+    slope = growth * exponent * stress / (3.0 * third)
+    logarithm = growth
+    if abs(form) >= _EXPONENTIAL:
+        total = max(1.0 + form * growth, 1e-9)
+        logarithm = math.log(total) / form
+        slope /= total
+    if logarithm > _LARGEST_RATIO:
+        logarithm, slope = _LARGEST_RATIO, 0.0
+    return math.exp(logarithm), slope
+
+
+@compiled()
+def _of(body: Floats, point: int, curve: int, sample: int) -> Own:
+    own = body[point, curve, min(sample, body.shape[2] - 1)]
+    return own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7], own[8]
+
+
+@compiled()
+def _whole_sphere(a: float, radius: float) -> tuple[float, float, float]:
+    """F/E', δ and dδ/da of a sphere that is no paraboloid (Sneddon 1965): δ = a artanh(a/R), dF = 2E'a dδ.
+
+    Where a is nearly R the depth goes on in a straight line: no contact is wider.
+    """
+    x = min(a / radius, _EQUATOR)
+    if x < _PARABOLIC:
+        square = x * x
+        depth, slope = radius * square * (1.0 + square / 3.0), 2.0 * x * (1.0 + 2.0 * square / 3.0)
+        return 4.0 / 3.0 * radius**2 * x * square * (1.0 + 0.4 * square), depth, slope
+    turned = math.atanh(x)
+    slope = turned + x / (1.0 - x * x)
+    beyond = a - x * radius
+    force = radius**2 * ((1.0 + x * x) * turned - x) + 2.0 * x * radius * slope * beyond
+    return force, radius * x * turned + slope * beyond, slope
+
+
+@compiled()
+def _strain_ratio(
+    load: float, by_load: float, whole: float, cubics: Floats, u: float, per_h: float
+) -> tuple[float, float]:
+    """δ of the solved contact over the linear one's at the same force, less 1, and its derivative by a.
+
+    x (p0 + p1 x + p2 x²) with x = L^(1/3) of the `load` L, d ln L/da = `by_load`; each p is a cubic over a/h.
+    """
+    x = min(load ** (1 / 3), LARGEST_CBRT_LOAD)
+    by_x = by_load * x / 3.0 if x < LARGEST_CBRT_LOAD else 0.0
+    c3, c2, c1, c0 = cubics[0], cubics[1], cubics[2], cubics[3]
+    p0 = ((c3[4] * u + c2[4]) * u + c1[4]) * u + c0[4]
+    p1 = ((c3[5] * u + c2[5]) * u + c1[5]) * u + c0[5] - whole * WHOLE_OF_LOAD
+    p2 = ((c3[6] * u + c2[6]) * u + c1[6]) * u + c0[6]
+    by_p0 = (3.0 * c3[4] * u + 2.0 * c2[4]) * u + c1[4]
+    by_p1 = (3.0 * c3[5] * u + 2.0 * c2[5]) * u + c1[5]
+    by_p2 = (3.0 * c3[6] * u + 2.0 * c2[6]) * u + c1[6]
+    ratio = x * (p0 + x * (p1 + x * p2))
+    by_a = (p0 + x * (2.0 * p1 + 3.0 * x * p2)) * by_x + x * (by_p0 + x * (by_p1 + x * by_p2)) * per_h
+    return ratio, by_a
+
+
+@compiled()
+def _contact(a: float, own: Own, cubics: Floats) -> tuple[Four, Four]:
+    """F, δ and K without adhesion at the radius a, and ℓ/√w of the adhesive stretch; and their logarithms' derivatives
+    by a."""
+    modulus, radius, _, thickness, coefficient, form, exponent, whole, share = own
+    cell, u, per_h, growth, inverse = 0, 0.0, 0.0, 0.0, 1.0 / a
+    if coefficient >= 0:
+        strain = _STRAIN * a / radius
+        ratio, slope = _stiffened(min(strain, _LARGEST_STRAIN), coefficient, form, exponent)
+        modulus *= ratio
+        growth = slope * _STRAIN / radius if strain < _LARGEST_STRAIN else 0.0
+    depth, stiffness = a * a / radius, 2.0 * modulus * a
+    force, stretch = 2.0 / 3.0 * stiffness * depth, math.sqrt(2.0 * math.pi * a / modulus)
+    by_force, by_depth, by_stiffness = 3.0 * inverse + growth, 2.0 * inverse, inverse + growth
+    by_stretch = 0.5 * (inverse - growth)
+    if whole > 0:
+        force, depth, slope = _whole_sphere(a, radius)
+        force, by_force, by_depth = modulus * force, stiffness * slope / (modulus * force) + growth, slope / depth
+    if thickness > 0:
+        cells = cubics.shape[0]
+        place = min(a / thickness, LARGEST_A_OVER_H) * cells / LARGEST_A_OVER_H
+        cell = min(int(place), cells - 1)
+        u = (place - cell) * LARGEST_A_OVER_H / cells
+        per_h = 1.0 / thickness if place < cells else 0.0
+        c3, c2, c1, c0 = cubics[cell, 0], cubics[cell, 1], cubics[cell, 2], cubics[cell, 3]
+        of_force = ((c3[0] * u + c2[0]) * u + c1[0]) * u + c0[0]
+        of_depth = ((c3[1] * u + c2[1]) * u + c1[1]) * u + c0[1]
+        of_stiffness = ((c3[2] * u + c2[2]) * u + c1[2]) * u + c0[2]
+        of_stretch = ((c3[3] * u + c2[3]) * u + c1[3]) * u + c0[3]
+        by_force += ((3.0 * c3[0] * u + 2.0 * c2[0]) * u + c1[0]) / of_force * per_h
+        by_depth += ((3.0 * c3[1] * u + 2.0 * c2[1]) * u + c1[1]) / of_depth * per_h
+        by_stiffness += ((3.0 * c3[2] * u + 2.0 * c2[2]) * u + c1[2]) / of_stiffness * per_h
+        by_stretch += ((3.0 * c3[3] * u + 2.0 * c2[3]) * u + c1[3]) / of_stretch * per_h
+        force, depth, stiffness, stretch = (
+            force * of_force,
+            depth * of_depth,
+            stiffness * of_stiffness,
+            stretch * of_stretch,
+        )
+    if share != 0:
+        ratio, by_a = _strain_ratio(
+            LOAD_OF_REDUCED * force / (modulus * radius**2), by_force - growth, whole, cubics[cell], u, per_h
+        )
+        total = 1.0 + share * ratio
+        depth, by_depth = depth * total, by_depth + share * by_a / total
+    return (force, depth, stiffness, stretch), (by_force, by_depth, by_stiffness, by_stretch)
+
+
+@compiled()
+def _travel(a: float, root_work: float, own: Own, cubics: Floats) -> tuple[float, float]:
+    """δ + F/k in equilibrium, where δ and F fall by ℓ and K ℓ, and its derivative by a."""
+    (force, depth, stiffness, unit), (by_force, by_depth, by_stiffness, by_stretch) = _contact(a, own, cubics)
+    stretch = unit * root_work
+    lost = stiffness * stretch
+    travel = depth - stretch + own[2] * (force - lost)
+    of_force = force * by_force - lost * (by_stiffness + by_stretch)
+    return travel, depth * by_depth - stretch * by_stretch + own[2] * of_force
+
+
+@compiled()
+def _solved(aim: float, start: float, lowest: float, root_work: float, own: Own, cubics: Floats) -> Four:
+    """The radius, not below `lowest`, at which the travel is `aim`; and the last tangent: where, its travel and slope.
+
+    Newton's steps, and halvings where one leaves the bracket known so far.
+    """
+    radius, below, above, bounded = start, lowest, math.inf, False
+    touching = at_touching = slope = 0.0
+    for _ in range(_STEPS):
+        touching = radius
+        at_touching, slope = _travel(radius, root_work, own, cubics)
+        if at_touching > aim:
+            above = radius
+        else:
+            below, bounded = radius, True
+        step = (at_touching - aim) / slope if slope > 0 else 0.5 * radius
+        radius = max(radius - min(max(step, -radius), 0.9 * radius), lowest)
+        if slope > 0 and abs(radius - touching) <= _TOLERANCE * touching:
+            break
+        if radius >= above or (bounded and radius <= below):
+            radius = 0.5 * (below + above) if above < math.inf else 2 * touching
+            if above - below <= _TOLERANCE * above:
+                break
+    return radius, touching, at_touching, slope
+
+
+@compiled(f"void({_ROWS}, {_BODY}, float64[:, :, :, ::1])")
+def contact_rows(a: Floats, body: Floats, cubics: Floats, contact: Floats) -> None:
+    """Fill F, δ, K and ℓ/√w (4, points, curves, samples) at radii a."""
+    points, curves, samples = a.shape
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            for sample in range(samples):
+                here, _ = _contact(a[point, curve, sample], _of(body, point, curve, sample), layer)
+                for number in range(4):
+                    contact[number, point, curve, sample] = here[number]
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, {_ROWS}, {_ROWS}, {_BODY})")
+def radius_rows(travel: Floats, work: Floats, least: Floats, a: Floats, body: Floats, cubics: Floats) -> None:
+    """Solve travel(a) = travel by Newton's steps from radii `a` above, in place.
+
+    `work` and `least`, which no radius falls below, are (points, curves, samples or 1). The parabola through the last
+    two samples' tangents leads so near the radius of the next that one step is mostly enough.
+    """
+    points, curves, samples = travel.shape
+    alike = work.shape[2] == 1 and body.shape[2] == 1
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            own, root_work = _of(body, point, curve, 0), math.sqrt(work[point, curve, 0])
+            touching, at_touching, slope, bend = 0.0, 0.0, 0.0, 0.0
+            for sample in range(samples):
+                if not alike:
+                    own = _of(body, point, curve, sample)
+                    root_work = math.sqrt(work[point, curve, min(sample, work.shape[2] - 1)])
+                lowest = least[point, curve, min(sample, least.shape[2] - 1)]
+                aim, radius = travel[point, curve, sample], a[point, curve, sample]
+                if root_work == 0 and aim <= 0:  # not in contact, where Newton's steps would shrink without end
+                    a[point, curve, sample], slope = max(lowest, _NO_CONTACT), 0.0
+                    continue
+                if alike and slope > 0:
+                    tangent = (aim - at_touching) / slope
+                    bent = 0.5 * bend * tangent / slope
+                    radius = min(radius, touching + tangent * (1.0 - min(max(bent, -_BENT), _BENT)))
+                before, former = touching, slope
+                radius, touching, at_touching, slope = _solved(aim, max(radius, lowest), lowest, root_work, own, layer)
+                bend = (slope - former) / (touching - before) if former > 0 and touching != before else 0.0
+                a[point, curve, sample] = radius
+
+
+@compiled()
+def _least_travel(low: float, high: float, root_work: float, own: Own, cubics: Floats) -> float:
+    """The radius between two at which the travel's slope is 0; the bound that is nearer where it keeps its sign.
+
+    Regula falsi (Illinois) of slope √a over a^(3/2), which is straight for JKR's contact with a half space.
+    """
+    below, above = low**1.5, high**1.5
+    at_below = _travel(low, root_work, own, cubics)[1] * math.sqrt(low)
+    at_above = _travel(high, root_work, own, cubics)[1] * math.sqrt(high)
+    if at_below >= 0:
+        return low
+    if at_above <= 0:
+        return high
+    radius, before = high, 0.0
+    for _ in range(_STEPS):
+        power = (below * at_above - above * at_below) / (at_above - at_below)
+        radius, before = power ** (2 / 3), radius
+        if abs(radius - before) <= _TOLERANCE * radius:
+            break
+        found = _travel(radius, root_work, own, cubics)[1] * math.sqrt(radius)
+        if found > 0:
+            above, at_above, at_below = power, found, 0.5 * at_below
+        else:
+            below, at_below, at_above = power, found, 0.5 * at_above
+    return radius
+
+
+@compiled(f"void({_ROWS}, {_BODY}, {_ROWS}, {_ROWS})")
+def pull_off_rows(work: Floats, body: Floats, cubics: Floats, radius: Floats, travel: Floats) -> None:
+    """Fill the radius and the travel at which the travel is least in equilibrium."""
+    points, curves, samples = radius.shape
+    for point in range(points):
+        layer = cubics[min(point, len(cubics) - 1)]
+        for curve in range(curves):
+            for sample in range(samples):
+                own = _of(body, point, curve, sample)
+                root_work = math.sqrt(work[point, curve, sample])
+                unit = (2.0 * math.pi * root_work**2 * own[1] ** 2 / own[0]) ** (1 / 3)
+                low, high, thickness = 0.02 * unit, 4.0 * unit, own[3]
+                if thickness > 0:
+                    low, high = min(low, 0.1 * LARGEST_A_OVER_H * thickness), min(high, LARGEST_A_OVER_H * thickness)
+                high = _least_travel(low, high, root_work, own, layer) if low < high else high
+                radius[point, curve, sample] = high
+                travel[point, curve, sample] = _travel(high, root_work, own, layer)[0]
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, boolean[:, :, ::1], {_ROWS})")
+def edge_rows(advancing: Floats, receding: Floats, held: Mask, a: Floats) -> None:
+    """Fill the radius of an edge that advances to `advancing`, recedes to `receding`, and rests in between; it begins
+    anew after a sample out of contact."""
+    points, curves, samples = a.shape
+    for point in range(points):
+        for curve in range(curves):
+            edge = 0.0
+            for sample in range(samples):
+                forward = advancing[point, curve, sample]
+                if held[point, curve, sample] and edge > 0:
+                    edge = min(max(edge, forward), receding[point, curve, sample])
+                else:
+                    edge = forward
+                a[point, curve, sample] = edge
+                if not held[point, curve, sample]:
+                    edge = 0.0
+
+
+_SERIES = 1e-3
+_SECANTS, _SETTLED = 12, 1e-9  # of the edge's place between two samples
+
+Pairs = tuple[Floats, Floats]  # g and τ
+Now = tuple[float, float, Floats]  # depth, time, memory of depths
+Rings = tuple[Floats, Floats, Floats, Floats, Floats]  # depth, time, memory of depths, ℓ and ℓ_s of each sample
+
+_MEMORY = "float64[:, :, :, ::1]"
+_PAIRS = "float64[:, ::1], float64[:, ::1]"
+
+
+@compiled()
+def _lagging(x: float) -> float:
+    """(1 − e^(−x))/x: what is left of a steady change at its end, x of its duration over τ."""
+    return 1 - x / 2 + x**2 / 6 if x < _SERIES else -math.expm1(-x) / x
+
+
+@compiled(f"void({_ROWS}, {_ROWS}, float64[:, ::1], {_MEMORY})")
+def memory_rows(history: Floats, time: Floats, times: Floats, memory: Floats) -> None:
+    """Fill Y = ∫ e^(−(t−s)/τ) du(s) of histories u, straight between samples; what u is at the first came at once."""
+    points, curves, samples = history.shape
+    for point in range(points):
+        for curve in range(curves):
+            u, t, own = history[point, curve], time[point, curve], memory[point, curve]
+            for pair in range(times.shape[1]):
+                own[0, pair] = u[0]
+                for sample in range(1, samples):
+                    x = max(t[sample] - t[sample - 1], 0.0) / times[point, pair]
+                    step = _lagging(x) * (u[sample] - u[sample - 1])
+                    own[sample, pair] = math.exp(-x) * own[sample - 1, pair] + step
+
+
+@compiled()
+def _carried(depth: float, time: float, memory: Floats, pairs: Pairs, now: Now) -> tuple[float, float]:
+    """H(s,t) of a ring that was reached at a depth and time, with the memory of depths then, and e(t−s)."""
+    age = max(now[1] - time, 0.0)
+    carried, remaining = now[0] - depth, 1.0
+    for pair in range(len(pairs[0])):
+        fraction, decay = pairs[0][pair], math.exp(-age / pairs[1][pair])
+        carried += fraction * (now[2][pair] - decay * memory[pair] - now[0] + depth)
+        remaining -= fraction * (1.0 - decay)
+    return carried, remaining
+
+
+@compiled()
+def _excess(ring: int, rings: Rings, pairs: Pairs, now: Now) -> float:
+    """H(s,t) + ℓ_s − ℓ e(t−s) of a ring, above 0 where it holds."""
+    depth, time, memory, slack, parting = rings
+    carried, remaining = _carried(depth[ring], time[ring], memory[ring], pairs, now)
+    return float(carried + parting[ring] - slack[ring] * remaining)
+
+
+@compiled()
+def _between(low: int, high: int, share: float, rings: Rings, pairs: Pairs, memory: Floats) -> None:
+    """Fill the memory of depths of a ring that was reached at a share of the way between two samples."""
+    for pair in range(len(memory)):
+        x = share * max(rings[1][high] - rings[1][low], 0.0) / pairs[1][pair]
+        change = share * (rings[0][high] - rings[0][low])
+        memory[pair] = math.exp(-x) * rings[2][low, pair] + _lagging(x) * change
+
+
+@compiled()
+def _last_sample(low: int, high: int, record: Indices, rings: Rings, pairs: Pairs, now: Now) -> int:
+    """The last of the samples from `low`, which holds, to `high` that does."""
+    if _excess(high, rings, pairs, now) >= 0:
+        return high
+    while high - low > 1:
+        middle = (low + high) // 2
+        # What was reached between two records was not deeper than the first of them.
+        if _excess(record[middle], rings, pairs, now) >= 0:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@compiled()
+def _share(low: int, high: int, rings: Rings, pairs: Pairs, now: Now, memory: Floats) -> float:
+    """The share of the way between two samples up to which rings hold: regula falsi, the end that stays halved."""
+    depth, time, _, slack, parting = rings
+    at_near, at_far = _excess(low, rings, pairs, now), _excess(high, rings, pairs, now)
+    inner, outer, share = 0.0, 1.0, 0.0
+    for _ in range(_SECANTS):
+        fall = at_near - at_far
+        tried = min(max(inner + (outer - inner) * at_near / fall, 0.0), 1.0) if fall > 0 else 0.0
+        settled = abs(tried - share) < _SETTLED
+        share = tried
+        if settled:
+            break
+        _between(low, high, share, rings, pairs, memory)
+        place = depth[low] + share * (depth[high] - depth[low])
+        carried, remaining = _carried(place, time[low] + share * (time[high] - time[low]), memory, pairs, now)
+        stretch = parting[low] + share * (parting[high] - parting[low])
+        value = carried + stretch - (slack[low] + share * (slack[high] - slack[low])) * remaining
+        if value >= 0:
+            inner, at_near, at_far = share, value, 0.5 * at_far
+        else:
+            outer, at_far, at_near = share, value, 0.5 * at_near
+    return share
+
+
+@compiled(
+    f"void({_ROWS}, {_ROWS}, {_MEMORY}, {_ROWS}, {_ROWS}, {_ROWS}, {_MEMORY}, int64[:, :, ::1], int64[:, ::1], "
+    f"{_PAIRS}, {_ROWS}, {_ROWS}, {_ROWS}, boolean[:, :, ::1])"
+)
+def creep_edge_rows(
+    depth: Floats,
+    time: Floats,
+    depth_memory: Floats,
+    slack: Floats,
+    parting: Floats,
+    force: Floats,
+    force_memory: Floats,
+    record: Indices,
+    begins: Indices,
+    fractions: Floats,
+    times: Floats,
+    edge: Floats,
+    carried: Floats,
+    kept: Floats,
+    stuck: Mask,
+) -> None:
+    """Of samples after the last deeper one (`record`) fill whether any ring holds, and of the outermost that does the
+    depth δ it was reached at, H(s,t), and Σ g e^(−(t−s)/τ) Y of the force then.
+
+    Rings let go one after another from the outermost; the one about to lies between two samples.
+    """
+    points, curves, samples = depth.shape
+    memory = np.empty(fractions.shape[1])
+    for point in range(points):
+        pairs = fractions[point], times[point]
+        for curve in range(curves):
+            here = point, curve
+            rings = depth[here], time[here], depth_memory[here], slack[here], parting[here]
+            first = begins[here]
+            for sample in range(first, samples):
+                high = record[point, curve, sample]
+                now = depth[point, curve, sample], time[point, curve, sample], depth_memory[point, curve, sample]
+                if high == sample or not _excess(first, rings, pairs, now) >= 0:
+                    continue
+                low = _last_sample(first, high, record[here], rings, pairs, now)
+                high = min(low + 1, high)
+                share = _share(low, high, rings, pairs, now, memory) if high > low else 0.0
+                _between(low, high, share, rings, pairs, memory)
+                place = rings[0][low] + share * (rings[0][high] - rings[0][low])
+                reached = rings[1][low] + share * (rings[1][high] - rings[1][low])
+                stuck[point, curve, sample] = True
+                edge[point, curve, sample] = place
+                carried[point, curve, sample] = _carried(place, reached, memory, pairs, now)[0]
+                of_force = force[here], time[here], force_memory[here], slack[here], parting[here]
+                _between(low, high, share, of_force, pairs, memory)
+                total = 0.0
+                for pair in range(len(memory)):
+                    age = max(now[1] - reached, 0.0)
+                    total += pairs[0][pair] * math.exp(-age / pairs[1][pair]) * memory[pair]
+                kept[point, curve, sample] = total

@@ -1,0 +1,566 @@
+"""Spectra of time series.
+
+Periodic forces: a sweep, a burst or noise that begins anew, over and over.
+
+Force and charge then have lines at the multiples of 1/T, T the period, and nothing between. Hann's window over two
+periods gives each of them exactly: the window mixes a line with those half a line away alone, which are empty (Pintelon
+and Schoukens, System Identification, 2012, chapter 2). A straight line fitted to a block would take a part of the force
+with it, another one of the charge, and leave their ratio wrong at the lowest lines; the means of the two periods, which
+are equal but for the drift, tell the drift alone.
+
+Defects of a sampled signal: overload (clipping), held samples and jumps.
+
+The blocks that a defect touches are left out of the FRF, and the rest is used.
+
+The FRF from spectra averaged over blocks of two signals.
+
+Stepped sine: where the force dwells on a tone, and the complex amplitude of its cycles there.
+
+A step is a run of cycles of one period, seen by its rising crossings of the middle; the frequency is then refined by
+the phase's advance over the step. Amplitude X means x = Re(X e^(iωt)).
+
+FRFs put together where they have the same lines, so that they are worked on at once.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, median_filter, uniform_filter1d
+
+from underskin.errors import unusable
+from underskin.findings import sentences
+from underskin.findings.sentences import DefectKind
+from underskin.recordings.frf.estimators import Estimator, noise_ratio, ratio
+from underskin.units import Complexes, Floats, Indices, Mask
+
+_FEWEST_PERIODS = 4
+_LEAST_SAMPLES = 16  # of a period
+_PARTS = 8  # of a record: the mean over one is taken for drift where likeness is asked for
+_ALIKE = 0.9  # correlation of one period with each later one
+_AS_GOOD = 0.002  # of the correlation: the shortest of the periods that are as good as the best
+_ROUNDING = 1e-9  # of the force, that a constant one may seem to move by
+_DIP = 0.5  # a correlation below this ends the likeness of neighbouring samples
+
+
+def period_of(force: Floats) -> int:
+    """The samples after which a force repeats itself, at least four times in all; 0 where it does not."""
+    samples = len(force)
+    longest = samples // _FEWEST_PERIODS
+    if longest < _LEAST_SAMPLES:
+        return 0
+    width = samples // _PARTS
+    steady = (force - uniform_filter1d(force, width))[width:-width]  # filtered alike everywhere: as periodic as before
+    power = float(np.mean(steady**2))
+    if power <= (_ROUNDING * float(np.abs(force).max())) ** 2:
+        return 0
+    lags = np.arange(len(steady) // 2 + 1)
+    from scipy.signal import correlate  # takes 0.3 s to load, which few need
+
+    products = correlate(steady, steady, method="fft")[len(steady) - 1 :]
+    likeness = products[: len(lags)] / (len(steady) - lags) / power
+    dips = np.flatnonzero(likeness < _DIP)
+    first = max(_LEAST_SAMPLES, int(dips[0])) if len(dips) else longest + 1
+    if first > longest:
+        return 0
+    least = max(_ALIKE, likeness[first : longest + 1].max() - _AS_GOOD)
+    lag = np.arange(first, min(longest + 1, len(likeness) - 1))
+    peak = (likeness[lag] >= least) & (likeness[lag] >= likeness[lag - 1]) & (likeness[lag] >= likeness[lag + 1])
+    return next((int(period) for period in lag[peak] if likeness[period::period].min() > _ALIKE), 0)
+
+
+def without_drift(blocks: Floats) -> Floats:
+    """Blocks of two periods (blocks, samples) less their mean and the drift from the first period to the second."""
+    period = blocks.shape[1] // 2
+    first, second = blocks[:, :period].mean(axis=1), blocks[:, period:].mean(axis=1)
+    time = (np.arange(blocks.shape[1]) - (blocks.shape[1] - 1) / 2) / period
+    return np.asarray(blocks - ((first + second) / 2)[:, None] - (second - first)[:, None] * time)
+
+
+_CLIPPED_RUN = 3  # samples in a row at the extreme value
+_CLIPPED_RATIO = 5.0  # a quantised sine's top level holds at most 1/(√2 − 1) = 2.4 times the samples of the next
+_HELD_RUN = 5  # samples in a row of one value
+_COARSE = 0.2  # share of samples that equal the one before, above which the levels are coarse
+_ONE_LEVEL = 1.5
+_BY_CHANCE = 1e-3  # runs as long in the whole signal
+_JUMP = 12.0  # second difference over its scale among neighbours; a sine stays below 1.5, noise below 6
+_BLOW, _RINGING = 20.0, 6.0  # kurtosis; a sine has 1.5, noise 3, a hammer's blow hundreds, what rings after it tens
+_AS_SHARP = 0.5  # of a jump: the bend at its place in the next period, where a periodic signal begins anew
+_GIVE_OR_TAKE = 2  # samples: a period need not be a whole number of them
+_CLEAR = 3.0  # standard deviations from 0
+_LOCAL = 64  # samples that make a neighbourhood
+
+
+@dataclass(frozen=True)
+class Defect:
+    """A run of `samples` from `first_sample` of a `channel` that cannot be trusted."""
+
+    kind: DefectKind
+    channel: str
+    samples: int
+    first_sample: int
+
+
+def mean_of(force: Floats) -> float | None:
+    """The mean of a force where it is a preload; None where an AC coupling may have removed that.
+
+    Then the mean lies within three standard deviations of 0.
+    """
+    mean, scatter = float(np.mean(force)), float(np.std(force))
+    return mean if abs(mean) > _CLEAR * scatter else None
+
+
+def defects_of_pair(force: Floats, charge: Floats) -> list[Defect]:
+    """Every defect of force and charge.
+
+    Jumps are no defects where the force is a blow that the charge answers, nor where a periodic force, such as a sweep,
+    begins anew: these recur in each period.
+    """
+    every = [*defects("force_n", force), *defects("charge_pc", charge)]
+    if _kurtosis(force) > _BLOW and _kurtosis(charge) > _RINGING:
+        return [defect for defect in every if defect.kind != DefectKind.JUMP]
+    if all(defect.kind != DefectKind.JUMP for defect in every):
+        return every
+    period = period_of(force)
+    recurs = {name: _recurs(signal, period) for name, signal in (("force_n", force), ("charge_pc", charge))}
+    return [
+        defect for defect in every if defect.kind != DefectKind.JUMP or not recurs[defect.channel][defect.first_sample]
+    ]
+
+
+def _recurs(signal: Floats, period: int) -> Mask:
+    """Where a signal bends as sharply a period before or after; nowhere without a period."""
+    bend = np.pad(np.abs(np.diff(signal, n=2)), 1)
+    if not period:
+        return np.zeros(len(signal), dtype=bool)
+    around = maximum_filter1d(bend, 2 * _GIVE_OR_TAKE + 1)
+    before, after = np.zeros((2, len(signal)))
+    before[period:], after[:-period] = around[:-period], around[period:]
+    return np.asarray(np.maximum(before, after) > _AS_SHARP * bend)
+
+
+def _kurtosis(signal: Floats) -> float:
+    centred = signal - signal.mean()
+    power = float(np.mean(centred**2))
+    return float(np.mean(centred**4)) / power**2 if power > 0 else 0.0
+
+
+def defects(channel: str, signal: Floats) -> list[Defect]:
+    """Every defect of a signal, in order of its kind.
+
+    Dropped samples are seen as a held value, or as a jump where the signal is sampled finely enough to be smooth. Fewer
+    than three samples show none.
+    """
+    if len(signal) < 3:
+        return []
+    clipped = _overload(signal)
+    held = _held(signal) & ~clipped
+    jump = _jumps(signal) & ~clipped & ~held
+    kinds = ((DefectKind.OVERLOAD, clipped), (DefectKind.HELD_SAMPLES, held), (DefectKind.JUMP, jump))
+    return [Defect(kind, channel, count, first) for kind, mask in kinds for first, count in _runs(mask)]
+
+
+def damaged(every: list[Defect], samples: int) -> Mask:
+    """Which of the samples any of the defects touches."""
+    mask = np.zeros(samples, dtype=bool)
+    for defect in every:
+        mask[defect.first_sample : defect.first_sample + defect.samples] = True
+    return mask
+
+
+def _overload(signal: Floats) -> Mask:
+    mask = np.zeros(len(signal), dtype=bool)
+    levels, counts = np.unique(signal, return_counts=True)
+    if len(levels) < 3:
+        return mask
+    for end, neighbour in ((0, 1), (-1, -2)):
+        if counts[end] > _CLIPPED_RATIO * counts[neighbour]:
+            for first, count in _runs(signal == levels[end]):
+                if count >= _CLIPPED_RUN:
+                    mask[first : first + count] = True
+    return mask
+
+
+def _held(signal: Floats) -> Mask:
+    """Runs of one value that end in more than one level's step (a slow signal turns on one level); where levels are so
+    coarse that neighbours are alike by chance, those that end in a leap."""
+    step = np.abs(np.diff(signal))
+    same = np.concatenate([[False], step == 0])
+    mask = np.zeros(len(signal), dtype=bool)
+    usual, width = float(same.mean()), 2 * _LOCAL + 1
+    around = uniform_filter1d(same.astype(float), width)
+    level, leap = float(step[step > 0].min(initial=np.inf)), 2 * np.quantile(step, 0.999)
+    for first, count in _runs(same):
+        after = step[first + count - 1] if first + count < len(signal) else 2 * level
+        alike = max(usual, around[first + count // 2] - count / width)
+        by_chance = usual > _COARSE or len(signal) * alike**count > _BY_CHANCE
+        if count >= _HELD_RUN - 1 and after > (leap if by_chance else _ONE_LEVEL * level):
+            mask[first - 1 : first + count] = True
+    return mask
+
+
+def _jumps(signal: Floats) -> Mask:
+    mask = np.zeros(len(signal), dtype=bool)
+    bend = np.abs(np.diff(signal, n=2))
+    # In parts of two lengths, so that they are taken at once: a long series has some ten thousand.
+    length, longer = divmod(len(bend), max(1, len(bend) // _LOCAL))
+    parts = np.split(bend, [longer * (length + 1)])
+    sizes = (length + 1, length)
+    medians = [np.median(part.reshape(-1, size), axis=1) for part, size in zip(parts, sizes, strict=True)]
+    usual = 1.4826 * np.concatenate(medians)
+    around = np.max([np.roll(usual, shift) for shift in (-1, 0, 1)], axis=0)
+    scale = np.repeat(around, np.repeat(sizes, [len(of_size) for of_size in medians]))
+    mask[1:-1] = (bend > _JUMP * scale) & (scale > 0)
+    return mask
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """First index and length of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(first), int(last - first)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Blocks as long as their `taper` that start every `step` samples, less what `steadied` takes off them, and the
+    `lines` of their spectra that are kept."""
+
+    taper: Floats
+    step: int
+    lines: slice
+    steadied: Callable[[Floats], Floats]
+
+    def of(self, signal: NDArray[np.generic]) -> NDArray[Any]:
+        """(blocks, samples)."""
+        return np.lib.stride_tricks.sliding_window_view(signal, len(self.taper))[:: self.step]
+
+    def spectra(self, signal: Floats) -> Complexes:
+        """(blocks, lines)."""
+        return np.fft.rfft(self.steadied(self.of(signal)) * self.taper)[:, self.lines]
+
+
+@dataclass(frozen=True)
+class Frf:
+    """Lines of a measured FRF: `frequency` [Hz], `values` [C/N], and γ² and the number of averages where known.
+
+    `averages` counts independent blocks (overlapping ones count for less than one each); NaN coherence where a line
+    was averaged over one block. `defects` are those of the time series. `force_power` [N²] and
+    `charge_power` [C²] are mean squared amplitudes, and `passes` is in how many blocks the force has its power at a
+    line, (Σ p)²/Σ p²; None of tones. `independent`: whether neighbouring lines' noise is. `used`: the lines that say
+    something (`line_choice`), None where nobody looked. `bias` is what noise made of the `estimator` and was taken
+    off, and `bias_unsure` what that leaves open, relative and about the same for all lines (`line_choice`).
+    """
+
+    frequency: Floats
+    values: Complexes
+    coherence: Floats | None = None
+    averages: Floats | None = None
+    defects: tuple[Defect, ...] = ()
+    force_power: Floats | None = None
+    charge_power: Floats | None = None
+    independent: bool = True
+    passes: Floats | None = None
+    estimator: Estimator = "H1"
+    used: Mask | None = None
+    bias: float = 0.0
+    bias_unsure: float = 0.0
+
+    @property
+    def coherence_or_nan(self) -> Floats:
+        """γ² of each line, NaN where it is not known."""
+        return np.full(len(self.values), np.nan) if self.coherence is None else self.coherence
+
+    def at(self, lines: Indices) -> "Frf":
+        """The same at some of the lines."""
+        columns = ("frequency", "values", "coherence", "averages", "force_power", "charge_power", "passes", "used")
+        known = {name: column for name in columns if (column := getattr(self, name)) is not None}
+        return replace(self, **{name: column[lines] for name, column in known.items()})
+
+    @property
+    def used_or_all(self) -> Mask:
+        """The lines that say something; all where nobody looked."""
+        return np.ones(len(self.values), dtype=bool) if self.used is None else self.used
+
+    @property
+    def relative_uncertainty(self) -> Floats | None:
+        """Standard uncertainty of log|FRF|, and of the phase in radians; None where n is not known."""
+        if self.coherence is None or self.averages is None:
+            return None
+        return np.sqrt((1 - self.coherence) / (2 * self.averages * np.maximum(self.coherence, 1e-12)))
+
+
+def averaged(force: Floats, charge: Floats, sample_rate: float, blocks: Blocks, estimator: Estimator) -> Frf:
+    """The average over the undamaged blocks of force [N] and charge [C], sampled at `sample_rate` [Hz]."""
+    defects = defects_of_pair(force, charge)
+    whole = ~blocks.of(damaged(defects, len(force))).any(axis=1)
+    count = int(whole.sum())
+    if not count:
+        first = defects[0]
+        words = sentences.defect(first.kind, first.channel, first.samples, first.first_sample)
+        raise unusable(first.channel, f"{len(defects)} defects", f"no undamaged block: {words}")
+    force_spectra, charge_spectra = (blocks.spectra(signal)[whole] for signal in (force, charge))
+    frequency: Floats = sample_rate * np.fft.rfftfreq(len(blocks.taper))[blocks.lines].astype(np.float64)
+    averages = _independent_blocks(count, blocks.taper, blocks.step)
+    kappa = noise_ratio([(force_spectra, charge_spectra)])
+    values, coherence = ratio(force_spectra, charge_spectra, estimator, kappa)
+    scale = 2 / blocks.taper.sum()
+    force_power, charge_power = (np.abs(scale * spectra) ** 2 for spectra in (force_spectra, charge_spectra))
+    return Frf(
+        frequency,
+        values,
+        coherence if count > 1 else np.full_like(coherence, np.nan),
+        np.full(len(frequency), averages),
+        tuple(defects),
+        force_power.mean(axis=0),
+        charge_power.mean(axis=0),
+        passes=force_power.sum(axis=0) ** 2 / np.maximum((force_power**2).sum(axis=0), _TINY),
+        estimator=estimator,
+    )
+
+
+def without_line(blocks: Floats) -> Floats:
+    """The blocks (blocks, samples) less the straight line that fits each best."""
+    time = np.arange(blocks.shape[1]) - (blocks.shape[1] - 1) / 2
+    level = blocks.mean(axis=1, keepdims=True)
+    slope = (blocks @ time / (time @ time))[:, None]
+    return blocks - level - slope * time
+
+
+def _independent_blocks(count: int, taper: Floats, step: int) -> float:
+    """How many independent blocks carry as much as `count` overlapping ones (Welch 1967)."""
+    power = taper @ taper
+    excess = 0.0
+    for lag in range(1, min(count, -(-len(taper) // step))):
+        shared = float(taper[lag * step :] @ taper[: len(taper) - lag * step] / power)
+        excess += 2 * (1 - lag / count) * shared**2
+    return count / (1 + excess)
+
+
+_SAME_PERIOD = 0.05
+_DRIFT = 0.025  # of the period, from a run's first half to its second: a sweep's runs drift by about 0.05
+_FEWEST_CYCLES = 4
+_FINE = 8  # samples a cycle
+_COVERED = 0.7  # a force that dwells on tones does so for most of its time
+_BLOCK = 16  # samples, at least, in the whole cycles that make a block of the average
+_SETTLING = 0.1  # of a step, and at least one cycle: the answer to the step itself dies away
+
+
+@dataclass(frozen=True)
+class Step:
+    """Samples `first` to `last` (excluded) of a tone of `frequency` [Hz]."""
+
+    first: int
+    last: int
+    frequency: float
+
+
+def find_steps(force: Floats, sample_rate: float) -> list[Step]:
+    """The dwells of a stepped-sine force.
+
+    Parameters
+    ----------
+    force : (samples,) array
+        [N].
+    sample_rate : float
+        [Hz].
+
+    Returns
+    -------
+    list of Step
+        In order of time; empty where the force does not dwell on tones for most of its time.
+    """
+    crossings = _rising_crossings(force)
+    if len(crossings) > 1 and np.median(np.diff(crossings)) < _FINE:  # too few samples a cycle to place a crossing
+        from scipy.signal import resample_poly  # takes 0.3 s to load, which few need
+
+        crossings = _rising_crossings(resample_poly(force - np.median(force), _FINE, 1)) / _FINE
+    if len(crossings) <= _FEWEST_CYCLES:
+        return []
+    steps = [
+        Step(int(np.ceil(start)), int(end), _refined(force, start, end, cycles) * sample_rate)
+        for start, end, cycles in _even_runs(crossings)
+    ]
+    return steps if sum(step.last - step.first for step in steps) >= _COVERED * len(force) else []
+
+
+def settled(step: Step, sample_rate: float) -> int:
+    """The sample from which the answer to the step itself has died away."""
+    return step.first + int(np.ceil(max(sample_rate / step.frequency, _SETTLING * (step.last - step.first))))
+
+
+def step_amplitudes(
+    force: Floats, charge: Floats, sample_rate: float, step: Step, bad: Mask
+) -> tuple[Complexes, Complexes]:
+    """Complex amplitudes of force and charge in each settled, undamaged block of whole cycles.
+
+    Amplitude X of a signal x at the angular frequency ω of the step means x = Re(X e^(iωt)).
+
+    Parameters
+    ----------
+    force, charge : (samples,) arrays
+        [N], [C].
+    sample_rate : float
+        [Hz].
+    step : Step
+        The samples, and the frequency [Hz] that the force dwells on.
+    bad : (samples,) array of bool
+        Which samples are damaged.
+
+    Returns
+    -------
+    force, charge : (blocks,) complex arrays
+        [N], [C]; empty where no block has settled.
+    """
+    period = sample_rate / step.frequency
+    first = settled(step, sample_rate)
+    block = period * np.ceil(_BLOCK / period)
+    blocks = int((step.last - first) / block)
+    if blocks < 1:
+        return np.empty(0, complex), np.empty(0, complex)
+    edges = first + np.round(np.arange(blocks + 1) * block).astype(int)
+    whole = np.array([not bad[a:b].any() for a, b in pairwise(edges)])
+    time = np.arange(edges[0], edges[-1]) / sample_rate
+    good = ~bad[edges[0] : edges[-1]]
+    pair = []
+    for signal in (force, charge):
+        part = signal[edges[0] : edges[-1]]
+        level = _level_and_drift(part, time, step.frequency, good)
+        pair.append(_each_block(part - level, time, step.frequency, edges - edges[0])[whole])
+    return pair[0], pair[1]
+
+
+def _level_and_drift(signal: Floats, time: Floats, frequency: float, good: Mask) -> Floats:
+    """DC and drift of a tone: the straight line of a least-squares fit of line, cosine and sine."""
+    angle = 2 * np.pi * frequency * time
+    line = np.column_stack([np.ones_like(time), time - time.mean()])
+    basis = np.column_stack([line, np.cos(angle), np.sin(angle)])
+    if good.sum() < basis.shape[1]:
+        return np.zeros_like(signal)
+    coefficients = np.linalg.lstsq(basis[good], signal[good], rcond=None)[0]
+    return line @ coefficients[:2]
+
+
+def _each_block(signal: Floats, time: Floats, frequency: float, edges: NDArray[np.int_]) -> Complexes:
+    """Least squares on cosine and sine in each block."""
+    angle = 2 * np.pi * frequency * time
+    cosine, sine = np.cos(angle), np.sin(angle)
+    sums = [
+        np.add.reduceat(product, edges[:-1])
+        for product in (cosine * cosine, cosine * sine, sine * sine, cosine * signal, sine * signal)
+    ]
+    cc, cs, ss, cx, sx = sums
+    determinant = cc * ss - cs**2
+    return ((ss * cx - cs * sx) - 1j * (cc * sx - cs * cx)) / determinant
+
+
+def _rising_crossings(signal: Floats) -> Floats:
+    """Places (fractions of a sample) where the signal rises through its running middle, noise ignored."""
+    middle = signal - np.median(signal)
+    threshold = 0.3 * np.quantile(np.abs(middle), 0.9)
+    state = np.where(middle > threshold, 1, np.where(middle < -threshold, -1, 0))
+    marks = np.flatnonzero(state)
+    rising = (state[marks[1:]] == 1) & (state[marks[:-1]] == -1)
+    before, rises = marks[:-1][rising], marks[1:][rising]
+    low, high = middle[before], middle[rises]
+    return before + (rises - before) * low / (low - high)
+
+
+def _even_runs(crossings: Floats) -> list[tuple[float, float, int]]:
+    """First and last crossing and number of cycles of each run of nearly equal periods."""
+    places = crossings.tolist()
+    runs, start = [], 0
+    for index in range(1, len(places)):
+        if index + 1 < len(places):
+            mean = (places[index] - places[start]) / (index - start)
+            if abs(places[index + 1] - places[index] - mean) < _SAME_PERIOD * mean:
+                continue
+        if index - start >= _FEWEST_CYCLES and not _drifts(places[start : index + 1]):
+            runs.append((places[start], places[index], index - start))
+        start = index
+    return runs
+
+
+def _drifts(crossings: list[float]) -> bool:
+    """Whether the period changes over a run: a sweep passes through tones and dwells on none."""
+    half = len(crossings) // 2
+    first, second = crossings[half] - crossings[0], crossings[-1] - crossings[-1 - half]
+    return abs(second - first) > _DRIFT * first
+
+
+def _refined(signal: Floats, start: float, end: float, cycles: int) -> float:
+    """Cycles per sample: the phase of the second half of a run against the first."""
+    frequency = cycles / (end - start)
+    place = np.arange(int(np.ceil(start)), int(end))
+    size = int(cycles // 2 / frequency)
+    if size < _BLOCK:
+        return frequency
+    phases = []
+    for part in (place[:size], place[-size:]):
+        values = signal[part] - signal[part].mean()
+        phases.append(values @ (np.hanning(len(part)) * np.exp(-2j * np.pi * frequency * part)))
+    advance = np.angle(phases[1] / phases[0])
+    return float(frequency + advance / (2 * np.pi * (place[-size] - place[0])))
+
+
+_AROUND = 11  # lines whose median γ² is that to be expected in their middle
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Recordings of one grid: `rows` are their numbers; frequency (lines,), values (rows, lines), γ² or NaN, and which
+    lines of each recording are `used`, all where nobody looked."""
+
+    rows: Indices
+    frequency: Floats
+    values: Complexes
+    coherence: Floats
+    used: Mask
+
+    def at(self, lines: Mask) -> "Stack":
+        """The same at some of the lines (lines,)."""
+        columns = (self.values[:, lines], self.coherence[:, lines], self.used[:, lines])
+        return Stack(self.rows, self.frequency[lines], *columns)
+
+    @cached_property
+    def weights(self) -> Floats:
+        """γ²/(1 − γ²) of the lines that are used (rows, lines), by which the variance of a line goes, with the γ² to be
+        expected; rounding of γ² near 1 is kept from ruling."""
+        weights = np.zeros(self.coherence.shape)
+        for row, (coherence, used) in enumerate(zip(self.coherence, self.used, strict=True)):
+            weights[row, used] = information(expected_coherence(coherence[used]))
+        return weights
+
+
+def information(coherence: Floats) -> Floats:
+    """γ²/(1 − γ²) of lines (lines,), 1 where γ² is not known."""
+    weight = coherence / np.maximum(1 - coherence, 1e-3)
+    return np.where(np.isfinite(coherence), np.maximum(weight, 1e-9), 1.0)
+
+
+def expected_coherence(coherence: Floats) -> Floats:
+    """γ² of each line (lines,) by those around it: weights by a line's own γ² prefer those that came out too large."""
+    if not np.isfinite(coherence).all() or len(coherence) < _AROUND:
+        return coherence
+    return np.asarray(median_filter(coherence, _AROUND, mode="nearest"))
+
+
+def stacked(frfs: Sequence[Frf]) -> list[Stack]:
+    """The recordings, put together where they share the same lines."""
+    members: dict[bytes, list[int]] = {}
+    for row, frf in enumerate(frfs):
+        members.setdefault(frf.frequency.tobytes(), []).append(row)
+    stacks = []
+    for rows in members.values():
+        own = [frfs[row] for row in rows]
+        values = np.array([frf.values for frf in own])
+        coherence = np.array([frf.coherence_or_nan for frf in own])
+        used = np.array([frf.used_or_all for frf in own])
+        stacks.append(Stack(np.array(rows), frfs[rows[0]].frequency, values, coherence, used))
+    return stacks

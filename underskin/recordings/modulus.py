@@ -1,0 +1,556 @@
+"""Moduli of single curves.
+
+The first loading branch of a curve: what a modulus is told from.
+
+The modulus that the first loading branch of a compressed or pulled sample tells. SI inside.
+
+Two laws are tried, each over the first part of the curve that it holds: the incompressible neo-Hookean solid between
+smooth platens, nominal stress = (E/3)(λ⁻² − λ) with λ = 1 − strain, compression positive; and Hooke's straight line,
+nominal stress = E strain. That which holds over more strain is the sample's; where both hold equally far the line if it
+leaves less, else the neo-Hookean one.
+
+The modulus that the first loading branch of an indentation tells: F = F0 + E' f(d − d0), the contact point d0 free,
+f that of a sphere on the layer whose thickness is declared, else on a half space; of the whole sphere where it is
+pressed deep (physics/sphere_law.py). SI inside.
+
+No number is quoted where the law does not hold: pressed deeper than it reaches, or where the force follows another
+power of the depth than a sphere's. That power is 1 under a flat punch or a stage that gives, 3/2 under a small sphere,
+2 under a cone, and above 3/2 on a layer whose thickness nobody declared.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from underskin.errors import InvalidInput, too_few, unequal_lengths, unusable
+from underskin.physics.skin import INCOMPRESSIBLE
+from underskin.physics.sphere_law import PARABOLOID, Softening, SphereLaw
+from underskin.recordings.campaign import CompressionRecording, IndentationRecording
+from underskin.recordings.curve_course import roughness
+from underskin.units import Floats, to_lab, to_si
+
+FEWEST = 8  # samples
+
+
+def loading_branch(along: Floats, load: Floats) -> tuple[Floats, Floats]:
+    """The samples up to the largest load (samples,), of those where both are finite.
+
+    `along` is the displacement or the strain, `load` the force or the stress, in any units. Raises InvalidInput where
+    the two differ in length, fewer than `FEWEST` samples load, or nothing moves.
+    """
+    if len(along) != len(load):
+        raise unequal_lengths("force_n", len(load), len(along), "displacement_mm")
+    finite = np.isfinite(along) & np.isfinite(load)
+    along, load = along[finite], load[finite]
+    if len(load) < FEWEST:
+        raise too_few("force_n", f"{len(load)} samples", f"must load over at least {FEWEST} entries")
+    top = int(np.argmax(np.abs(load - load[0])))
+    if top + 1 < FEWEST:
+        raise too_few("force_n", f"largest at entry {top}", f"must load over at least {FEWEST} entries")
+    if along[top] == along[0]:
+        raise unusable("displacement_mm", float(along[top]), "must change while the force rises")
+    return along[: top + 1], load[: top + 1]
+
+
+# Largest departure from a law: of the stress that it spans, of the stress there, and of that of the whole curve
+_STRAIGHT, _LOCALLY, _LEAST = 0.012, 0.05, 2e-3
+_LEAVES = 0.02  # departure from it, of the stress, at which the curve no longer follows the law
+_EARLY = 0.1  # the first such part starts below this share of the stress at its end
+_POINTS = 400
+_LEAST_STRETCH = 0.05  # of λ: a sample that is pressed to less is none
+_FOOT_ROUNDS = 2  # by which the foot of the curve is found, from which strain counts
+_FOOT = 0.01  # of the strain at a part's end: a part that starts nearer to the foot starts at it
+_SMOOTH = 5  # degree of the polynomial that stands for a curve of few points
+_LONGER = 1.15  # times as much strain: a law that holds over so much more is the better one
+_BETTER = 0.8  # of the other's departure: of two that hold equally far, the line is the better law then
+
+
+@dataclass(frozen=True)
+class CompressionModulus:
+    """E by the law that holds over the first part of the curve [Pa], its standard uncertainty, the part's ends, and
+    where the curve leaves the law.
+
+    Strains count from the foot of the curve, compression or tension positive. `leaves_at_strain` and `leaves_at_stress`
+    are None where the curve follows the law to its end; `departure` is the root mean square of what it leaves of the
+    part, over the stress that it spans. The uncertainty holds noise and the change of slope within the part;
+    friction at the platens and the sample's size are not in it.
+    """
+
+    modulus: float
+    uncertainty: float
+    first_strain: float
+    last_strain: float
+    leaves_at_strain: float | None
+    leaves_at_stress: float | None
+    is_straight: bool
+    departure: float
+
+    @property
+    def statement(self) -> str:
+        """Which law, and where it holds, in words."""
+        law = "straight" if self.is_straight else "neo-Hookean"
+        first = 0.0 if abs(self.first_strain) < _FOOT * self.last_strain else self.first_strain
+        follows = f"{law} from {100 * first:.3g} to {100 * self.last_strain:.3g} % strain"
+        if self.leaves_at_strain is None or self.leaves_at_stress is None:
+            return f"{follows}, and not seen to leave the {'line' if self.is_straight else 'law'}"
+        stress = float(to_lab("mean_stress_mpa", self.leaves_at_stress))
+        off = "line" if self.is_straight else "law"
+        return f"{follows}; leaves the {off} at {stress:.3g} MPa, {100 * self.leaves_at_strain:.3g} % from its foot"
+
+
+def of_compression(recording: CompressionRecording) -> CompressionModulus:
+    """The modulus of a `compression` recording."""
+    return compression_modulus(
+        to_si("displacement_mm", recording.displacement_mm),
+        to_si("force_n", recording.force_n),
+        float(to_si("sample_height_mm", recording.sample_height_mm)),
+        float(to_si("sample_diameter_mm", recording.sample_diameter_mm)),
+    )
+
+
+def compression_modulus(displacement: Floats, force: Floats, height: float, diameter: float) -> CompressionModulus:
+    """The modulus of a cylinder; compression positive, or tension with both negative.
+
+    Raises InvalidInput where the loading branch has too few points, or does not load.
+    """
+    along, load = loading_branch(displacement, force)
+    stress = load / (np.pi / 4 * diameter**2)
+    sign = 1.0 if stress[-1] >= stress[0] else -1.0
+    noise = _noise(along, stress) / np.sqrt(max(1.0, len(along) / _POINTS))
+    foot = float(along[np.abs(load).argmin()])
+    line = _by_law(along, stress, height, sign, noise, foot, straight=True)
+    if (along.max() - foot) / height > 1 - _LEAST_STRETCH:  # through all of the sample: a slip of units
+        return line
+    neo_hookean = _by_law(along, stress, height, sign, noise, foot, straight=False)
+    by_law, by_line = (one.last_strain - one.first_strain for one in (neo_hookean, line))
+    if max(by_law, by_line) > _LONGER * min(by_law, by_line):
+        return line if by_line > by_law else neo_hookean
+    return line if line.departure < _BETTER * neo_hookean.departure else neo_hookean
+
+
+def _by_law(
+    along: Floats, stress: Floats, height: float, sign: float, noise: float, foot: float, *, straight: bool
+) -> CompressionModulus:
+    """By one law; `foot` is about where the stress is 0, `sign` 1 where it grows with the displacement's pressing."""
+    for _ in range(_FOOT_ROUNDS):
+        strain, binned = _thinned(sign * (along - foot) / height, sign * stress)
+        stretched = strain if straight else sign * _neo_hookean(sign * strain)
+        first, last = _first_straight(stretched, binned, noise)
+        part = slice(first, last + 1)
+        slope, level = (float(value) for value in np.polyfit(stretched[part], binned[part], 1))
+        if not slope > 0 or straight:
+            break
+        foot -= sign * height * level / slope
+    middle = (first + last + 1) // 2
+    halves = [
+        np.polyfit(stretched[half], binned[half], 1)[0] for half in (slice(first, middle), slice(middle, last + 1))
+    ]
+    span = stretched[part] - stretched[part].mean()
+    rest = binned[part] - level - slope * stretched[part]
+    by_noise = noise / np.sqrt(span @ span)
+    leaves = _leaves(stretched, binned, slope, level, last, noise)
+    foot_strain = -level / slope if straight and slope else 0.0  # else counted from there already
+    return CompressionModulus(
+        modulus=slope,
+        uncertainty=float(np.hypot(by_noise, (halves[1] - halves[0]) / np.sqrt(12))),
+        first_strain=float(strain[first] - foot_strain),
+        last_strain=float(strain[last] - foot_strain),
+        leaves_at_strain=None if leaves is None else float(strain[leaves] - foot_strain),
+        leaves_at_stress=None if leaves is None else float(binned[leaves]),
+        is_straight=straight,
+        departure=float(np.sqrt(np.mean(rest**2)) / max(float(np.ptp(binned[part])), 1e-300)),
+    )
+
+
+def _neo_hookean(strain: Floats) -> Floats:
+    """Nominal stress over E at strains, compression positive."""
+    stretch = np.maximum(1.0 - strain, _LEAST_STRETCH)
+    return np.asarray((stretch**-2 - stretch) / 3)
+
+
+def _thinned(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
+    """Means over equal bins of strain, in order."""
+    bins = np.clip(((strain - strain.min()) / np.ptp(strain) * _POINTS).astype(int), 0, _POINTS - 1)
+    _, member, count = np.unique(bins, return_inverse=True, return_counts=True)
+    return np.bincount(member, strain) / count, np.bincount(member, stress) / count
+
+
+def _noise(along: Floats, values: Floats) -> float:
+    """Of one point: by the second difference, which a smooth curve of many points hardly has, and at most by what a
+    smooth polynomial leaves, since few points bend from one to the next by more than their noise."""
+    if len(values) < 3:
+        return 0.0
+    by_difference = float(1.4826 * np.median(np.abs(np.diff(values, n=2))) / np.sqrt(6))
+    place = 2 * (along - along.min()) / np.ptp(along) - 1
+    degree = min(_SMOOTH, len(values) - 3)
+    powers = np.polynomial.legendre.legvander(place, degree)
+    left = values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
+    freedom = max(len(values) - degree - 1, 1)
+    return min(by_difference, float(np.sqrt(left @ left / freedom)))
+
+
+def _first_straight(strain: Floats, stress: Floats, noise: float) -> tuple[int, int]:
+    """First and last point of the longest straight part among those that start early.
+
+    A toe is passed over, a start that is steeper is not: there the stress lies below the line.
+    """
+    best = (0, min(len(strain), FEWEST) - 1)
+    least = _LEAST * float(np.ptp(stress))
+    for first in range(0, len(strain) - FEWEST, max(1, len(strain) // 100)):
+        for last in range(len(strain) - 1, first + FEWEST - 2, -max(1, len(strain) // 200)):
+            if strain[last] - strain[first] <= strain[best[1]] - strain[best[0]]:
+                break
+            if stress[first] > _EARLY * stress[last]:
+                continue
+            part = slice(first, last + 1)
+            middle, level = float(strain[part].mean()), float(stress[part].mean())
+            x, y = strain[part] - middle, stress[part] - level
+            rest = stress - level - (x @ y) / (x @ x) * (strain - middle)
+            most = _STRAIGHT * (stress[last] - stress[first])
+            allowed = np.minimum(most, _LOCALLY * np.abs(stress[part]) + least) + 4 * noise
+            if (np.abs(rest[part]) <= allowed).all() and (rest[:first] >= -most - 4 * noise).all():
+                best = (first, last)
+                break
+    return best
+
+
+def _leaves(strain: Floats, stress: Floats, slope: float, level: float, last: int, noise: float) -> int | None:
+    """The first point from which on the curve stays off the line."""
+    line = level + slope * strain
+    off = np.abs(stress - line) > _LEAVES * np.abs(stress) + 3 * noise
+    off[: last // 2] = False
+    staying = np.flatnonzero(~off)
+    start = int(staying[-1]) + 1 if len(staying) else last
+    return start if start < len(strain) else None
+
+
+_AIR = 5  # points before contact that make a force offset known
+_CONTACTS = 200  # contact points tried
+_THINNED = 300  # samples by which powers are compared
+_DEEPEST_OF_RADIUS = 2.0  # a/R is 0.96 there: a sphere pressed deeper is held at its equator
+_DEEPEST_OF_THICKNESS = 0.5  # a linear layer pressed to half its thickness: strains are of order 1 beyond
+_NOT_ALL = 3.0  # times a sample's noise, that a law leaves where more than it is at work
+_PLAINLY = 0.7  # of the other's residual: one of layer and half space is then the better law
+_MISSES = 0.01  # of the force that it spans, root mean square, beyond which a law may miss plainly
+_BEYOND_NOISE = 4.0  # times a sample's noise, that it leaves then
+_POWERS = np.arange(0.7, 3.05, 0.1)  # of the depth, that are tried in place of the law's own
+_TAKES = 0.4  # of the law's residual, at most, that another power leaves where the law misses plainly
+_AS_NOISE, _AS_IDEAL = 1.5, 1e-3  # times the noise, and of the force: less is left where the power says all
+_SPHERES = 1.25, 1.8  # powers that adhesion, creep, stiffening and a stage that gives make of a sphere's 3/2
+
+
+@dataclass(frozen=True)
+class IndentationModulus:
+    """The modulus [Pa] with its standard uncertainty, the contact point d0 [m] and what the fit leaves [N].
+
+    `noise` [N] is a sample's, `depth` [m] the largest; `radius` and `thickness` are those of the law, None of a half
+    space. The uncertainty goes by the residuals and their correlation from point to point. `residual` far above the
+    noise says that the law is not the whole story, and that E is a number for this curve only.
+    """
+
+    modulus: float
+    uncertainty: float
+    contact_point: float
+    residual: float
+    depth: float
+    radius: float
+    thickness: float | None
+    declared_thickness: float | None
+    noise: float
+    finite_strain: float = 0.0  # by which E is higher where the solved contact is taken
+
+    @property
+    def statement(self) -> str:
+        """Which law, where contact begins, how deep it was pressed, and what the law leaves, in words."""
+        contact = float(to_lab("displacement_mm", self.contact_point))
+        over = f"{self.depth / self.radius:.2g} of the radius"
+        if self.declared_thickness is not None:
+            over += f", {self.depth / self.declared_thickness:.2g} of the thickness"
+        strain = (
+            f"; up to {100 * self.finite_strain / self.modulus:.2g} % more by finite strain"
+            if 0 < self.finite_strain < self.modulus
+            else ""
+        )
+        times = self.residual / self.noise if self.noise > 0 else 0.0
+        misses = f", {times:.2g} times the noise: the law is not all" if times > _NOT_ALL else ""
+        return (
+            f"sphere on a {self._body}, contact from {contact:.4g} mm, pressed {over} deep; it leaves "
+            f"{self.residual:.2g} N (root mean square{misses}){strain}"
+        )
+
+    @property
+    def _body(self) -> str:
+        if self.thickness is not None:
+            return f"bonded layer of {float(to_lab('thickness_mm', self.thickness)):.3g} mm"
+        return "half space" if self.declared_thickness is not None else "half space (no thickness is declared)"
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A law with its contact point fitted to a loading branch: the design (samples, 1 or 2) and its coefficients."""
+
+    law: Callable[[Floats], Floats]
+    contact: float
+    design: Floats
+    fitted: Floats
+    residual: Floats
+    at_bound: bool
+
+    @property
+    def left(self) -> float:
+        """The root mean square of the residual."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+
+def of_indentation(
+    recording: IndentationRecording,
+    poisson_ratio: float,
+    thickness_mm: float | None = None,
+    softening: Softening | None = None,
+) -> IndentationModulus:
+    """The modulus of an `indentation` recording; raises InvalidInput where no number can be quoted."""
+    thickness = None if thickness_mm is None else float(to_si("thickness_mm", thickness_mm))
+    return indentation_modulus(
+        to_si("displacement_mm", recording.displacement_mm),
+        to_si("force_n", recording.force_n),
+        float(to_si("indenter_radius_mm", recording.indenter_radius_mm)),
+        poisson_ratio,
+        thickness,
+        softening,
+    )
+
+
+def indentation_modulus(
+    displacement: Floats,
+    force: Floats,
+    radius: float,
+    poisson_ratio: float,
+    thickness: float | None = None,
+    softening: Softening | None = None,
+) -> IndentationModulus:
+    """The sphere's modulus with a free contact point, and a free force offset where points before contact show it.
+
+    The modulus is the linear contact's. What finite strain adds to the depth is known for one contact alone
+    (`softening`): the uncertainty is that of a value anywhere between the moduli without and with it.
+    Raises InvalidInput where the loading branch has too few points, does not load, or leaves the modulus open, where it
+    is pressed deeper than the law holds, and where it follows no sphere's law.
+    """
+    depth, load = loading_branch(displacement, force)
+    fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
+    if fit.at_bound:
+        allowed = "must show where contact begins: record from the air, or deeper, so that the force bends"
+        raise unusable("displacement_mm", None, allowed)
+    found = _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
+    require_depth(found)
+    tip = _tip(depth, load, fit, thickness)
+    if tip is not None:
+        raise tip.refusal
+    if softening is None:
+        return found
+    softer = _as_deep(depth, load, radius, used, poisson_ratio, softening)
+    more = float(softer.fitted[0] - fit.fitted[0]) * (1 - poisson_ratio**2)
+    return replace(found, uncertainty=float(np.hypot(found.uncertainty, more / np.sqrt(3))), finite_strain=more)
+
+
+def estimate(
+    displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None = None
+) -> IndentationModulus:
+    """The same whatever it is worth: where a fit begins."""
+    depth, load = loading_branch(displacement, force)
+    fit, used = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
+    return _modulus(depth, load, fit, radius, poisson_ratio, used, thickness)
+
+
+def require_depth(found: IndentationModulus) -> None:
+    """Raises InvalidInput where it is pressed deeper than a law of a sphere, or of a layer, holds."""
+    of_radius = found.depth / found.radius
+    depth_mm, radius_mm = (float(to_lab("displacement_mm", length)) for length in (found.depth, found.radius))
+    if of_radius > _DEEPEST_OF_RADIUS:
+        allowed = (
+            f"is {of_radius:.2g} times the declared radius of {radius_mm:.3g} mm, where no sphere's law holds (at most "
+            f"{_DEEPEST_OF_RADIUS:g} times): is the tip a cone, or the radius another? "
+            "Press less deep, or a larger sphere"
+        )
+        raise unusable("displacement_mm", f"a depth of {depth_mm:.3g} mm", allowed)
+    if found.declared_thickness is None:
+        return
+    of_thickness = found.depth / found.declared_thickness
+    layer = SphereLaw(found.radius, found.declared_thickness, INCOMPRESSIBLE)
+    if of_thickness > _DEEPEST_OF_THICKNESS or found.depth >= layer.deepest:
+        allowed = (
+            f"is {of_thickness:.2g} of the declared thickness, where the linear layer's law does not hold (at most "
+            f"{_DEEPEST_OF_THICKNESS:g}, and a contact of at most 4 thicknesses): press less deep, or a thicker sample"
+        )
+        raise unusable("displacement_mm", f"a depth of {depth_mm:.3g} mm", allowed)
+
+
+@dataclass(frozen=True)
+class Tip:
+    """What a curve looks like that follows no sphere's law: the power of the depth, and why no modulus follows."""
+
+    power: float
+    refusal: InvalidInput
+    is_plain: bool  # nothing but noise is left of that power: no law of a sphere beside another effect is needed
+
+    @property
+    def is_blunt(self) -> bool:
+        """Whether it looks like a flat punch, or a stage that gives, under which nothing tells the modulus."""
+        return self.power < _SPHERES[0]
+
+
+def tip_of(
+    displacement: Floats, force: Floats, radius: float, poisson_ratio: float, thickness: float | None
+) -> Tip | None:
+    """What the tip looks like, where that is plainly no sphere."""
+    depth, load = loading_branch(displacement, force)
+    fit, _ = _sphere_fit(depth, load, radius, poisson_ratio, thickness)
+    return _tip(depth, load, fit, thickness)
+
+
+def _tip(depth: Floats, load: Floats, fit: _Fit, thickness: float | None) -> Tip | None:
+    """Another power n of the depth fits far better, (f(d − d0))^(n/1.5), so that a declared layer's own stiffening is
+    none of it; and is far from what a sphere's force can look like."""
+    span, noise = float(np.ptp(load)), roughness(load)
+    if fit.left < max(_MISSES * span, _BEYOND_NOISE * noise):
+        return None
+    at = np.unique(np.linspace(0, len(load) - 1, min(len(load), _THINNED)).round().astype(np.intp))
+    fits = {float(power): _fitted(depth[at], load[at], _to_power(fit.law, float(power))) for power in _POWERS}
+    power = min(fits, key=lambda power: fits[power].left)
+    if fits[power].left > _TAKES * fit.left or _SPHERES[0] <= power <= _SPHERES[1]:
+        return None
+    like = "as under a cone (2)"
+    if power < _SPHERES[0]:
+        like = "as under a flat punch (1), or where stage or cantilever give way"
+    elif thickness is None:
+        like += ", or on a thin layer whose thickness is not declared"
+    allowed = (
+        f"is {like}; a sphere has 1.5, and its law misses by {100 * fit.left / span:.2g} % of the force, "
+        f"{fit.left / max(noise, 1e-300):.2g} times the noise: no modulus follows; look at the tip, and press a block "
+        "of known modulus"
+    )
+    is_plain = fits[power].left < max(_AS_NOISE * noise, _AS_IDEAL * span)
+    return Tip(power, unusable("force_n", f"growth with the depth to the power {power:.2g}", allowed), is_plain)
+
+
+def _sphere_fit(
+    depth: Floats,
+    load: Floats,
+    radius: float,
+    poisson_ratio: float,
+    thickness: float | None,
+) -> tuple[_Fit, float | None]:
+    """The fit on the declared layer, or on the half space where that is plainly the better law; and the thickness that
+    it is of."""
+    half_space = _as_deep(depth, load, radius, None, poisson_ratio)
+    if thickness is None:
+        return half_space, None
+    layer = _as_deep(depth, load, radius, thickness, poisson_ratio)
+    if half_space.left < _PLAINLY * layer.left:
+        return half_space, None
+    return layer, thickness
+
+
+def _as_deep(
+    depth: Floats,
+    load: Floats,
+    radius: float,
+    thickness: float | None,
+    poisson_ratio: float,
+    softening: Softening | None = None,
+) -> _Fit:
+    """With the whole sphere in place of the paraboloid where it is pressed deep."""
+    fit = _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening))
+    if depth.max() - fit.contact < PARABOLOID * radius:
+        return fit
+    return _fitted(depth, load, SphereLaw(radius, thickness, poisson_ratio, softening, whole=True))
+
+
+def _to_power(law: Callable[[Floats], Floats], power: float) -> Callable[[Floats], Floats]:
+    return lambda depth: law(depth) ** (power / 1.5)
+
+
+def _fitted(depth: Floats, load: Floats, law: Callable[[Floats], Floats]) -> _Fit:
+    contact, at_bound = _contact_point(depth, load, law, offset=True)
+    with_offset = int((depth < contact).sum()) >= _AIR
+    if not with_offset:
+        contact, at_bound = _contact_point(depth, load, law, offset=False)
+    design = _design(depth, contact, law, with_offset)
+    fitted: Floats = np.linalg.lstsq(design, load, rcond=None)[0].astype(np.float64)
+    return _Fit(law, contact, design, fitted, load - design @ fitted, at_bound)
+
+
+def _modulus(
+    depth: Floats,
+    load: Floats,
+    fit: _Fit,
+    radius: float,
+    poisson_ratio: float,
+    thickness: float | None,
+    declared: float | None,
+) -> IndentationModulus:
+    # d0 is a parameter as well: its column is the slope of the model.
+    step = 1e-4 * float(np.ptp(depth))
+    slope = fit.fitted[0] * (fit.law(depth - fit.contact - step) - fit.law(depth - fit.contact + step)) / (2 * step)
+    jacobian = np.column_stack([fit.design, slope])
+    freedom = max(1, len(load) - jacobian.shape[1])
+    variance = float(fit.residual @ fit.residual) / freedom * _correlation_factor(fit.residual)
+    deviation = float(np.sqrt(variance)) * _amplification(jacobian)
+    per_reduced = 1 - poisson_ratio**2
+    return IndentationModulus(
+        modulus=float(fit.fitted[0] * per_reduced),
+        uncertainty=float(deviation * per_reduced),
+        contact_point=fit.contact,
+        residual=fit.left,
+        depth=float(depth.max() - fit.contact),
+        radius=radius,
+        thickness=thickness,
+        declared_thickness=declared,
+        noise=roughness(load),
+    )
+
+
+def _amplification(jacobian: Floats) -> float:
+    """The first parameter's standard deviation over that of the noise; raises InvalidInput where it has none."""
+    size = np.linalg.norm(jacobian, axis=0)
+    shape = jacobian / np.where(size > 0, size, 1)
+    normal = shape.T @ shape
+    if np.linalg.matrix_rank(normal, hermitian=True) < len(normal):
+        allowed = "must tell the modulus from the contact point: more samples in contact"
+        raise unusable("displacement_mm", f"{np.count_nonzero(jacobian[:, 0])} samples in contact", allowed)
+    return float(np.sqrt(np.linalg.inv(normal)[0, 0]) / size[0])
+
+
+def _design(depth: Floats, contact: float, law: Callable[[Floats], Floats], offset: bool) -> Floats:
+    pressed = law(depth - contact)
+    return np.column_stack([pressed, np.ones_like(pressed)]) if offset else pressed[:, None]
+
+
+def _contact_point(depth: Floats, load: Floats, law: Callable[[Floats], Floats], *, offset: bool) -> tuple[float, bool]:
+    """d0 of the least squares in force, before the first point where the recording starts in contact; and whether it is
+    as far before as is looked for."""
+
+    def misfit(contact: float) -> float:
+        pressed = law(depth - contact)
+        force = load
+        if offset:
+            pressed, force = pressed - pressed.mean(), force - force.mean()
+        square = float(pressed @ pressed)
+        return float(force @ force) - (float(pressed @ force) ** 2 / square if square > 0 else 0.0)
+
+    span = float(np.ptp(depth))
+    guesses = np.linspace(depth.min() - (0 if offset else span), depth.max() - 0.02 * span, _CONTACTS)
+    best = int(np.argmin([misfit(float(guess)) for guess in guesses]))
+    around = float(guesses[max(best - 1, 0)]), float(guesses[min(best + 1, len(guesses) - 1)])
+    found = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-9 * span}).x
+    return float(found), not offset and best == 0
+
+
+def _correlation_factor(residual: Floats) -> float:
+    """How much fewer independent points there are, for residuals that are alike from one to the next."""
+    power = float(residual @ residual)
+    if power == 0:
+        return 1.0
+    alike = float(np.clip(residual[1:] @ residual[:-1] / power, 0.0, 0.99))
+    return (1 + alike) / (1 - alike)
