@@ -20,7 +20,6 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -197,6 +196,8 @@ def _course(*columns: bytes) -> Course:
 def _deepest(displacement: Floats) -> int:
     """The deepest sample, of means over samples as close as the noise."""
     count = hidden_samples(displacement)
+    from scipy.ndimage import uniform_filter1d  # takes 0.2 s to load, which few need
+
     return int(np.argmax(uniform_filter1d(displacement, count, mode="nearest") if count > 1 else displacement))
 
 

@@ -31,7 +31,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from underskin.errors import unusable
 from underskin.findings.codes import Reason
@@ -550,6 +549,8 @@ def _splines(travel: Floats, apart: float) -> Floats:
     count = max(int(np.ceil((high - low) / apart)), 1)
     inner = np.linspace(low, high, count + 1)
     knots = np.concatenate([np.full(3, low), inner, np.full(3, high)])
+    from scipy.interpolate import BSpline  # takes 0.4 s to load, which few need
+
     return np.asarray(BSpline.design_matrix(travel, knots, 3).toarray())
 
 
