@@ -29,7 +29,7 @@ SKIN = [
     "--preload-n=1",
 ]
 
-COMPILED_THERE = "hertz_kernel"  # within half a second
+COMPILED_THERE = "contact_kernel"  # within a second
 
 # Every module of the library, but for the cluster's `distributed`, which is imported when it is asked for.
 IMPORT_ALL = """

@@ -64,8 +64,9 @@ def predict(
         The σ table (`load_table`).
     parameters
         Values by name, in the parameter's unit: those of every mechanism, and of the base model `d33` [pC/N] (default
-        the declared one), `youngs_modulus` and `thickness` (factors on the declared ones, default 1), and of curves
-        `contact_point <id>` [mm].
+        the declared one), `youngs_modulus` and `thickness` (factors on the declared ones, default 1), of curves
+        `contact_point <id>` [mm], and of indentations `finite_strain`, the share of what finite strain adds to the
+        depth (default ½).
     mechanisms
         Names from the catalogue, in any order.
     kind
