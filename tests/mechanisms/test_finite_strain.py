@@ -9,6 +9,8 @@ from scipy.optimize import least_squares
 from rig.solved.layer import Material, PressedLayer, Sublayer
 from tests.support.mechanism_campaigns import SKIN, hertz_force, predicted
 from underskin.mechanisms.models.indentation import Layers, Sphere, Stiffening, layer_ratios
+from underskin.mechanisms.models.sphere_kernels import LARGEST_CBRT_LOAD
+from underskin.physics.sphere_law import SphereLaw
 from underskin.recordings.campaign import Campaign, IndentationRecording
 from underskin.surrogate.contact_table import load_contact
 from underskin.units import Floats
@@ -88,7 +90,18 @@ def test_share(stiffening: Stiffening | None, thickness: float | None) -> None:
 @pytest.mark.parametrize("names", [[], ["layered_contact"]])
 def test_depth_beyond_the_table(names: list[str]) -> None:
     """Beyond the table's load the correction stays, so that the force goes on without a kink."""
+    assert load_contact().contact_axes[1][-1] == pytest.approx(LARGEST_CBRT_LOAD, rel=1e-12)
     depth = np.linspace(0.02, 1.2, 400)
     force = force_of(names, 2.0, depth, 1.0)
     assert (np.diff(force) > 0).all()
     assert np.abs(np.diff(np.diff(force) / np.diff(depth), 2)).max() < 0.02 * np.ptp(np.diff(force) / np.diff(depth))
+
+
+@pytest.mark.parametrize("over_radius", [0.5, 0.8])
+def test_whole_sphere(over_radius: float) -> None:
+    """The softening of a sphere that is pressed deep is the same in the fit of one curve as in a diagnosis."""
+    radius, depth = 2e-3, over_radius * 2e-3
+    law = SphereLaw(radius, None, 0.5, load_contact().softening, whole=True)
+    sphere = Sphere(np.full((1, 1, 1), 1.0), np.full((1, 1), radius), whole=1.0, strain_share=1.0)
+    a = sphere.radius_at(np.full((1, 1, 1), depth), None)
+    assert law(np.array([depth])) == pytest.approx(sphere.at(a)[0].ravel(), rel=1e-4)

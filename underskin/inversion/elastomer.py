@@ -1,5 +1,5 @@
-"""The elastomer's modulus from the same bench, of each recording: a compressed or pulled sample (block_modulus), or a
-sphere pressed in (sphere_modulus). Curves are read as curve_preparation leaves them."""
+"""The elastomer's modulus from the same bench, of each recording: a compressed or pulled sample, or a sphere pressed in
+(recordings/modulus.py). Curves are read as curve_preparation leaves them."""
 
 from dataclasses import dataclass
 

@@ -29,8 +29,8 @@ LOAD_OF_REDUCED = 4 / 3  # L = F/(R²E) over F/(R²E'), at ν = ½
 # with a/R = (9L/16)^(1/3).
 WHOLE_OF_LOAD = (9 / 16) ** (2 / 3) / 15
 
-# δ over the linear contact's at the same force, less 1, of a/h and L^(1/3)
-Softening = Callable[[Floats, Floats], Floats]
+# δ over the linear contact's at the same force, less 1, of a/h, L^(1/3), and whether that contact is the whole sphere's
+Softening = Callable[[Floats, Floats, bool], Floats]
 
 
 class SphereLaw:
@@ -66,8 +66,8 @@ class SphereLaw:
         force = np.append(0.0, np.cumsum(steps))
         if softening is not None:
             cbrt_load = np.cbrt(LOAD_OF_REDUCED * force) / np.cbrt(radius) ** 2
-            larger = softening(np.zeros_like(a) if thickness is None else a / thickness, cbrt_load)
-            depth = depth * (1 + larger - (WHOLE_OF_LOAD * cbrt_load**2 if whole else 0.0))
+            alpha = np.zeros_like(a) if thickness is None else a / thickness
+            depth = depth * (1 + softening(alpha, cbrt_load, whole))
         self._depth, self._root = depth, np.cbrt(force) ** 2
         self.deepest = float(depth[-1])
 

@@ -19,7 +19,7 @@ that: what is pressed harder is pressed deeper, by Hertz as F^(2/3), never with 
 Defects of a curve's channels that have nothing to do with the sample: a force that saturates, and one that carries
 an error that is periodic in the travel.
 
-Compression and depth are positive here, see curve_signs.
+Compression and depth are positive here.
 
 Curves as everything that reads them takes them: compression and depth positive, from the air into the sample,
 without samples at which the channel saturates and without an error that is periodic in the travel.

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
+from underskin.physics.sphere_law import WHOLE_OF_LOAD
 from underskin.surrogate.hdf5_format import CONTACT_SCHEMA
 from underskin.surrogate.sigma_table import tables_folder
 from underskin.surrogate.table_file import Table
@@ -76,11 +77,14 @@ class ContactTable(Table):
         """
         return np.asarray(self._softening(np.minimum(a_over_h, self.axes[0][-1])))
 
-    def softening(self, a_over_h: Floats, cbrt_load: Floats) -> Floats:
-        """δ/δ_linear − 1 at the same force; the last L stands for larger ones."""
+    def softening(self, a_over_h: Floats, cbrt_load: Floats, whole: bool) -> Floats:
+        """δ/δ_linear − 1 at the same force; the last L stands for larger ones.
+
+        The linear contact is a paraboloid's, or the `whole` sphere's.
+        """
         x = np.minimum(cbrt_load, self.axes[1][-1])
         p0, p1, p2 = np.moveaxis(self.softening_coefficients(a_over_h), -1, 0)
-        return np.asarray(x * (p0 + x * (p1 + x * p2)))
+        return np.asarray(x * (p0 + x * (p1 - (WHOLE_OF_LOAD if whole else 0.0) + x * p2)))
 
 
 def load_contact(path: Path | None = None) -> ContactTable:

@@ -17,7 +17,7 @@ the radius of the linear contact.
 
 Under a given travel the contact is stable where the travel grows with a. It ends at the least travel: at JKR's least
 depth for a stiff stage, at the least force, −3πwR/2 on the half space, for a soft one. The functions of a are compiled
-(sphere_kernel).
+(sphere_kernels).
 
 Arrays are (points, curves, samples), with 1 where nothing differs: points of the fit coordinates, samples of a curve.
 

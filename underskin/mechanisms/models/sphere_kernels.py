@@ -1,6 +1,4 @@
-"""Compiled: spheres pressed into a layer, also one that creeps.
-
-Compiled: the contact of a sphere as a function of its radius, and the radius at a travel; see sphere_contact.
+"""Compiled: the contact of a sphere as a function of its radius, and the radius at a travel (indentation.py).
 
 Arrays are (points, curves, samples). A `body` (points, curves, samples or 1, 9) holds the reduced modulus E', the
 sphere's radius R, 1/k of the stage, the layer's thickness h (0: half space), of stiffening c (−1: none), q and m, 1
@@ -8,9 +6,8 @@ where the sphere is pressed so deep that it is no paraboloid (else 0), and the s
 `cubics` (layers, cells, powers, 7) are a layer's four ratios and the three coefficients of that correction over a/h
 from 0 to `LARGEST_A_OVER_H`, highest power first, of each point or one for all; a half space has those of one cell.
 
-Compiled: fading memories, and the edge of a contact that recedes on a body that relaxes; see creeping_contact.
-
-Arrays are (points, curves, samples), memories with the pairs on a last axis; g and τ are (points, pairs).
+Also fading memories, and the edge of a contact that recedes on a body that relaxes: memories have the pairs on a last
+axis; g and τ are (points, pairs).
 """
 
 import math
