@@ -9,9 +9,9 @@ import numpy as np
 
 from rig.joint_campaign import Joint, JointDocument
 from rig.joint_hypotheses import skin_covariance
-from underskin.diagnosis.inference.hypothesis import Knowledge
+from underskin.diagnosis.inference.hypothesis import Gaussian
 from underskin.diagnosis.several.fleet import SPREADS
-from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Make, State, populations
+from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Batch, State, populations
 from underskin.units import Floats
 
 _DECLARED = (0.02, 0.01, 1.5)  # deviations of the make's logarithms about what is declared; of d33, about the truth
@@ -22,7 +22,7 @@ def departures(joint: Joint) -> dict[str, float]:
     skins = [_states(document) for document in joint.documents]
     experiment = joint.documents[0].experiment
     declared = [experiment.skin.youngs_modulus_mpa, experiment.skin.thickness_mm, experiment.skin.d33_pc_per_n]
-    make = Make(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
+    make = Batch(0.0, np.log(declared), np.array(_DECLARED) ** -2.0)
     found = populations(skins, [make], SPREADS)
     return {document.skin: 1 - own[REGULAR] for document, own in zip(joint.documents, found.departs, strict=True)}
 
@@ -30,7 +30,7 @@ def departures(joint: Joint) -> dict[str, float]:
 def _states(document: JointDocument) -> list[State]:
     truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
     precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
-    said = Knowledge(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
+    said = Gaussian(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
     further = np.diag(np.square(FAR))
     return [
         State(REGULAR, said, np.zeros(len(FAR))),

@@ -23,7 +23,7 @@ from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.search import frf_problem, search
 from underskin.mechanisms.base import Unsupported
-from underskin.mechanisms.registry import Known
+from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import from_dict
 from underskin.surrogate.sigma_table import load_table
 
@@ -63,7 +63,7 @@ def compared(case: DrawnCase) -> Result:
         truth = refitted(problem, hidden, effects)
     except Unsupported:
         return {**head, "lost": None}
-    showing = [entry for entry in found.explanations if found.shows(entry)]
+    showing = [entry for entry in found.explanations if found.is_supported(entry)]
     best = max(showing, key=found.log_weight)
     own = next((entry for entry in found.explanations if set(entry.names) == set(hidden)), None)
     return {
@@ -78,7 +78,7 @@ def searched(document: Result) -> tuple[FittingProblem, Search] | None:
     """The FRFs of a campaign and the search over sets of mechanisms, as `underskin.diagnosis.pipeline` has them; None
     where nothing can be concluded from them."""
     campaign, _ = from_dict(document)
-    table, mechanisms = load_table(), Known()
+    table, mechanisms = load_table(), ActiveCatalogue()
     inspected = inspect(campaign, table)
     if inspected.lacking:
         return None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from proof.slip_rivals import LevelRivals, left_of_conjugated, over_one_sign
 from rig.recorded import RecordedLines
 from underskin.findings.codes import Reason
-from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
 Floats = NDArray[np.float64]

@@ -16,7 +16,7 @@ from underskin.mechanisms import Mechanism, Parameter
 from underskin.mechanisms.declared.folder import digest
 from underskin.mechanisms.declared.mechanism import DeclaredMechanism
 from underskin.mechanisms.reference_campaigns import reference_campaign
-from underskin.mechanisms.unnamed.vocabulary import followed
+from underskin.mechanisms.unlisted.vocabulary import followed
 from underskin.surrogate.sigma_table import SigmaTable
 
 ALIKE = 0.7  # cosine from which on another mechanism is named

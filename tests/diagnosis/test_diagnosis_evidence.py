@@ -63,11 +63,13 @@ def real(rows: np.ndarray) -> Floats:
     return np.concatenate([rows.real, rows.imag])
 
 
-@pytest.mark.parametrize(("made", "placed"), LIKELIHOODS)
-def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, placed: bool, table: SigmaTable) -> None:
+@pytest.mark.parametrize(("made", "has_position_scatter"), LIKELIHOODS)
+def test_the_likelihood_is_that_of_the_whole_covariance_matrix(
+    made: Made, has_position_scatter: bool, table: SigmaTable
+) -> None:
     """Woodbury's identity against one dense covariance matrix over all rows."""
     problem = FittingProblem(lines(campaign(made, table)), table)
-    hypothesis = problem.hypothesis(made.mechanisms, placed, whole=True)
+    hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, whole=True)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
     fitter, used = Fitter([hypothesis]), hypothesis.lines
     at = fitter.begin([np.array([own])], slopes=True)
@@ -80,7 +82,7 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
     covariance = np.diag((levels.level * np.tile(used.deviation, 2)) ** 2)
     covariance += np.outer(model, model) * same * gain[:, None]
     covariance += np.outer(model, model) * (sensor[:, None] == sensor[None, :]) * levels.spread**2
-    if placed:
+    if has_position_scatter:
         assert prediction.position_slopes is not None
         for slope in prediction.position_slopes:
             column = real(slope * factor)
@@ -90,7 +92,7 @@ def test_the_likelihood_is_that_of_the_whole_covariance_matrix(made: Made, place
     # What all hypotheses share is left out: 2π and the lines' own deviations
     shared = -float(len(model) * np.log(2 * np.pi) / 2 + 2 * np.log(used.deviation).sum())
     several = fitter.levels(at.points.covariance[:, None])
-    each = log_likelihoods(fitter.lines, curvature, at.products, several, at.points.bend)
+    each = log_likelihoods(fitter.lines, curvature, at.products, several, at.points.sensor_log_gain)
     assert each[0, 0] == pytest.approx(exact - shared, abs=1e-6 * abs(exact))
 
 
@@ -98,7 +100,7 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
     """By Laplace's method, of the hypothesis with which the campaign was made."""
     made = Made(names, values, sensors=3, offsets_mm=(0.0, 1.0), preloads_n=(0.3, 1.2, 2.4), highest_hz=1000.0)
     problem = FittingProblem(lines(campaign(made, table)), table)
-    hypothesis = problem.hypothesis(names, placed=False)
+    hypothesis = problem.hypothesis(names, has_position_scatter=False)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, values, strict=False)]
     fitter = Fitter([hypothesis])
     return laplace(fitter, fitter.improve(fitter.begin([np.array([own])]).points))
@@ -127,7 +129,7 @@ def test_evidence_with_positioning_scatter(
     assert explained is not None
     (whole,) = integrated([explained])
     _, found = whole.each[1]
-    assert found.hypothesis.placed
+    assert found.hypothesis.has_position_scatter
     assert found.log_evidence == pytest.approx(importance(found), abs=0.3)
 
 

@@ -138,11 +138,11 @@ def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, 
 def test_what_followed_the_order_is_confirmed_by_repeating_recordings_of_both_ends(
     quiet: Campaign, table: SigmaTable
 ) -> None:
-    """What may be behind it is said as docs/unnamed.md has it."""
+    """What may be behind it is said as docs/unlisted.md has it."""
     found = reported(changed(quiet, lambda _, number, __: 1.15 if number >= 30 else 1.0), table)
     assert found["unnamed"]["axis"] in ("order", "recorded_at")
     row = f"| `{found['unnamed']['acts_on']}` | `{found['unnamed']['axis']}` | "
-    (told,) = [line for line in Path("docs/unnamed.md").read_text(encoding="utf-8").splitlines() if row in line]
+    (told,) = [line for line in Path("docs/unlisted.md").read_text(encoding="utf-8").splitlines() if row in line]
     cause = told.removeprefix(row).partition(" would do this")[0].lower()
     assert (cause in found["statement"].lower()) == is_settled(found)
     planned = found["next_experiment"]

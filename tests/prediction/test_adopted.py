@@ -9,7 +9,7 @@ import pytest
 from tests.support.mechanism_campaigns import SKIN, frf_campaign, indentation_campaign, table
 from underskin import InvalidInput
 from underskin.mechanisms import CATALOGUE, compose
-from underskin.mechanisms.registry import Known
+from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.prediction.adopted_model import AdoptedModel, adopted
 from underskin.recordings.campaign import Campaign, FrfRecording, frf_recordings
 
@@ -175,7 +175,7 @@ def test_the_edge_under_its_older_name_serves() -> None:
     older["mechanisms"] = [{"name": "amplitude_nonlinearity", "parameters": [{"name": "edge_mobility", "value": 0.6}]}]
     found = adopted(older, campaign).response(campaign, table())
     np.testing.assert_allclose(D33 * found.value, lines(campaign), rtol=1e-12)
-    assert Known(["amplitude_nonlinearity"]).without == ("moving_contact_edge",)
+    assert ActiveCatalogue(["amplitude_nonlinearity"]).without == ("moving_contact_edge",)
 
 
 def test_curves_make_no_model_of_charge() -> None:

@@ -78,7 +78,7 @@ def save(
 def _on(mechanism: "DeclaredMechanism") -> str:
     """On what, with the columns of `conditions` that it reads: a name that nobody records is a slip."""
     from underskin.mechanisms.declared.mechanism import FREQUENCY
-    from underskin.mechanisms.unnamed.axes import BUILT_IN
+    from underskin.mechanisms.unlisted.axes import BUILT_IN
 
     own = [name for name in mechanism.axes if name not in (*BUILT_IN, FREQUENCY)]
     columns = f", by {' and '.join(own)} of their conditions" if own else ""

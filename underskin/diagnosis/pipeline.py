@@ -20,15 +20,15 @@ from underskin.diagnosis.screening.curve_unit_errors import without_inconsistent
 from underskin.diagnosis.screening.inspection import inspect
 from underskin.diagnosis.screening.physical_limits import without_extremes
 from underskin.diagnosis.screening.unusable_curves import without_unusable
-from underskin.diagnosis.selection.answers import Search, within_as_found
-from underskin.diagnosis.selection.other_kinds import Beside
-from underskin.diagnosis.selection.search import Joined, Others, frf_problem, search, telling_modulus
-from underskin.diagnosis.selection.unnamed_search import with_laws
+from underskin.diagnosis.selection.answers import Search, inside_tables_under_posterior
+from underskin.diagnosis.selection.other_kinds import CurveLikelihood
+from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search, telling_modulus
+from underskin.diagnosis.selection.unlisted_search import with_laws
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.cross_validation import (
     above_noise,
+    has_structured_residual,
     held_out,
-    keeps_structure,
     largest_floor_percent,
     of_nearest_law,
 )
@@ -46,7 +46,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind
-from underskin.mechanisms.registry import CATALOGUE, Known
+from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
@@ -78,12 +78,12 @@ def diagnose(
 
     Raises InvalidInput where one of those is not in it.
     """
-    diagnosis = _diagnosed(prepared(campaign).campaign, table, progress, limits, Known(without))
+    diagnosis = _diagnosed(prepared(campaign).campaign, table, progress, limits, ActiveCatalogue(without))
     return replace(diagnosis, findings=tuple(dict.fromkeys((*implausible(campaign), *diagnosis.findings))))
 
 
 def _diagnosed(
-    campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: Known
+    campaign: Campaign, table: SigmaTable, progress: Progress, limits: RigLimits, mechanisms: ActiveCatalogue
 ) -> DiagnosisResult:
     progress(0.05)
     possible = without_extremes(campaign)
@@ -107,9 +107,11 @@ def _diagnosed(
     if kinds and "frf" not in kinds and not curves:
         return replace(begun, lacking=Lacking(Lack.NO_CURVE))
     if "frf" in kinds or not curves:
-        return _of_frf(begun, campaign, table, mechanisms, Others(curves, table, mechanisms.without), progress, limits)
+        return _of_frf(
+            begun, campaign, table, mechanisms, OtherKinds(curves, table, mechanisms.without), progress, limits
+        )
     kind = next(iter(curves))
-    others = Others({other: own for other, own in curves.items() if other != kind}, table, mechanisms.without)
+    others = OtherKinds({other: own for other, own in curves.items() if other != kind}, table, mechanisms.without)
     return _of_curves(begun, curves[kind], kind, table, mechanisms, others, progress, limits)
 
 
@@ -117,19 +119,19 @@ def _of_frf(
     begun: DiagnosisResult,
     campaign: Campaign,
     table: SigmaTable,
-    mechanisms: Known,
-    others: Others,
+    mechanisms: ActiveCatalogue,
+    others: OtherKinds,
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
     frf = tuple(entry for entry in campaign.recordings if isinstance(entry, FrfRecording))
     inspected = inspect(replace(campaign, recordings=frf), table)
-    joined: Joined | None = None
+    joined: KindsTogether | None = None
     while not inspected.lacking:
         joined = _searched(inspected, table, mechanisms, others)
         if not inspected.beyond:
             break
-        kept = inspected.beyond & within_as_found(joined.problem, joined.search)
+        kept = inspected.beyond & inside_tables_under_posterior(joined.problem, joined.search)
         if kept == inspected.beyond:
             break
         inspected = inspect(replace(campaign, recordings=frf), table, kept)
@@ -141,16 +143,20 @@ def _of_frf(
     return _work_out(replace(begun, joined=joined), problem, result, progress, limits)
 
 
-def _searched(inspected: Inspected, table: SigmaTable, mechanisms: Known, others: Others) -> Joined:
+def _searched(
+    inspected: Inspected, table: SigmaTable, mechanisms: ActiveCatalogue, others: OtherKinds
+) -> KindsTogether:
     """The search on FRFs, with what other kinds tell."""
     alone, known = frf_problem(inspected.campaign, inspected.uneven, table, mechanisms)
 
-    def fitted(beside: Beside | None, asked_for: Sequence[frozenset[str]]) -> tuple[FittingProblem, Search]:
+    def fitted(
+        beside: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
+    ) -> tuple[FittingProblem, Search]:
         """Beside other kinds under the same noise, so that evidences can be compared."""
         if beside is None:
             return alone, search(alone, known)
         problem = FittingProblem(alone.lines, table, beside)
-        return problem, search(problem, asked_for=asked_for)
+        return problem, search(problem, required_sets=required_sets)
 
     return others.joined(fitted)
 
@@ -160,17 +166,19 @@ def _of_curves(
     campaign: Campaign,
     kind: Kind,
     table: SigmaTable,
-    mechanisms: Known,
-    others: Others,
+    mechanisms: ActiveCatalogue,
+    others: OtherKinds,
     progress: Progress,
     limits: RigLimits,
 ) -> DiagnosisResult:
     mechanisms.bind(campaign, table, kind)
     rows = replace(curve_lines(campaign, kind), mechanisms=mechanisms)
 
-    def fitted(beside: Beside | None, asked_for: Sequence[frozenset[str]]) -> tuple[FittingProblem, Search]:
+    def fitted(
+        beside: CurveLikelihood | None, required_sets: Sequence[frozenset[str]]
+    ) -> tuple[FittingProblem, Search]:
         problem = FittingProblem(rows, table, beside)
-        return problem, search(problem, asked_for=asked_for)
+        return problem, search(problem, required_sets=required_sets)
 
     joined = others.joined(fitted)
     problem, result = joined.problem, joined.search
@@ -192,15 +200,15 @@ def _work_out(
     progress(0.7)
     leader = result.answers[0]
     nothing = next(entry for entry in result.explanations if not entry.names)
-    shown = result.shown_or_nothing(leader)
+    shown = result.fit_behind(leader)
     axes, ranges, size = _located(problem, nothing, shown.best.levels)
     progress(0.8)
     ranked = [answer.explanation for answer in result.answers if answer.explanation is not None]
-    showing = [entry for entry in ranked if result.shows(entry)]
+    showing = [entry for entry in ranked if result.is_supported(entry)]
     groups = held_out(problem, result, showing, nothing)
     progress(0.95)
     doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
-    contradicted = {entry.names for entry in doubted if keeps_structure(problem, entry, nothing)}
+    contradicted = {entry.names for entry in doubted if has_structured_residual(problem, entry, nothing)}
     before, after = cross_validation.total(groups)
     misled = after.is_missed(_FAR_ABOVE) or after.misleads(before)
     if problem.kind == "indentation" and after.recordings and misled and leader.explanation is not None:
@@ -208,13 +216,13 @@ def _work_out(
     if contradicted:
         result = replace(result, contradicted=frozenset(contradicted))
         leader = result.answers[0]
-        shown = result.shown_or_nothing(leader)
+        shown = result.fit_behind(leader)
     if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
         groups = held_out(problem, result, showing, nothing)
     begun, result = _beside_unlisted(begun, problem, result, nothing)
     result = _beside_other_tip(begun, problem, result)
     leader = result.answers[0]
-    shown = result.shown_or_nothing(leader)
+    shown = result.fit_behind(leader)
     floor = largest_floor_percent(problem, nothing, groups)
     if leader.explanation is nothing and floor > _LARGEST_FLOOR:
         return replace(begun, lacking=Lacking(Lack.NOISE, {"floor_percent": floor}))
@@ -308,7 +316,7 @@ def with_refused(diagnosis: DiagnosisResult, problems: Sequence[RecordingProblem
     return replace(diagnosis, findings=(*refused(problems), *diagnosis.findings), lacking=lacking)
 
 
-def _provenance(table: SigmaTable, mechanisms: Known) -> dict[str, Any]:
+def _provenance(table: SigmaTable, mechanisms: ActiveCatalogue) -> dict[str, Any]:
     return {
         "underskin": importlib.metadata.version("underskin"),
         "numpy": np.__version__,

@@ -83,7 +83,7 @@ class Catalogue(Mapping[str, Mechanism]):
 CATALOGUE = Catalogue()
 
 
-class Known(Mapping[str, Mechanism]):
+class ActiveCatalogue(Mapping[str, Mechanism]):
     """What one diagnosis composes its models of: the catalogue less what is left out, and laws bound to its recordings.
 
     Those are added as a screening finds them, and come last.

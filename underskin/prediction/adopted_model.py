@@ -19,8 +19,8 @@ from underskin.mechanisms.models.composed import forward_model
 from underskin.mechanisms.models.composition import chosen, parameters_together
 from underskin.mechanisms.parameter import Parameter
 from underskin.mechanisms.registry import CATALOGUE, current_name
-from underskin.mechanisms.unnamed.grammar import OF_ONE_CAMPAIGN, Grammar, bound_to
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unlisted.grammar import OF_ONE_CAMPAIGN, Grammar, bound_to
+from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.prediction import plausibility
 from underskin.prediction.forward_model import needed_fields, require_fields
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription, frf_of, frf_recordings
@@ -64,7 +64,7 @@ class AdoptedModel:
     skin: SkinDescription
     parameters: Mapping[str, Mapping[str, float]]
     unsure: float
-    law: UnnamedLaw | None = None  # that nobody listed, as it was found
+    law: UnlistedLaw | None = None  # that nobody listed, as it was found
     of_law: Mapping[str, float] = field(default_factory=dict)  # its parameters
 
     @property

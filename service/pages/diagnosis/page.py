@@ -29,7 +29,7 @@ from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.diagnosis.reporting.wording import planned_columns
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
+from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go

@@ -16,7 +16,7 @@ from service.usecases import adopted_models, d33_cache
 from underskin import InvalidInput
 from underskin.diagnosis.data.names import EXPLAINED, in_words
 from underskin.findings.formatting import in_percent
-from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
+from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 from underskin.surrogate.sigma_table import SigmaTable
 
 _WORTH_NAMING = 0.02  # probability of a rival, as in a report

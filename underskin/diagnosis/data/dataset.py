@@ -35,7 +35,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.lacking import Lacking
 from underskin.mechanisms.base import Kind
 from underskin.mechanisms.models.composition import kind_of
-from underskin.mechanisms.registry import Known
+from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import (
     Campaign,
     CurveRecording,
@@ -358,7 +358,7 @@ class Lines:
     noise: LineNoise
     scatter: tuple[float, int] = (0.0, 0)
     smooth: CurveError | None = None  # of curves
-    mechanisms: Known = field(default_factory=Known)  # that may explain them
+    mechanisms: ActiveCatalogue = field(default_factory=ActiveCatalogue)  # that may explain them
 
     @property
     def recordings(self) -> int:

@@ -69,7 +69,7 @@ class Evidence:
     point: FitPoint
     cost: float
     covariance: Floats  # (mean parameters, mean parameters), of the quadratic, bounds not counted
-    growth: Floats | None = None  # (1, recordings, parameters), see Evaluated
+    log_slope_gradient: Floats | None = None  # (1, recordings, parameters), see Evaluated
 
     @cached_property
     def fitter(self) -> Fitter:
@@ -79,7 +79,7 @@ class Evidence:
     @cached_property
     def at(self) -> Evaluated:
         """The most probable point, evaluated."""
-        return replace(self.fitter.evaluate(self.fitter.at(self.point)), growth=self.growth)
+        return replace(self.fitter.evaluate(self.fitter.at(self.point)), log_slope_gradient=self.log_slope_gradient)
 
     @cached_property
     def marginal(self) -> Likelihoods:
@@ -139,9 +139,13 @@ def around(fitter: Fitter, at: Evaluated) -> list[Evidence]:
     for number, (value, covariance) in enumerate(zip(values + volumes, covariances, strict=True)):
         hypothesis = fitter.hypotheses[at.points.owner[number]]
         count = len(hypothesis.model.parameters)
-        point = FitPoint(at.points.fit[number, :count], at.points.covariance[number], at.points.bend[number])
-        growth = None if at.growth is None else at.growth[number : number + 1, :, :count]
-        evidence.append(Evidence(float(value), hypothesis, point, float(at.cost[number]), covariance, growth))
+        point = FitPoint(at.points.fit[number, :count], at.points.covariance[number], at.points.sensor_log_gain[number])
+        log_slope_gradient = (
+            None if at.log_slope_gradient is None else at.log_slope_gradient[number : number + 1, :, :count]
+        )
+        evidence.append(
+            Evidence(float(value), hypothesis, point, float(at.cost[number]), covariance, log_slope_gradient)
+        )
     return evidence
 
 
@@ -228,10 +232,10 @@ def _polish(fitter: Fitter, at: Evaluated, moving: Indices) -> tuple[Indices, Ev
         if not len(trying):
             break
         moved = np.clip(fit[trying] + step[trying], low[trying], high[trying])
-        tried = fitter.settle(fitter.evaluate(replace(part.points[trying], fit=moved)), 1)
+        tried = fitter.update_noise_levels(fitter.evaluate(replace(part.points[trying], fit=moved)), 1)
         better = tried.cost < part.cost[trying] - 0.2 * _POLISHED
-        growth = None if part.growth is None else part.growth[trying]
-        at = fitter.replaced(at, moving[trying[better]], replace(tried, growth=growth)[better])
+        log_slope_gradient = None if part.log_slope_gradient is None else part.log_slope_gradient[trying]
+        at = fitter.replaced(at, moving[trying[better]], replace(tried, log_slope_gradient=log_slope_gradient)[better])
         gained.append(moving[trying[better]])
         trying = trying[~better]
         step = step / 3
@@ -296,9 +300,11 @@ def integrated(evidence: Sequence[Evidence]) -> list[Evidence]:
     """Over all values of a parameter that the lines leave loose, where there is one, and of the positioning scatter."""
     whole = list(evidence)
     for group in _alike(whole, [_loosest(entry) is not None for entry in whole]):
-        for number, entry in zip(group, _over_loose([whole[number] for number in group]), strict=True):
+        for number, entry in zip(
+            group, _integrate_over_weak_parameter([whole[number] for number in group]), strict=True
+        ):
             whole[number] = entry
-    for group in _alike(whole, [entry.hypothesis.placed for entry in whole]):
+    for group in _alike(whole, [entry.hypothesis.has_position_scatter for entry in whole]):
         for number, entry in zip(group, _over_position([whole[number] for number in group]), strict=True):
             whole[number] = entry
     return whole
@@ -363,7 +369,7 @@ def _work_out(integrals: Sequence[_Integral], log_values: Callable[[list[int], F
             integrals[number].log_values[value] = log_value
 
 
-def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
+def _integrate_over_weak_parameter(evidence: list[Evidence]) -> list[Evidence]:
     """With log ∫ Z(x) p(x) dx over the loosest parameter x of each.
 
     Where the integral comes upon a point more probable than that around which it was begun, it begins again from there.
@@ -381,7 +387,7 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
 
     def log_values(numbers: list[int], values: Floats) -> Floats:
         points = held_points(held, evidence, known, numbers, values)
-        begun = held.settle(held.evaluate(points), 1)
+        begun = held.update_noise_levels(held.evaluate(points), 1)
         found = around(held, held.descend(begun, 1, _within_reach))
         own = [held.hypotheses[number].model.parameters[known[number]] for number in numbers]
         priors = [entry.log_prior(value) for entry, value in zip(own, values.tolist(), strict=True)]
@@ -397,10 +403,10 @@ def _over_loose(evidence: list[Evidence]) -> list[Evidence]:
     ]
     for number, entry in better.items():
         fitter = Fitter([entry.hypothesis])
-        settled = fitter.settle(fitter.evaluate(fitter.at(entry.point)), 1)
+        settled = fitter.update_noise_levels(fitter.evaluate(fitter.at(entry.point)), 1)
         if settled.cost[0] < evidence[number].cost - _TRUSTED:
             again = around(fitter, settled)
-            whole[number] = _over_loose(again)[0] if _loosest(again[0]) is not None else again[0]
+            whole[number] = _integrate_over_weak_parameter(again)[0] if _loosest(again[0]) is not None else again[0]
     return whole
 
 
@@ -437,10 +443,11 @@ def held_points(
         fits[row, mean] += along * (value - entry.point.fit[place])
         fits[row] = np.clip(fits[row], held.low[number], held.high[number])
         fits[row, place] = value
-    covariance, bend = (
-        np.array([getattr(evidence[number].point, name) for number in numbers]) for name in ("covariance", "bend")
+    covariance, sensor_log_gain = (
+        np.array([getattr(evidence[number].point, name) for number in numbers])
+        for name in ("covariance", "sensor_log_gain")
     )
-    return Points(np.array(numbers, dtype=np.intp), fits, covariance, bend)
+    return Points(np.array(numbers, dtype=np.intp), fits, covariance, sensor_log_gain)
 
 
 def _over_position(evidence: list[Evidence]) -> list[Evidence]:
@@ -449,14 +456,16 @@ def _over_position(evidence: list[Evidence]) -> list[Evidence]:
     fits = np.zeros((len(evidence), fitter.low.shape[1]))
     for row, entry in zip(fits, evidence, strict=True):
         row[: len(entry.point.fit)] = entry.point.fit
-    covariance, bend = (np.array([getattr(entry.point, name) for entry in evidence]) for name in ("covariance", "bend"))
-    best = fitter.evaluate(Points(np.arange(len(evidence)), fits, covariance, bend))
-    growth = np.full((len(evidence), fitter.lines.recordings, fits.shape[1]), np.nan)
-    for row, entry in zip(growth, evidence, strict=True):
-        if entry.growth is not None:
-            row[:, : entry.growth.shape[-1]] = entry.growth[0]
-            row[:, entry.growth.shape[-1] :] = 0.0
-    best = replace(best, growth=growth)
+    covariance, sensor_log_gain = (
+        np.array([getattr(entry.point, name) for entry in evidence]) for name in ("covariance", "sensor_log_gain")
+    )
+    best = fitter.evaluate(Points(np.arange(len(evidence)), fits, covariance, sensor_log_gain))
+    log_slope_gradient = np.full((len(evidence), fitter.lines.recordings, fits.shape[1]), np.nan)
+    for row, entry in zip(log_slope_gradient, evidence, strict=True):
+        if entry.log_slope_gradient is not None:
+            row[:, : entry.log_slope_gradient.shape[-1]] = entry.log_slope_gradient[0]
+            row[:, entry.log_slope_gradient.shape[-1] :] = 0.0
+    best = replace(best, log_slope_gradient=log_slope_gradient)
     hessian = fitter.covariance_equations(best)[1]
     low, high = fitter.covariance[POSITION].low, fitter.covariance[POSITION].high
     integrals = [
@@ -469,7 +478,9 @@ def _over_position(evidence: list[Evidence]) -> list[Evidence]:
         covariance = begin.points.covariance.copy()
         covariance[:, POSITION] = values
         moved = fitter.weighed(fitter.with_covariance(begin.points, covariance), begin.products)
-        at = replace(fitter.settle(moved, _SETTLING, held=POSITION), growth=begin.growth)
+        at = replace(
+            fitter.update_noise_levels(moved, _SETTLING, held=POSITION), log_slope_gradient=begin.log_slope_gradient
+        )
         return around_mean(fitter, at)[0] + _over_gain(fitter, at)
 
     _work_out(integrals, log_values)
@@ -556,7 +567,7 @@ def _along(evidence: Evidence, place: int, values: Floats) -> list[Evidence]:
             near, far = sorted(reached, key=lambda other: abs(other - value))[:2]
             step = (reached[near].fit - reached[far].fit) * (value - near) / (near - far)
             begin = held.at(replace(reached[near], fit=np.clip(reached[near].fit + step, held.low[0], held.high[0])))
-        (found[value],) = around(held, held.descend(held.settle(held.evaluate(begin), 1), 1))
+        (found[value],) = around(held, held.descend(held.update_noise_levels(held.evaluate(begin), 1), 1))
         reached[value] = found[value].point
     return [found[value] for value in values.tolist()]
 
@@ -603,7 +614,7 @@ def together(several: Sequence[Normals]) -> Normals:
     )
 
 
-def over_spread(fitter: Fitter, at: Evaluated, place: int) -> list[Normals] | None:
+def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, place: int) -> list[Normals] | None:
     """The parameter at a place among the model's, around each of several points of one hypothesis; None where that has
     no free spread.
 
@@ -619,7 +630,7 @@ def over_spread(fitter: Fitter, at: Evaluated, place: int) -> list[Normals] | No
     covariance = several.points.covariance.copy()
     covariance[:, column] = np.tile(low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES, len(at))
     moved = fitter.weighed(fitter.with_covariance(several.points, covariance), several.products)
-    moved = replace(moved, growth=several.growth)
+    moved = replace(moved, log_slope_gradient=several.log_slope_gradient)
     values, covariances = around_mean(fitter, moved)
     free = np.flatnonzero(fitter.free[0])
     index = int(np.searchsorted(free, place))
@@ -664,7 +675,7 @@ def profile_end(evidence: Evidence, place: int, limit: float) -> float | None:
     values = np.linspace(np.clip(limit, *entry.bounds), middle, _STRIDES, endpoint=False)
     held = Fitter([evidence.hypothesis], held=[(place,)])
     begun = held.evaluate(held_points(held, [evidence], [place], [0] * _STRIDES, values))
-    fitted = held.descend(held.settle(begun, 1), 1)
+    fitted = held.descend(held.update_noise_levels(begun, 1), 1)
     priors = np.array([entry.log_prior(value) for value in values.tolist()])
     fallen = np.append(fitted.cost - priors - evidence.cost, 0.0)
     beyond = np.flatnonzero(fallen > _FALL)

@@ -25,8 +25,8 @@ from underskin.diagnosis.inference.hypothesis import (
     Curvature,
     Evaluated,
     FitPoint,
+    Gaussian,
     Hypothesis,
-    Knowledge,
     Points,
     alone,
     curvature,
@@ -52,7 +52,7 @@ _PLACED_STARTS = 4  # of curves, whose contact points are looked for
 
 
 @dataclass(frozen=True)
-class Beginning:
+class StartingPoint:
     """Where the fit of a hypothesis may begin.
 
     `parent`: fit coordinates of its mechanisms that were fitted without the others; None where none were. `begin`:
@@ -65,13 +65,13 @@ class Beginning:
     alone: Mapping[str, Sequence[float]]
 
 
-def best_starts(fitter: Fitter, beginnings: Sequence[Beginning]) -> list[Points]:
+def best_starts(fitter: Fitter, beginnings: Sequence[StartingPoint]) -> list[Points]:
     """Of each hypothesis the best of the local minima of a grid over the new mechanisms' prior quantiles, and of what
     recordings suggest."""
     grids = [_Grid(*pair) for pair in zip(fitter.hypotheses, beginnings, strict=True)]
     begun = fitter.begin([grid.own for grid in grids], [entry.begin for entry in beginnings])
     settles = fitter.own.size and all(entry.parent is None for entry in beginnings)
-    tried = fitter.settle(begun, _SETTLING_ALONE if settles else _SETTLING)
+    tried = fitter.update_noise_levels(begun, _SETTLING_ALONE if settles else _SETTLING)
     edges = np.cumsum([0, *(len(grid.own) for grid in grids)])
     starts = []
     for number, (grid, beginning) in enumerate(zip(grids, beginnings, strict=True)):
@@ -94,7 +94,7 @@ class _Grid:
     Attributes: `own`; `shape`, along each new parameter, and `size` of the grid; `new`, the mechanisms that are.
     """
 
-    def __init__(self, hypothesis: Hypothesis, beginning: Beginning) -> None:
+    def __init__(self, hypothesis: Hypothesis, beginning: StartingPoint) -> None:
         places = own_places(hypothesis.model.names, hypothesis.lines)
         known = beginning.parent or {}
         # New too is what has other parameters beside the mechanism that was added.
@@ -124,7 +124,7 @@ class _Grid:
         self.own[:, free] = points
 
 
-def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[str], beginning: Beginning) -> Points:
+def _of_curves(fitter: Fitter, lowest: Evaluated, guessed: int, new: Sequence[str], beginning: StartingPoint) -> Points:
     """The best starts of curves, contact points looked for where none are known; the last so many are guesses."""
     count = len(lowest) - guessed
     ranked = _cheapest(lowest[:count])[:_PLACED_STARTS]
@@ -243,7 +243,7 @@ class Explanation:
     names: tuple[str, ...]
     log_evidence: float
     best: Evidence
-    placed: float  # probability that there is positioning scatter, given this set
+    has_position_scatter: float  # probability that there is positioning scatter, given this set
     each: tuple[tuple[float, Evidence], ...]  # without and with it, as far as they were fitted, with their log priors
 
     @classmethod
@@ -252,9 +252,9 @@ class Explanation:
         weights = np.array([prior + fit.log_evidence for prior, fit in each])
         total = float(np.logaddexp.reduce(weights))
         best = each[int(np.argmax(weights))][1]
-        scattered = [fit.hypothesis.placed for _, fit in each]
-        placed = float(np.exp(weights[scattered] - total).sum())
-        return cls(each[0][1].hypothesis.model.names, total, best, placed, tuple(each))
+        scattered = [fit.hypothesis.has_position_scatter for _, fit in each]
+        has_position_scatter = float(np.exp(weights[scattered] - total).sum())
+        return cls(each[0][1].hypothesis.model.names, total, best, has_position_scatter, tuple(each))
 
     @property
     def model(self) -> Model:
@@ -290,23 +290,23 @@ class Request:
     @property
     def without_scatter(self) -> bool:
         """Whether it is fitted without positioning scatter."""
-        return self.parent is None or self.parent.placed < _DECIDED
+        return self.parent is None or self.parent.has_position_scatter < _DECIDED
 
-    def target(self, placed: bool) -> float:
+    def target(self, has_position_scatter: bool) -> float:
         """The cost below which a fit is better than the parent's of like scatter; ∞ where that cannot be compared."""
-        if self.parent is None or self.kept or (self.parent.placed > 0.5) is not placed:
+        if self.parent is None or self.kept or (self.parent.has_position_scatter > 0.5) is not has_position_scatter:
             return np.inf
         return self.parent.best.cost - _LEAST_GAIN
 
 
-Beside = Callable[[Model, Lines], Knowledge | None]
+OtherKindsLikelihood = Callable[[Model, Lines], Gaussian | None]
 
 
 class FittingProblem:
     """Recordings of one kind and their noise, to which hypotheses are fitted: all rows, and a mean a recording."""
 
     def __init__(
-        self, lines: Lines, table: SigmaTable, beside: Beside | None = None, gain: Plateau = GAIN_PRIOR
+        self, lines: Lines, table: SigmaTable, beside: OtherKindsLikelihood | None = None, gain: Plateau = GAIN_PRIOR
     ) -> None:
         """Collapse, and work out how σ bends; curves are not collapsed and have no place. `beside` says what recordings
         of other kinds know of a model's parameters; `gain` is the prior of the gain scatter's logarithm."""
@@ -320,18 +320,18 @@ class FittingProblem:
         self.curvature = curvature(self.collapsed, table) if kind == "frf" else Curvature(none, none)
         self._hypotheses: dict[tuple[frozenset[str], bool, bool], Hypothesis] = {}
 
-    def hypothesis(self, names: Sequence[str], placed: bool, *, whole: bool = False) -> Hypothesis:
+    def hypothesis(self, names: Sequence[str], has_position_scatter: bool, *, whole: bool = False) -> Hypothesis:
         """The set's model on the lines that it needs; raises Unsupported."""
         whole = whole or any(self.lines.mechanisms[name].needs_lines for name in names)
-        key = frozenset(names), whole, placed
+        key = frozenset(names), whole, has_position_scatter
         if key not in self._hypotheses:
-            other = self._hypotheses.get((frozenset(names), whole, not placed))
+            other = self._hypotheses.get((frozenset(names), whole, not has_position_scatter))
             if other is None:
                 lines = self.lines if whole else self.collapsed
                 model = compose(names, lines.campaign, self.table, self.kind, lines.mechanisms)
                 known = None if self.beside is None else self.beside(model, lines)
-                other = Hypothesis(model, lines, self.curvature, placed, gain=self.gain, knowledge=known)
-            self._hypotheses[key] = replace(other, placed=placed)
+                other = Hypothesis(model, lines, self.curvature, has_position_scatter, gain=self.gain, knowledge=known)
+            self._hypotheses[key] = replace(other, has_position_scatter=has_position_scatter)
         return self._hypotheses[key]
 
     def explain(self, requests: Sequence[Request], best: float = np.inf) -> list[Explanation | None]:
@@ -341,14 +341,14 @@ class FittingProblem:
         not show; and where a set of mechanisms is hopeless, by `_HOPELESS` nats behind the others or what is the `best`
         cost so far. Evidences are Laplace approximations, until they are `integrated`. Raises Unsupported.
         """
-        plain, placed = (
+        plain, has_position_scatter = (
             [self.hypothesis(request.names, scattered) for request in requests] for scattered in (False, True)
         )
         scattered = {number for number, request in enumerate(requests) if not request.without_scatter}
         starts = _starts(
             {number: plain[number] for number in range(len(requests)) if number not in scattered}, requests
         )
-        placed_starts = _starts({number: placed[number] for number in sorted(scattered)}, requests)
+        placed_starts = _starts({number: has_position_scatter[number] for number in sorted(scattered)}, requests)
         fits: list[list[tuple[float, Evidence]]] = [[] for _ in requests]
         log_priors = np.log([NO_POSITION_SCATTER, 1 - NO_POSITION_SCATTER])
         also_placed: dict[int, Points] = {}
@@ -357,17 +357,17 @@ class FittingProblem:
         matters = self._position_matters(plain, parentless)
         for number, improved, evidence in fitted:
             parent = requests[number].parent
-            if evidence is None and parent is not None and parent.placed <= 0.5:
+            if evidence is None and parent is not None and parent.has_position_scatter <= 0.5:
                 continue
-            also = parent.placed > 1 - _DECIDED if parent else matters[number]
+            also = parent.has_position_scatter > 1 - _DECIDED if parent else matters[number]
             if evidence is not None:
                 fits[number].append((float(log_priors[0]) if also or parent else 0.0, evidence))
             if also:
                 also_placed[number] = improved
-        placed_starts |= with_scatter(placed, also_placed)
+        placed_starts |= with_scatter(has_position_scatter, also_placed)
         best = min([best, *(evidence.cost for own in fits for _, evidence in own)])
         shown_plain = {number for number, own in enumerate(fits) if own}
-        scattering = _fitted(placed, placed_starts, requests, best)
+        scattering = _fitted(has_position_scatter, placed_starts, requests, best)
         _add(fits, scattering, log_priors[1])
         for number, _, evidence in scattering:
             if evidence is None and np.isfinite(requests[number].target(True)):
@@ -391,14 +391,16 @@ class FittingProblem:
         starts: dict[int, Points] = {}
         for entry in explanations:
             try:
-                hypothesis = self.hypothesis(entry.names, entry.best.hypothesis.placed)
+                hypothesis = self.hypothesis(entry.names, entry.best.hypothesis.has_position_scatter)
             except (Unsupported, InvalidInput):
                 continue  # what was left out is what the mechanism, or any model of a curve, needs
             if [one.name for one in hypothesis.model.parameters] == [one.name for one in entry.model.parameters]:
                 fitter = Fitter([hypothesis])
                 # Bounds may be narrower here: those of a time follow from how often the curves were sampled.
                 fit = np.clip(entry.point.fit, fitter.low[0], fitter.high[0])
-                starts[len(hypotheses)] = fitter.at(replace(entry.point, fit=fit, bend=fitter.no_bend))
+                starts[len(hypotheses)] = fitter.at(
+                    replace(entry.point, fit=fit, sensor_log_gain=fitter.no_sensor_log_gain)
+                )
                 hypotheses.append(hypothesis)
         requests = [Request(hypothesis.model.names) for hypothesis in hypotheses]
         fitted = {requests[number].names: evidence for number, _, evidence in _fitted(hypotheses, starts, requests)}
@@ -448,7 +450,7 @@ def _fitted(
     for members in groups(starts, hypotheses):
         fitter = Fitter([hypotheses[number] for number in members])
         points = stacked([starts[number] for number in members])
-        gains = np.array([requests[number].target(fitter.placed) for number in members])[points.owner]
+        gains = np.array([requests[number].target(fitter.has_position_scatter) for number in members])[points.owner]
         least = 1 if fitter.lines.curves else 0  # of curves every pair is tried, which begins from a single one
         kept = [requests[number].kept or len(requests[number].names) <= least for number in members]
         hopeless = np.where(kept, np.inf, _HOPELESS)[points.owner]
@@ -481,7 +483,7 @@ def _starts(hypotheses: Mapping[int, Hypothesis], requests: Sequence[Request]) -
                 known, begin = {name: larger.own(name) for name in requests[number].names}, larger.point
             added = requests[number].alone
             alone = {} if added is None else {name: added.own(name) for name in added.names}
-            beginnings.append(Beginning(known, parent.point if parent and begin is None else begin, alone))
+            beginnings.append(StartingPoint(known, parent.point if parent and begin is None else begin, alone))
         starts |= dict(
             zip(members, best_starts(Fitter([hypotheses[number] for number in members]), beginnings), strict=True)
         )

@@ -17,8 +17,8 @@ from underskin.autodiff import contiguous
 from underskin.diagnosis.inference.hypothesis import (
     Evaluated,
     FitPoint,
+    GaussianBatch,
     Hypothesis,
-    KnowledgeOfSeveral,
     Likelihoods,
     Points,
     log_likelihoods,
@@ -39,7 +39,7 @@ SMOOTH = 2  # of curves, which have no place
 _FREE_SPREAD = 0.02  # above this sd, e^b is linearised where b is, not at 0
 _NUMBERS_AT_ONCE = 500_000
 _PREDICTED_AT_ONCE = 1_000_000
-_BENDINGS, _BENT, _LARGEST_BEND = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
+_BENDINGS, _BENT, _LARGEST_SENSOR_LOG_GAIN = 6, 3e-3, 2.0  # rounds at most, change that ends them, and bounds of b
 _LARGEST_D33_STEP = 1.0  # of log d33
 _POSITION_STARTS = (0.07e-3, 0.14e-3, 0.28e-3)  # [m]
 _SETTLING = 20
@@ -67,7 +67,7 @@ class Fitter:
         have no prior."""
         self.hypotheses = tuple(hypotheses)
         first = hypotheses[0]
-        self.lines, self.curvature, self.placed = first.lines, first.curvature, first.placed
+        self.lines, self.curvature, self.has_position_scatter = first.lines, first.curvature, first.has_position_scatter
         self.covariance = first.covariance
         self._covariance_prior = np.array([entry.prior.row for entry in self.covariance])
         self._lowest = np.array([entry.low for entry in self.covariance])
@@ -87,7 +87,7 @@ class Fitter:
             self._log_prior_height[number], self._freedom[number, places] = of_priors[2].sum(), of_priors[3]
         self._range = self.high - self.low
         each = [entry.knowledge for entry in hypotheses]
-        self._known = KnowledgeOfSeveral(each, shape[1]) if any(one is not None for one in each) else None
+        self._known = GaussianBatch(each, shape[1]) if any(one is not None for one in each) else None
         # Where each hypothesis has the covariance parameters that are its mechanisms' own, which come last.
         self.own = np.array(
             [
@@ -102,17 +102,17 @@ class Fitter:
         self._spread = spreads[0] if spreads else None
 
     @property
-    def no_bend(self) -> Floats:
+    def no_sensor_log_gain(self) -> Floats:
         """Log gains of the sensors that are all 0."""
         return np.zeros(self.lines.sensors.shape[1])
 
     def at(self, point: FitPoint) -> Points:
         """One point of the first hypothesis."""
-        return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.bend[None])
+        return Points(np.zeros(1, dtype=np.intp), point.fit[None], point.covariance[None], point.sensor_log_gain[None])
 
     def evaluate(self, points: Points, *, slopes: bool = True) -> Evaluated:
         """Predict, with derivatives unless they are not needed, and weigh."""
-        products = self.products(points, slopes=slopes, place=self.placed)
+        products = self.products(points, slopes=slopes, place=self.has_position_scatter)
         return self.weighed(points, products)
 
     def products(self, points: Points, *, slopes: bool, place: bool) -> Products:
@@ -166,19 +166,21 @@ class Fitter:
         if self._spread is not None:
             for _ in range(_BENDINGS):
                 levels = self.levels(points.covariance[:, None])
-                gains = Likelihoods(self.lines, self.curvature, products, levels, points.bend).sensor_gains
+                gains = Likelihoods(self.lines, self.curvature, products, levels, points.sensor_log_gain).sensor_gains
                 free = levels.spread[:, 0] >= _FREE_SPREAD
-                bend = np.where(free, np.clip(gains, -_LARGEST_BEND, _LARGEST_BEND), points.bend)
-                bent = np.abs(bend - points.bend).max()
+                sensor_log_gain = np.where(
+                    free, np.clip(gains, -_LARGEST_SENSOR_LOG_GAIN, _LARGEST_SENSOR_LOG_GAIN), points.sensor_log_gain
+                )
+                bent = np.abs(sensor_log_gain - points.sensor_log_gain).max()
                 if bent < _BENT:
                     break
-                points = replace(points, bend=bend)
+                points = replace(points, sensor_log_gain=sensor_log_gain)
         return Evaluated(points, products, self._costs(points, products, points.covariance[:, None])[:, 0])
 
     def marginal(self, at: Evaluated) -> Likelihoods:
         """The likelihoods at points."""
         levels = self.levels(at.points.covariance[:, None])
-        return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.bend)
+        return Likelihoods(self.lines, self.curvature, at.products, levels, at.points.sensor_log_gain)
 
     def levels(self, covariance: Floats) -> SeveralLevels:
         """The noise levels that covariance parameters (…, parameters) hold, (…, 1)."""
@@ -189,7 +191,7 @@ class Fitter:
         return SeveralLevels(
             gain=values[..., GAIN, :],
             level=values[..., LEVEL, :],
-            position=values[..., POSITION, :] if self.placed else np.zeros(shape),
+            position=values[..., POSITION, :] if self.has_position_scatter else np.zeros(shape),
             spread=np.full(shape, SENSOR_SPREAD) if self._spread is None else values[..., self._spread, :],
             pickup=None if pickup is None else pickup.deviation(own),
             smooth=values[..., SMOOTH, :] if self.lines.curves else np.zeros(shape),
@@ -207,7 +209,7 @@ class Fitter:
                 parts = [slice(first, first + at_once) for first in range(0, len(points), at_once)]
                 return np.concatenate([self._costs(points[part], products[part], covariances[part]) for part in parts])
         covariances = contiguous(covariances)
-        each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.bend)
+        each = log_likelihoods(self.lines, self.curvature, products, self.levels(covariances), points.sensor_log_gain)
         bounds = self.free, self.low, self.high, self._precision, self._centre
         heights = self._freedom, self._log_prior_height
         log_priors(points.owner, contiguous(points.fit), *bounds, *heights, covariances, self._covariance_prior, each)
@@ -224,8 +226,10 @@ class Fitter:
 
         What is held or no parameter has gradient 0 and information 1 of its own.
         """
-        levels, bend = self.levels(at.points.covariance[:, None]), at.points.bend
-        information, gradient = normal_equations(self.lines, self.curvature, at.products, levels, bend, at.growth)
+        levels, sensor_log_gain = self.levels(at.points.covariance[:, None]), at.points.sensor_log_gain
+        information, gradient = normal_equations(
+            self.lines, self.curvature, at.products, levels, sensor_log_gain, at.log_slope_gradient
+        )
         owner = at.points.owner
         free = self.free[owner]
         away = at.points.fit - self._centre[owner]
@@ -253,7 +257,7 @@ class Fitter:
         np.put_along_axis(fit, self.own[points.owner], covariance[:, self._common :], axis=1)
         return replace(points, covariance=covariance, fit=fit)
 
-    def settle(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
+    def update_noise_levels(self, at: Evaluated, steps: int, held: int | None = None) -> Evaluated:
         """Newton steps of the covariance parameters, one of which may be held, at fixed predictions.
 
         Several of a mechanism's own hang together, so that steps of one at a time would creep.
@@ -297,26 +301,28 @@ class Fitter:
             moving = moving[gained >= LEAST_GAIN]
             if not len(moving):
                 break
-        return Evaluated(points, at.products, cost, at.growth)
+        return Evaluated(points, at.products, cost, at.log_slope_gradient)
 
     def _settled_apart(self, at: Evaluated, products: FrfProducts, steps: int, held: int | None) -> Evaluated:
         """The same where no mechanism acts on the covariance: each parameter moves on its own."""
-        from underskin.diagnosis.inference.kernels import settle
+        from underskin.diagnosis.inference.kernels import update_noise_levels
 
         covariance, cost = at.points.covariance.copy(), at.cost.copy()
         about_means, numbers = self.lines.about_means
         place = products.place_slopes
-        size = np.zeros((len(at), 0)) if place is None or not self.placed else place[0] ** 2 + place[1] ** 2
-        settle(
+        size = (
+            np.zeros((len(at), 0)) if place is None or not self.has_position_scatter else place[0] ** 2 + place[1] ** 2
+        )
+        update_noise_levels(
             *map(contiguous, (products.level, products.uu, products.uy, products.yy, size)),
             self.lines.sensor,
-            contiguous(at.points.bend),
+            contiguous(at.points.sensor_log_gain),
             self.curvature.laplacian,
             self.curvature.square,
             about_means,
             float(numbers),
             SENSOR_SPREAD,
-            self.placed,
+            self.has_position_scatter,
             self._covariance_prior,
             self._lowest,
             self._highest,
@@ -364,20 +370,20 @@ class Fitter:
             rows = owner == number
             fit[rows, :mechanisms], fit[rows, mechanisms:count] = values, nuisances
         common = [GAIN_PRIOR.middle, 0.0]
-        if self.placed:
+        if self.has_position_scatter:
             common.append(POSITION_PRIOR.middle)
         if self.lines.curves:
             common.append(self.hypotheses[0].smooth.middle)
         of_mechanisms = np.take_along_axis(fit, self.own[owner], axis=1)
         covariance = np.concatenate([np.tile(common, (len(owner), 1)), of_mechanisms], axis=1)
-        return Points(owner, fit, covariance, np.tile(self.no_bend, (len(owner), 1)))
+        return Points(owner, fit, covariance, np.tile(self.no_sensor_log_gain, (len(owner), 1)))
 
     def begin(
         self, own: Sequence[Floats], parents: Sequence[FitPoint | None] | None = None, *, slopes: bool = False
     ) -> Evaluated:
         """The starts of each hypothesis with these coordinates, d33 as the data would have it, evaluated."""
         points = self.start(own, parents or [None] * len(own))
-        products = self.products(points, slopes=slopes, place=self.placed)
+        products = self.products(points, slopes=slopes, place=self.has_position_scatter)
         if not any(entry.proportional for entry in self.hypotheses[0].model.parameters):
             return self.weighed(points, products)
         ratio = self._ratio(points, products)
@@ -441,7 +447,7 @@ class Fitter:
         step = np.clip(
             gradient[number, place] / information[number, place, place], -_LARGEST_D33_STEP, _LARGEST_D33_STEP
         )
-        return self.settle(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
+        return self.update_noise_levels(self.weighed(*self._scaled(at.points, at.products, np.exp(step))), 2)
 
     @cached_property
     def _d33(self) -> Indices:
@@ -463,14 +469,16 @@ class Fitter:
     def improve(self, start: Points, target: Target | None = None) -> Evaluated:
         """The most probable points near the starts; only roughly where their targets will not be reached."""
         if not self.lines.curves:
-            return self.settle(self.descend(self.settle(self.evaluate(start), 3), 1, target), 2)
+            return self.update_noise_levels(
+                self.descend(self.update_noise_levels(self.evaluate(start), 3), 1, target), 2
+            )
         begun = by_least_squares(self, start)
-        as_they_are = self.settle(self.evaluate(start), _CURVE_SETTLING)
+        as_they_are = self.update_noise_levels(self.evaluate(start), _CURVE_SETTLING)
         if as_they_are.cost.min() < begun.cost[0]:
             begun = as_they_are[as_they_are.best()]
         if target is not None and begun.cost[0] > target(begun)[0] + _MAY_GAIN:
             return begun
-        return self.settle(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
+        return self.update_noise_levels(self._between_samples(begun).descend(begun, 1), _CURVE_SETTLING)
 
     def _between_samples(self, at: Evaluated) -> Self:
         """Of what sticks, with contact points held between the samples where they are at one point."""
@@ -502,7 +510,7 @@ class Fitter:
             resting = (slope < _CONVERGED) & self.grown(part)
             going = np.ones(len(part), dtype=bool)
             if resting.any():
-                settled = self.settle(part[resting], settling)
+                settled = self.update_noise_levels(part[resting], settling)
                 going[resting] = part.cost[resting] - settled.cost >= _CONVERGED
                 best = self.replaced(best, moving[resting], settled)
             stepping = ~resting
@@ -524,10 +532,12 @@ class Fitter:
         """
         owner = at.points.owner
         fit = np.clip(at.points.fit + step, self.low[owner], self.high[owner])
-        tried = self.settle(self.evaluate(replace(at.points, fit=fit)), settling)
+        tried = self.update_noise_levels(self.evaluate(replace(at.points, fit=fit)), settling)
         gained = at.cost - tried.cost
         better = gained > 0
-        after = self.replaced(at, np.flatnonzero(better), replace(tried, growth=at.growth)[better])
+        after = self.replaced(
+            at, np.flatnonzero(better), replace(tried, log_slope_gradient=at.log_slope_gradient)[better]
+        )
         stuck = ~better & ((damping > 1e4) | (np.abs(step).max(axis=1) < 1e-7))
         blind = np.flatnonzero(~better & ~stuck & ~self.grown(at))
         if len(blind):
@@ -541,17 +551,17 @@ class Fitter:
 
     def grown(self, at: Evaluated) -> Mask:
         """Which points know how the position's slopes change, or have no use for it."""
-        if not self.placed:
+        if not self.has_position_scatter:
             return np.ones(len(at), dtype=bool)
-        if at.growth is None:
+        if at.log_slope_gradient is None:
             return np.zeros(len(at), dtype=bool)
-        return np.asarray(np.isfinite(at.growth).all(axis=(1, 2)))
+        return np.asarray(np.isfinite(at.log_slope_gradient).all(axis=(1, 2)))
 
     def replaced(self, at: Evaluated, where: Indices, other: Evaluated) -> Evaluated:
         """With other points in the place of some, which are in rising order."""
         if not len(where):
             return at
-        if len(where) == len(at) and (at.growth is None or other.growth is not None):
+        if len(where) == len(at) and (at.log_slope_gradient is None or other.log_slope_gradient is not None):
             return other
         order = np.arange(len(at))
         order[where] = len(at) + np.arange(len(other))
@@ -564,16 +574,19 @@ class Fitter:
             np.concatenate([one.owner, two.owner])[order],
             of(one.fit, two.fit),
             of(one.covariance, two.covariance),
-            of(one.bend, two.bend),
+            of(one.sensor_log_gain, two.sensor_log_gain),
         )
-        growth = None
-        if at.growth is not None or other.growth is not None:
+        log_slope_gradient = None
+        if at.log_slope_gradient is not None or other.log_slope_gradient is not None:
             unknown = np.full((1, self.lines.recordings, max(self.counts)), np.nan)
-            growth = of(
-                *(np.repeat(unknown, len(one), axis=0) if one.growth is None else one.growth for one in (at, other))
+            log_slope_gradient = of(
+                *(
+                    np.repeat(unknown, len(one), axis=0) if one.log_slope_gradient is None else one.log_slope_gradient
+                    for one in (at, other)
+                )
             )
         products = joined([at.products, other.products], max(self.counts))[order]
-        return Evaluated(points, products, of(at.cost, other.cost), growth)
+        return Evaluated(points, products, of(at.cost, other.cost), log_slope_gradient)
 
     def with_growth(self, at: Evaluated) -> Evaluated:
         """With ∂ log |t|²/∂θ (points, recordings, parameters) of the position's slopes t, by differences."""
@@ -586,10 +599,10 @@ class Fitter:
         fit = moved.fit.copy()
         fit[np.arange(len(fit)), place] += step[number, place]
         here, there = (_log_size(self.place_slopes(points)) for points in (at.points, replace(moved, fit=fit)))
-        growth = np.zeros((len(at), here.shape[1], count))
-        growth[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
-        growth[number, :, place] = (there - here[number]) / step[number, place][:, None]
-        return replace(at, growth=growth)
+        log_slope_gradient = np.zeros((len(at), here.shape[1], count))
+        log_slope_gradient[np.arange(len(at)), :, self._d33[owner]] = 2.0  # the response is proportional to d33
+        log_slope_gradient[number, :, place] = (there - here[number]) / step[number, place][:, None]
+        return replace(at, log_slope_gradient=log_slope_gradient)
 
     def _step(self, at: Evaluated, damping: Floats) -> tuple[Floats, Floats]:
         """Damped Gauss–Newton steps of the mean parameters within the bounds, and what the gradients say they gain."""
@@ -682,7 +695,7 @@ def by_least_squares(fitter: Fitter, start: Points) -> Evaluated:
     smooth = np.clip(_SMOOTH_STARTS, *_smooth_range(fitter))
     covariance = np.array([[GAIN_PRIOR.middle, 0.0, value] for value in smooth])
     both = start[np.zeros(len(smooth), dtype=np.intp)]
-    at = fitter.settle(
+    at = fitter.update_noise_levels(
         fitter.evaluate(replace(both, fit=np.tile(fit, (len(smooth), 1)), covariance=covariance)), _SETTLING
     )
     return at[at.best()]

@@ -10,9 +10,9 @@ C_i = κ² D + Q + V_i u uᵀ, V_i = s² a² + p² |t|² + ½ p⁴ tr(H²) a², 
 recordings. All of it is taken out by Sherman and Morrison's identity, so that time is linear in rows and in
 recordings. The covariance follows the model, so log|C| stays.
 
-e^b is linearised at `bend`, the most probable b of each sensor: Laplace's method for b. Where a contact sits on an
-extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above, with H of
-the base model.
+e^b is linearised at `sensor_log_gain`, the most probable b of each sensor: Laplace's method for b. Where a contact
+sits on an extremum of σ, p acts in second order: on the mean by the factor exp(½ p² ∇²σ/σ), on the variance as above,
+with H of the base model.
 
 What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording. How σ bends
 around each contact's commanded place, in the base model: positioning scatter in second order. Points of several
@@ -67,11 +67,11 @@ class Curvature:
 
 
 def log_likelihoods(
-    lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
+    lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
 ) -> Floats:
     """Of predictions at several points, each at some sets of noise levels (points, sets, 1): (points, sets).
 
-    `bend` (points, sensors).
+    `sensor_log_gain` (points, sensors).
     """
     from underskin.diagnosis.inference.kernels import log_likelihoods as add
 
@@ -80,11 +80,11 @@ def log_likelihoods(
     further = sums.log_determinant + 2 * numbers * np.log(levels.level) + about_means / levels.level**2
     each = np.ascontiguousarray(-0.5 * np.asarray(further)[..., 0])
     slopes = products.place_slopes
-    place = np.zeros((len(bend), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
+    place = np.zeros((len(sensor_log_gain), 0)) if slopes is None else slopes[0] ** 2 + slopes[1] ** 2
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)
     yy = sums.yy if sums.yy.ndim == 3 else sums.yy[None, None]
     arrays = map(contiguous, (products.level, sums.uu, sums.uy, yy, place))
-    add(*arrays, lines.sensor, contiguous(bend), curvature.laplacian, curvature.square, noise, each)
+    add(*arrays, lines.sensor, contiguous(sensor_log_gain), curvature.laplacian, curvature.square, noise, each)
     return each
 
 
@@ -93,15 +93,15 @@ def normal_equations(
     curvature: Curvature,
     products: Products,
     levels: SeveralLevels,
-    bend: Floats,
-    growth: Floats | None = None,
+    sensor_log_gain: Floats,
+    log_slope_gradient: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Jᵀ C⁻¹ J (points, P, P), the information on the parameters, and the gradient of the log likelihood (points, P),
     at the first set of noise levels.
 
     The gradient is that by the mean and by all columns that follow the model, ∂/∂θ (−½ log|C| − ½ rᵀC⁻¹r). How the
-    position's slopes t change is told by their `growth` ∂ log |t|²/∂θ (points, recordings, P), finite where known;
-    else they are taken to change as L does, or where they lead, not at all.
+    position's slopes t change is given by `log_slope_gradient` ∂ log |t|²/∂θ (points, recordings, P), finite where
+    known; else they are taken to change as L does, or where they lead, not at all.
     """
     from underskin.diagnosis.inference.kernels import normal_equations as fill
 
@@ -116,9 +116,25 @@ def normal_equations(
     noise = np.concatenate([levels.gain, levels.level, levels.position, levels.spread], axis=-1)[:, 0]
     count = max(by_level.shape[-1], turned[0].shape[-1])
     information, gradient = np.empty((points, count, count)), np.empty((points, count))
-    arrays = products.level, by_level, uu, uy, *turned, place, none if growth is None else growth
+    arrays = (
+        products.level,
+        by_level,
+        uu,
+        uy,
+        *turned,
+        place,
+        none if log_slope_gradient is None else log_slope_gradient,
+    )
     of_place = curvature.laplacian, curvature.square
-    fill(*map(contiguous, arrays), lines.sensor, contiguous(bend), *of_place, contiguous(noise), information, gradient)
+    fill(
+        *map(contiguous, arrays),
+        lines.sensor,
+        contiguous(sensor_log_gain),
+        *of_place,
+        contiguous(noise),
+        information,
+        gradient,
+    )
     return information, gradient
 
 
@@ -126,12 +142,12 @@ class Likelihoods:
     """Of predictions at several points, each at some sets of noise levels."""
 
     def __init__(
-        self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, bend: Floats
+        self, lines: Lines, curvature: Curvature, products: Products, levels: SeveralLevels, sensor_log_gain: Floats
     ) -> None:
-        """Levels are (points, sets, 1), `bend` (points, sensors)."""
+        """Levels are (points, sets, 1), `sensor_log_gain` (points, sensors)."""
         self.levels, self._products, self._curvature = levels, products, curvature
         self._sensors = lines.sensors
-        self._bend = own = bend[:, None, lines.sensor]
+        self._bend = own = sensor_log_gain[:, None, lines.sensor]
         k2, p2 = levels.level**2, levels.position**2
         sums = products.summed(levels)
         self._factor = factor = np.exp(own + 0.5 * p2 * curvature.laplacian)
@@ -155,10 +171,10 @@ class Likelihoods:
         """Re u*m, Re u*r and Re u*u of the first point's recordings (recordings,) at another positioning scatter, with
         weights that leave out κ."""
         sums = self._products.summed(self.levels)
-        bend, level = self._bend[0, 0], self._products.level[0]
+        sensor_log_gain, level = self._bend[0, 0], self._products.level[0]
         uu, uy = np.broadcast_to(sums.uu[0, 0], level.shape), np.broadcast_to(sums.uy[0, 0], level.shape)
-        a = level * np.exp(bend + 0.5 * position**2 * self._curvature.laplacian)
-        return a * uu, uy - a * (1 - bend) * uu, uu
+        a = level * np.exp(sensor_log_gain + 0.5 * position**2 * self._curvature.laplacian)
+        return a * uu, uy - a * (1 - sensor_log_gain) * uu, uu
 
     @property
     def slopes_along(self) -> Floats:
@@ -258,25 +274,25 @@ class Points:
     owner: Indices
     fit: Floats
     covariance: Floats
-    bend: Floats
+    sensor_log_gain: Floats
 
     def __len__(self) -> int:
         return len(self.owner)
 
     def __getitem__(self, points: Indices | Mask | slice) -> "Points":
-        return Points(self.owner[points], self.fit[points], self.covariance[points], self.bend[points])
+        return Points(self.owner[points], self.fit[points], self.covariance[points], self.sensor_log_gain[points])
 
 
 def together(one: Points, other: Points) -> Points:
     """The points of both, which are of one hypothesis."""
-    names = "owner", "fit", "covariance", "bend"
+    names = "owner", "fit", "covariance", "sensor_log_gain"
     return Points(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in names))
 
 
 def alone(points: Points, owner: int, count: int) -> Points:
     """The points of one of several hypotheses, which has so many parameters, as those of it alone."""
     own = points[points.owner == owner]
-    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.bend)
+    return Points(np.zeros_like(own.owner), own.fit[:, :count], own.covariance, own.sensor_log_gain)
 
 
 def stacked(points: Sequence[Points]) -> Points:
@@ -285,22 +301,24 @@ def stacked(points: Sequence[Points]) -> Points:
     fit = np.zeros((len(owner), max(entry.fit.shape[1] for entry in points)))
     for number, entry in enumerate(points):
         fit[owner == number, : entry.fit.shape[1]] = entry.fit
-    covariance, bend = (np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "bend"))
-    return Points(owner, fit, covariance, bend)
+    covariance, sensor_log_gain = (
+        np.concatenate([getattr(entry, name) for entry in points]) for name in ("covariance", "sensor_log_gain")
+    )
+    return Points(owner, fit, covariance, sensor_log_gain)
 
 
 @dataclass(frozen=True)
 class Evaluated:
     """Points with what was worked out there; `cost` is minus the log posterior density (up to what all share).
 
-    `growth` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a fit has not
-    needed it yet.
+    `log_slope_gradient` ∂ log |t|²/∂θ of the position's slopes (points, recordings, parameters): not finite where a
+    fit has not needed it yet.
     """
 
     points: Points
     products: Products
     cost: Floats
-    growth: Floats | None = None
+    log_slope_gradient: Floats | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -312,8 +330,8 @@ class Evaluated:
     def __getitem__(self, points: Indices | Mask | slice) -> "Evaluated":
         if isinstance(points, np.ndarray) and points.dtype == bool and points.all():
             return self
-        growth = None if self.growth is None else self.growth[points]
-        return Evaluated(self.points[points], self.products[points], self.cost[points], growth)
+        log_slope_gradient = None if self.log_slope_gradient is None else self.log_slope_gradient[points]
+        return Evaluated(self.points[points], self.products[points], self.cost[points], log_slope_gradient)
 
     def best(self) -> Indices:
         """The point of least cost of each hypothesis that has one."""
@@ -323,7 +341,7 @@ class Evaluated:
 
 
 @dataclass(frozen=True, eq=False)
-class Knowledge:
+class Gaussian:
     """ln L(x) = height + linear·x − ½ xᵀ precision x, in a model's fit coordinates x (parameters,)."""
 
     precision: Floats  # (parameters, parameters)
@@ -338,18 +356,18 @@ class Knowledge:
             matrix.T @ precision @ matrix, -matrix.T @ precision @ away, float(height - 0.5 * away @ precision @ away)
         )
 
-    def __add__(self, other: "Knowledge") -> "Knowledge":
-        return Knowledge(self.precision + other.precision, self.linear + other.linear, self.height + other.height)
+    def __add__(self, other: "Gaussian") -> "Gaussian":
+        return Gaussian(self.precision + other.precision, self.linear + other.linear, self.height + other.height)
 
     def log_density(self, fit: Floats) -> float:
         """ln L at one point (parameters,)."""
         return float(self.height + self.linear @ fit - 0.5 * fit @ self.precision @ fit)
 
 
-class KnowledgeOfSeveral:
+class GaussianBatch:
     """That of several hypotheses, whose parameters are padded to equally many."""
 
-    def __init__(self, each: Sequence[Knowledge | None], most: int) -> None:
+    def __init__(self, each: Sequence[Gaussian | None], most: int) -> None:
         """None where nothing is known beside the recordings themselves."""
         self._precision, self._linear = np.zeros((len(each), most, most)), np.zeros((len(each), most))
         self._height = np.zeros(len(each))
@@ -392,11 +410,11 @@ class Hypothesis:
     model: Model
     lines: Lines
     curvature: Curvature
-    placed: bool  # whether there is positioning scatter
+    has_position_scatter: bool  # whether there is positioning scatter
     gain: Plateau = GAIN_PRIOR
     position: Plateau = POSITION_PRIOR
     smooth: Plateau = USUAL  # η of curves
-    knowledge: Knowledge | None = None  # from recordings of other kinds
+    knowledge: Gaussian | None = None  # from recordings of other kinds
 
     @cached_property
     def mean_places(self) -> list[int]:
@@ -412,7 +430,7 @@ class Hypothesis:
             CovarianceParameter("gain", np.log(1e-3), np.log(0.5), self.gain),
             CovarianceParameter("level", np.log(low), np.log(high), level),
         ]
-        if self.placed:
+        if self.has_position_scatter:
             highest = self.position.high + np.log(2.0)
             common.append(CovarianceParameter("position", np.log(2e-5), highest, self.position))
         if self.lines.curves:
@@ -484,7 +502,7 @@ class FitPoint:
 
     fit: Floats
     covariance: Floats
-    bend: Floats
+    sensor_log_gain: Floats
 
 
 def _as_plateau(entry: Parameter) -> Plateau:

@@ -30,7 +30,7 @@ def log_likelihood(
     yy: Floats,
     place: Floats,
     sensor: NDArray[np.int64],
-    bend: Floats,
+    sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     noise: Floats,
@@ -48,7 +48,7 @@ def log_likelihood(
     determinant, inverse = 1.0, 1 / k2
     for recording in range(len(level)):
         of = sensor[recording]
-        own = bend[of]
+        own = sensor_log_gain[of]
         exponent = own + 0.5 * p2 * laplacian[recording]
         factor = np.exp(exponent) if exponent != 0 else 1.0
         a = level[recording] * factor
@@ -88,7 +88,7 @@ def log_likelihoods(
     yy: Floats,
     place: Floats,
     sensor: NDArray[np.int64],
-    bend: Floats,
+    sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     noise: Floats,
@@ -113,7 +113,7 @@ def log_likelihoods(
     noise
         (points, sets, 4): gain, level, position and spread.
     """
-    mm, mr = np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    mm, mr = np.empty(sensor_log_gain.shape[1]), np.empty(sensor_log_gain.shape[1])
     for point in range(each.shape[0]):
         for number in range(each.shape[1]):
             each[point, number] += log_likelihood(
@@ -123,7 +123,7 @@ def log_likelihoods(
                 yy[min(point, yy.shape[0] - 1), min(number, yy.shape[1] - 1)],
                 place[point],
                 sensor,
-                bend[point],
+                sensor_log_gain[point],
                 laplacian,
                 square,
                 noise[min(point, len(noise) - 1), number],
@@ -199,9 +199,9 @@ def _cost(
 ) -> float:
     """The cost with covariance parameters (parameters,), up to what no noise level changes; `noise` and `sums` are
     overwritten."""
-    about_means, numbers, placed, plateaus = known
+    about_means, numbers, has_position_scatter, plateaus = known
     noise[0], noise[1] = np.exp(covariance[0]), np.exp(covariance[1])
-    if placed:
+    if has_position_scatter:
         noise[2] = np.exp(covariance[2])
     of_lines = -numbers * covariance[1] - 0.5 * about_means / noise[1] ** 2
     return -(of_lines + log_likelihood(*of_point, noise, *sums) + log_plateaus(covariance, plateaus))
@@ -253,20 +253,20 @@ def _newton_step(
     "float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, boolean, float64[:, ::1], float64[::1], "
     "float64[::1], int64, int64, float64[:, ::1], float64[::1])"
 )
-def settle(
+def update_noise_levels(
     level: Floats,
     uu: Floats,
     uy: Floats,
     yy: Floats,
     place: Floats,
     sensor: NDArray[np.int64],
-    bend: Floats,
+    sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     about_means: float,
     numbers: float,
     spread: float,
-    placed: bool,
+    has_position_scatter: bool,
     plateaus: Floats,
     lowest: Floats,
     highest: Floats,
@@ -275,8 +275,8 @@ def settle(
     covariance: Floats,
     cost: Floats,
 ) -> None:
-    """Newton steps of gain, level and, where `placed`, position scatter, each on its own: `covariance` (points,
-    parameters) and `cost` (points,) are overwritten with where they end.
+    """Newton steps of gain, level and, where `has_position_scatter`, position scatter, each on its own: `covariance`
+    (points, parameters) and `cost` (points,) are overwritten with where they end.
 
     Parameters
     ----------
@@ -298,13 +298,23 @@ def settle(
     count = covariance.shape[1]
     noise, step, tried = np.zeros(4), np.empty(count), np.empty(count)
     noise[3] = spread
-    sums = np.empty(bend.shape[1]), np.empty(bend.shape[1])
+    sums = np.empty(sensor_log_gain.shape[1]), np.empty(sensor_log_gain.shape[1])
     for point in range(len(cost)):
         if not np.isfinite(cost[point]):
             continue
         here = covariance[point]
-        of_point = level[point], uu[point], uy[point], yy, place[point], sensor, bend[point], laplacian, square
-        known = about_means, numbers, placed, plateaus
+        of_point = (
+            level[point],
+            uu[point],
+            uy[point],
+            yy,
+            place[point],
+            sensor,
+            sensor_log_gain[point],
+            laplacian,
+            square,
+        )
+        known = about_means, numbers, has_position_scatter, plateaus
         best = begun = _cost(here, noise, of_point, sums, known)
         for _ in range(steps):
             _newton_step(here, lowest, highest, held, noise, of_point, sums, known, step)
@@ -338,7 +348,7 @@ def _scatter(
     uy: Floats,
     place: Floats,
     sensor: NDArray[np.int64],
-    bend: Floats,
+    sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     levels: Floats,
@@ -347,7 +357,7 @@ def _scatter(
     """What each recording's scatter makes of it: `terms` (recordings, 8), with V = s'² a² + p² |t|²."""
     gain2, k2, p2, _ = levels
     for r in range(len(level)):
-        own = bend[sensor[r]]
+        own = sensor_log_gain[sensor[r]]
         factor = np.exp(own + 0.5 * p2 * laplacian[r])
         a = level[r] * factor
         known = a * (1 - own)
@@ -459,7 +469,7 @@ def _of_place(
     level: Floats,
     level_slopes: Floats,
     place: Floats,
-    growth: Floats,
+    log_slope_gradient: Floats,
     uv: Floats,
     vy: Floats,
     inverse: float,
@@ -478,7 +488,7 @@ def _of_place(
         taken = of[_UU] * of[_REDUCED] - shrink * um * um  # uᵀ C⁻¹ u
         led = _FROM_SLOPES**2 * place[r] > level[r] ** 2
         for p in range(len(slope)):
-            grows = growth[r, p] if growth.shape[1] else np.nan
+            grows = log_slope_gradient[r, p] if log_slope_gradient.shape[1] else np.nan
             if np.isnan(grows):
                 grows = 0.0 if led else 2 * level_slopes[r, p] / level[r]
             by_growth = 0.5 * (explained * explained - taken) * grows
@@ -504,9 +514,9 @@ def normal_equations(
     vy: Floats,
     vv: Floats,
     place: Floats,
-    growth: Floats,
+    log_slope_gradient: Floats,
     sensor: NDArray[np.int64],
-    bend: Floats,
+    sensor_log_gain: Floats,
     laplacian: Floats,
     square: Floats,
     noise: Floats,
@@ -531,7 +541,7 @@ def normal_equations(
         (points, 4): gain, level, position and spread.
     """
     points, recordings = level.shape
-    sensors, count = bend.shape[1], gradient.shape[1]
+    sensors, count = sensor_log_gain.shape[1], gradient.shape[1]
     terms = np.empty((recordings, _TERMS))
     uj, jr, mj = np.empty((recordings, count)), np.empty((recordings, count)), np.empty((recordings, count))
     of_sensors = np.empty((sensors, 4))
@@ -539,7 +549,18 @@ def normal_equations(
     for point in range(points):
         levels = noise[min(point, len(noise) - 1)] ** 2
         at = min(point, len(place) - 1)
-        _scatter(level[point], uu[point], uy[point], place[at], sensor, bend[point], laplacian, square, levels, terms)
+        _scatter(
+            level[point],
+            uu[point],
+            uy[point],
+            place[at],
+            sensor,
+            sensor_log_gain[point],
+            laplacian,
+            square,
+            levels,
+            terms,
+        )
         _along(level_slopes[point], uv[point], vy[point], 1 / levels[1], terms, uj, jr)
         _over_sensors(sensor, levels[3], terms, uj, mj, of_sensors, by_sensor[0])
         whole, slope = information[point], gradient[point]
@@ -558,7 +579,7 @@ def normal_equations(
                 level[point],
                 level_slopes[point],
                 place[point],
-                growth[point],
+                log_slope_gradient[point],
                 uv[point],
                 vy[point],
                 1 / levels[1],

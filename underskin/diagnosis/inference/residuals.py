@@ -22,7 +22,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import qmc
 
-from underskin.diagnosis.inference.evidence import Normals, around_levels, around_mean, over_spread, together
+from underskin.diagnosis.inference.evidence import (
+    Normals,
+    around_levels,
+    around_mean,
+    marginalise_sensor_spread,
+    together,
+)
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
 from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, own_places
@@ -77,9 +83,9 @@ def residuals(problem: FittingProblem, explanation: Explanation, gain: float, po
     size = np.add.reduceat(precision * np.abs(prediction) ** 2, lines.first)
     along = np.add.reduceat(precision * (prediction.conj() * lines.value).real, lines.first)
     relative = explanation.best.relative_place_slopes
-    placed = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
+    has_position_scatter = position**2 * (relative**2).sum(axis=0) + 0.5 * position**4 * problem.curvature.square
     line, weight = line_residuals(problem, explanation)
-    return Residuals(along / size - 1, np.sqrt(gain**2 + placed + 1 / size), line, weight)
+    return Residuals(along / size - 1, np.sqrt(gain**2 + has_position_scatter + 1 / size), line, weight)
 
 
 _FLAT = 1e-3  # of a parameter's bounds: deviations of the least prior, for those that change nothing
@@ -106,7 +112,7 @@ def information(explanation: Explanation, rows: Floats, noise: Explanation | Non
     levels = fitter.levels(at.points.covariance[:, None])
     assert isinstance(at.products, CurveProducts)
     along, square = at.products.of_rows(rows, levels)
-    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.bend)
+    likelihood = Likelihoods(fitter.lines, fitter.curvature, at.products, levels, at.points.sensor_log_gain)
     level2 = float(levels.level.flat[0]) ** 2
     return np.asarray(likelihood.information(along[None] / level2, square[None] / level2)[0])
 
@@ -137,7 +143,7 @@ def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, pa
     if not known[name].moves_predictions:
         return None
     try:
-        hypothesis = problem.hypothesis(names, best.hypothesis.placed)
+        hypothesis = problem.hypothesis(names, best.hypothesis.has_position_scatter)
     except (Unsupported, InvalidInput):
         return None
     places = own_places(names, hypothesis.lines)
@@ -162,7 +168,7 @@ def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, pa
     gained = whole - without
     shares = np.exp(np.minimum(gained, gained - gained.max() + _MOST)) / len(fit)
     place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
-    spread = over_spread(held, at, place)
+    spread = marginalise_sensor_spread(held, at, place)
     if spread is not None:
         return together([normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)])
     index = int(np.searchsorted(np.flatnonzero(held.free[0]), place))
@@ -183,8 +189,10 @@ def _evenly(parameters: int) -> Floats:
 def _fitted(held: Fitter, fit: Floats, explanation: Explanation) -> Evaluated:
     """The places that count, with all that is not held fitted."""
     point, cost = explanation.point, explanation.best.cost
-    covariance, bend = (np.tile(values, (len(fit), 1)) for values in (point.covariance, point.bend))
-    begun = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, bend))
+    covariance, sensor_log_gain = (
+        np.tile(values, (len(fit), 1)) for values in (point.covariance, point.sensor_log_gain)
+    )
+    begun = held.evaluate(Points(np.zeros(len(fit), dtype=np.intp), fit, covariance, sensor_log_gain))
     fitted = held.descend(begun, 1, lambda at: np.full(len(at), cost + _COUNTS))
     return fitted[np.flatnonzero(fitted.cost < cost + _COUNTS)]
 

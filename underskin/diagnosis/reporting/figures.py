@@ -37,7 +37,7 @@ from underskin.diagnosis.reporting.recording_figures import (
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.findings.formatting import in_percent
 from underskin.inversion.many_sensors import MOST_NAMED, many_sensors
-from underskin.mechanisms.unnamed.laws import in_plain_words
+from underskin.mechanisms.unlisted.laws import in_plain_words
 from underskin.recordings.campaign import Campaign
 from underskin.units import Floats, readable_unit
 
@@ -56,7 +56,7 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
     nothing = next(entry for entry in diagnosis.search.explanations if not entry.names)
-    shown = diagnosis.search.shown_or_nothing(diagnosis.search.answers[0])
+    shown = diagnosis.search.fit_behind(diagnosis.search.answers[0])
     thinned = Thinned(diagnosis, diagnosis.problem, shown)
     before, after = thinned.points(nothing), thinned.points(shown)
     drawn = {

@@ -16,15 +16,15 @@ from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, at_bounds, parameter, place_of, rounded, with_hidden
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.other_kinds import OfCurves, hidden_factors, may_hide
-from underskin.diagnosis.selection.search import Joined
+from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.cross_validation import NOISY
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.base import Kind, Mechanism
-from underskin.mechanisms.unnamed.expressions import CurveLaw
-from underskin.mechanisms.unnamed.laws import UnnamedLaw, in_plain_words
+from underskin.mechanisms.unlisted.expressions import CurveLaw
+from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
 
 _FACTOR = "modulus_factor"  # of modulus_error
 
@@ -111,9 +111,9 @@ def fit_summary(
 def _plainly(problem: FittingProblem, name: str) -> str:
     """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
     law = problem.lines.mechanisms[name]
-    if not isinstance(law, UnnamedLaw):
+    if not isinstance(law, UnlistedLaw):
         return name
-    return f"unnamed: {law.spoken.acts_on} over {law.spoken.axis}, {law.spoken.form}"
+    return f"unnamed: {law.description.acts_on} over {law.description.axis}, {law.description.form}"
 
 
 def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[str, float | None]:
@@ -237,14 +237,14 @@ def _of_unknown_thickness(problem: FittingProblem, explanation: Explanation) -> 
 
 
 def _of_depth(mechanism: Mechanism) -> bool:
-    return isinstance(mechanism, CurveLaw) and mechanism.spoken.axis in ("displacement_mm", "force_n")
+    return isinstance(mechanism, CurveLaw) and mechanism.description.axis in ("displacement_mm", "force_n")
 
 
 _CALLED: Mapping[Kind, str] = {"frf": "the FRFs", "indentation": "the indentations", "compression": "the block"}
 _MODULUS_ERROR = "modulus_error"
 
 
-def by_kind(joined: Joined, leading: Sequence[str]) -> list[dict[str, Any]]:
+def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any]]:
     """E by each kind alone, and from curves the parameters of their mechanisms under the leading set, or under what the
     curves alone find where the kinds contradict each other; empty where there is one kind."""
     if joined.beside is None or joined.apart is None:
@@ -270,12 +270,12 @@ def _entry(stated: Mapping[str, Any]) -> dict[str, Any]:
     return {"parameter": stated["name"], **{key: stated[key] for key in ("unit", "value", "low", "high")}}
 
 
-def _modulus_alone(joined: Joined) -> dict[str, Any] | None:
+def _modulus_alone(joined: KindsTogether) -> dict[str, Any] | None:
     """E as the recordings of the first kind alone have it; None where they do not ask for another than is declared."""
     assert joined.apart is not None
     declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
     leader = joined.apart.answers[0]
-    explanation = joined.apart.shown_or_nothing(leader)
+    explanation = joined.apart.fit_behind(leader)
     kind = {"kind": joined.problem.kind}
     if declared is None:
         return {**kind, **_entry(parameter(explanation, place_of(explanation, "youngs_modulus")))}
@@ -287,7 +287,7 @@ def _modulus_alone(joined: Joined) -> dict[str, Any] | None:
     return {**kind, "parameter": "youngs_modulus", "unit": "MPa", **ends}
 
 
-def moduli_clause(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
+def moduli_clause(joined: KindsTogether, told: Sequence[Mapping[str, Any]]) -> str:
     """E by kind; empty where there is one kind."""
     moduli = [entry for entry in told if entry["parameter"] == "youngs_modulus"]
     if not moduli:
@@ -300,7 +300,7 @@ def moduli_clause(joined: Joined, told: Sequence[Mapping[str, Any]]) -> str:
     return f"{each}, declared {declared:g}" if declared is not None else each
 
 
-def contradictions(joined: Joined) -> list[dict[str, Any]]:
+def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
     """That the kinds are not of one material, where this is more probable than that they are."""
     if joined.beside is None or not joined.apart_is_likelier:
         return []
@@ -313,7 +313,7 @@ def contradictions(joined: Joined) -> list[dict[str, Any]]:
     return [{"parameter": "youngs_modulus", "kinds": kinds, "statement": said}]
 
 
-def of_curves_alone(joined: Joined, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
+def of_curves_alone(joined: KindsTogether, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
     """Name, parameters and share of the misfit of mechanisms that act on the curves beside alone."""
     entries = []
     for kind in () if joined.beside is None else joined.beside.kinds:

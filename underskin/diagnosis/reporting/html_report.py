@@ -21,7 +21,7 @@ from underskin.diagnosis.reporting.law_statement import first_and_rest, lacking_
 from underskin.diagnosis.reporting.page_styles import SCHEME
 from underskin.findings.formatting import in_percent
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.vocabulary import acted_on, followed
+from underskin.mechanisms.unlisted.vocabulary import acted_on, followed
 from underskin.prediction.columns import to_spreadsheet
 
 _LIST = """

@@ -9,7 +9,7 @@ The statement of a report: what decides, what is missing, what that means, and w
 
 Which physics usually does such a thing: hints, by where an unnamed law enters and what it follows.
 
-The same table stands in docs/unnamed.md.
+The same table stands in docs/unlisted.md.
 
 Findings that decide how far the statement of a report can be trusted, as clauses of that statement. A law that nobody
 listed in plain words: what it changes, by how much, what it is worth, what usually does it.
@@ -25,7 +25,7 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, SIMPLEST, in_words
 from underskin.diagnosis.reporting.numbers import SDS_OF_95
-from underskin.diagnosis.reporting.unnamed_law import SHOWN_AS_HOURS, LeadingLaw
+from underskin.diagnosis.reporting.unlisted_law import SHOWN_AS_HOURS, LeadingLaw
 from underskin.diagnosis.selection.answers import Answer
 from underskin.diagnosis.validation.signatures import Power
 from underskin.findings.codes import FindingCode
@@ -34,10 +34,10 @@ from underskin.findings.formatting import in_digits, in_percent
 from underskin.findings.lacking import Lack, Lacking
 from underskin.mechanisms.base import Kind, Mechanism, Stage
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.expressions import TURN, CurveLaw
-from underskin.mechanisms.unnamed.grammar import FrequencyLaw
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
-from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, acted_on, followed
+from underskin.mechanisms.unlisted.expressions import TURN, CurveLaw
+from underskin.mechanisms.unlisted.grammar import FrequencyLaw
+from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
+from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.recordings.readers.calendar_times import time_zone
 
 _END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # of a sentence within a clause
@@ -91,7 +91,7 @@ _STATED = 3  # mechanisms whose strengths are told
 
 
 @dataclass(frozen=True)
-class Around:
+class StatementContext:
     """What a statement says beside the answer itself.
 
     `slips` and `contradictions` are clauses on what decides how far any answer can be trusted, `reserves` on what this
@@ -110,7 +110,7 @@ class Around:
 
 
 @dataclass(frozen=True)
-class OfAnswer:
+class AnswerFacts:
     """What is known of the leading answer beside its probability.
 
     `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
@@ -125,7 +125,7 @@ class OfAnswer:
     told: Sequence[str] = ()
 
 
-_NOTHING_AROUND, _NOTHING_KNOWN = Around(), OfAnswer()
+_NOTHING_AROUND, _NOTHING_KNOWN = StatementContext(), AnswerFacts()
 
 
 def answer_statement(
@@ -133,8 +133,8 @@ def answer_statement(
     verdict: str,
     kind: Kind = "frf",
     fit: Mapping[str, Any] | None = None,
-    around: Around = _NOTHING_AROUND,
-    of_answer: OfAnswer = _NOTHING_KNOWN,
+    around: StatementContext = _NOTHING_AROUND,
+    of_answer: AnswerFacts = _NOTHING_KNOWN,
     shape: str = "",
     power: Sequence[Power] = (),
 ) -> str:
@@ -161,7 +161,7 @@ def answer_statement(
 
 
 def _answer(
-    answers: Sequence[Answer], verdict: str, model: str, of_answer: OfAnswer, *, all_used: bool
+    answers: Sequence[Answer], verdict: str, model: str, of_answer: AnswerFacts, *, all_used: bool
 ) -> tuple[str, ...]:
     """The verdict as a clause, and further ones on what it means."""
     leader = answers[0]
@@ -207,7 +207,7 @@ def _answer(
     )
 
 
-def _lacking(leader: Answer, of_answer: OfAnswer) -> tuple[str, bool]:
+def _lacking(leader: Answer, of_answer: AnswerFacts) -> tuple[str, bool]:
     """The mechanisms of the leading set with their probability, and whether that is each mechanism's own.
 
     It is where a mechanism is in other sets too, or these have its twin in its place.
@@ -506,7 +506,7 @@ def statement(
     leading: LeadingLaw,
     document: Mapping[str, Any],
     floor: float,
-    around: Around,
+    around: StatementContext,
     left: str,
     *,
     outweighed: bool,
@@ -517,7 +517,7 @@ def statement(
     `left` says how far the base model goes on curves; the law may be `outweighed` by a course of no form.
     """
     law = leading.law
-    acts_on = law.spoken.acts_on
+    acts_on = law.description.acts_on
     beside = tuple(name for name in leading.explanation.names if name != law.name)
     known = f" beside {_listed(beside)}" if beside else ""
     held = document["heldout_rmse_percent"]
@@ -552,19 +552,19 @@ def _hinted(leading: LeadingLaw) -> str:
     law = leading.law
     if isinstance(law, CurveLaw) and law.shape.variant == TURN:
         return TURNED
-    return CONSTANT_PHASE if leading.is_constant_phase else law.spoken.axis
+    return CONSTANT_PHASE if leading.is_constant_phase else law.description.axis
 
 
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(name.replace("_", " ") for name in names)
 
 
-def _altered(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
+def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
     """That a power law is one that is known with another exponent."""
-    if law.spoken.form != "power":
+    if law.description.form != "power":
         return []
     stated = {entry["name"]: entry for entry in document["parameters"]}
-    if isinstance(law, RecordingLaw) and law.spoken.acts_on == "contact_radius" and law.axis.name in _HERTZ:
+    if isinstance(law, RecordingLaw) and law.description.acts_on == "contact_radius" and law.axis.name in _HERTZ:
         value, low, high = (1 / 3 + stated["change"][name] for name in ("value", "low", "high"))
         power = f"{value:.2f} ({low:.2f} to {high:.2f}) in place of 1/3"
         grows = f"the contact radius grows with {followed(law.axis.name)} to the power {power}"
@@ -576,7 +576,7 @@ def _altered(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
     return []
 
 
-def _order(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
+def _order(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
     """That lines fall off towards low frequencies as behind a high pass, of what order."""
     if not (isinstance(law, FrequencyLaw) and law.variant == "high_pass"):
         return []
@@ -587,13 +587,13 @@ def _order(law: UnnamedLaw, document: Mapping[str, Any]) -> list[str]:
     return [f"this is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}), where an amplifier's is of order 1"]
 
 
-def _held_out(law: UnnamedLaw) -> str:
+def _held_out(law: UnlistedLaw) -> str:
     return "samples" if isinstance(law, CurveLaw) else "recordings"
 
 
 def _does(leading: LeadingLaw) -> str:
     law = leading.law
-    acts_on = law.spoken.acts_on
+    acts_on = law.description.acts_on
     of_curves = {
         "position": "moves the surface along the travel",
         "gain": "changes the gain of the cell",
@@ -618,10 +618,10 @@ def _follows(leading: LeadingLaw) -> str:
 
 
 def _axis_words(leading: LeadingLaw) -> str:
-    words = followed(leading.law.spoken.axis)
+    words = followed(leading.law.description.axis)
     if leading.axis is not None and leading.axis.relative:
         return f"{words} over its own"
-    if leading.law.spoken.axis in SHOWN_AS_HOURS:
+    if leading.law.description.axis in SHOWN_AS_HOURS:
         return f"{words} ({time_zone()})"
     return words
 
@@ -632,8 +632,8 @@ def _size(leading: LeadingLaw) -> str:
     law = leading.law
     where = f" {place}" if (place := _where(leading, at)) else ""
     half = SDS_OF_95 * deviation
-    if law.spoken.acts_on in ("force", "position"):
-        unit = "N" if law.spoken.acts_on == "force" else "mm"
+    if law.description.acts_on in ("force", "position"):
+        unit = "N" if law.description.acts_on == "force" else "mm"
         return f"{size:+.3g} {unit} ({size - half:+.3g} to {size + half:+.3g}){where}"
     if isinstance(law, LagLaw) and law.kind == "corner":
         hz = [law.lowest_hz * (size + way * half) for way in (0, -1, 1)]

@@ -26,7 +26,13 @@ from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from underskin.diagnosis.data.names import EXPLAINED
-from underskin.diagnosis.inference.evidence import Normals, levels_covariance, over_spread, profile_end, together
+from underskin.diagnosis.inference.evidence import (
+    Normals,
+    levels_covariance,
+    marginalise_sensor_spread,
+    profile_end,
+    together,
+)
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.residuals import declared_d33, residuals, whole_prediction, with_unseen
@@ -36,7 +42,7 @@ from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits
 from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.unnamed.laws import UnnamedLaw, in_plain_words
+from underskin.mechanisms.unlisted.laws import UnlistedLaw, in_plain_words
 from underskin.units import Floats, Indices
 
 SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard deviations
@@ -217,11 +223,13 @@ def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
     """Logarithms of the factors (levels,) by which d33 may be another, equally probable; 0 alone where no law is a
     factor."""
     known, names = problem.lines.mechanisms, explanation.names
-    laws = [law for name in names if isinstance(law := known[name], UnnamedLaw) and law.spoken.acts_on in _FACTORS]
+    laws = [
+        law for name in names if isinstance(law := known[name], UnlistedLaw) and law.description.acts_on in _FACTORS
+    ]
     if not laws:
         return np.zeros(1)
     left = tuple(name for name in names if all(name != law.name for law in laws))
-    with_law, without = (problem.hypothesis(each, placed=False, whole=True) for each in (names, left))
+    with_law, without = (problem.hypothesis(each, has_position_scatter=False, whole=True) for each in (names, left))
     fit = np.zeros(len(without.model.parameters))
     for name, place in own_places(left, without.lines).items():
         fit[place] = explanation.own(name)
@@ -269,7 +277,7 @@ def present(search: Search, problem: FittingProblem) -> dict[str, float]:
             for name in answer.names:
                 found[name] = found.get(name, 0.0) + answer.probability
             continue
-        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.shows(entry)]
+        laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.is_supported(entry)]
         beside = [*laws, *search.processes_showing]
         total = np.logaddexp.reduce([weight for _, weight in beside]) if beside else 0.0
         for entry, weight in beside:
@@ -350,7 +358,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     show; the shares sum to 1."""
     place = place_of(explanation, "d33")
     best = explanation.best
-    spread = over_spread(best.fitter, best.at, place)
+    spread = marginalise_sensor_spread(best.fitter, best.at, place)
     if spread is None:
         index = best.hypothesis.mean_places.index(place)
         deviation = np.sqrt(best.covariance[index, index])
@@ -380,7 +388,7 @@ def _stand_on(search: Search, answer: Answer) -> list[tuple[float, Explanation]]
     show, as they may have the same course and differ by what is d33."""
     if answer.explanation is not None:
         return [(answer.probability, answer.explanation)]
-    laws = [entry for entry in search.laws if search.shows(entry)]
+    laws = [entry for entry in search.laws if search.is_supported(entry)]
     weights = np.array([search.log_weight(entry) for entry in laws])
     shares = np.exp(weights - np.logaddexp.reduce(weights)) if laws else weights
     return [(answer.probability * float(share), entry) for share, entry in zip(shares, laws, strict=True)]
@@ -457,7 +465,7 @@ def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> f
     """Since the law has no parameter, the models with and without it have the same."""
     without = tuple(one for one in shown.names if one != name)
     order = [one for one in problem.lines.mechanisms if one in {*without, name}]
-    models = [problem.hypothesis(names, placed=False).model for names in (without, tuple(order))]
+    models = [problem.hypothesis(names, has_position_scatter=False).model for names in (without, tuple(order))]
     before, after = (model.predict(shown.point.fit).value for model in models)
     change, size = (float(np.linalg.norm(of)) for of in (after - before, before))
     return 100 * change / max(size, 1e-300)

@@ -18,8 +18,8 @@ from underskin.diagnosis.reporting import goodness_of_fit, numbers, statements
 from underskin.diagnosis.reporting import statements as next_experiment
 from underskin.diagnosis.reporting.goodness_of_fit import explains_percent, fit_summary, fit_warnings
 from underskin.diagnosis.reporting.law_statement import (
-    Around,
-    OfAnswer,
+    AnswerFacts,
+    StatementContext,
     answer_statement,
     insufficient_statement,
     left_by,
@@ -37,10 +37,10 @@ from underskin.diagnosis.reporting.numbers import (
     without_effect,
 )
 from underskin.diagnosis.reporting.statements import BY_NUISANCES, StatedD33, stated_d33
-from underskin.diagnosis.reporting.unnamed_law import LeadingLaw, confirming, outweighed, unnamed
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, outweighed, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import least_evidence
-from underskin.diagnosis.selection.search import Joined
+from underskin.diagnosis.selection.search import KindsTogether
 from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Power
 from underskin.findings.codes import FindingCode
@@ -80,7 +80,7 @@ class DiagnosisResult:
     shape: Shape | None = None  # of what remains, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
-    joined: Joined | None = None  # with recordings of other kinds
+    joined: KindsTogether | None = None  # with recordings of other kinds
 
     def with_findings(self, *further: Finding) -> "DiagnosisResult":
         """The same with further findings behind the others."""
@@ -92,7 +92,7 @@ class DiagnosisResult:
         planned = next_experiment.next_experiment(self.plan)
         if planned or self.search is None or self.problem is None or verdict(self) != "unexplained":
             return planned
-        leading = LeadingLaw.of(self.problem, self.search.shown_or_nothing(self.search.answers[0]))
+        leading = LeadingLaw.of(self.problem, self.search.fit_behind(self.search.answers[0]))
         return {} if leading is None else confirming(self.problem, leading)
 
 
@@ -180,7 +180,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         return Reported(nothing, StatedD33(None, why_not=["its recordings say too little"]))
     search, problem = diagnosis.search, diagnosis.problem
     leader = search.answers[0]
-    shown = search.shown_or_nothing(leader)
+    shown = search.fit_behind(leader)
     fit = fit_summary(search, problem, diagnosis.groups, shown)
     named = leader.explanation if stated in ("explained", "ambiguous") else None
     leading = LeadingLaw.of(problem, shown) if stated == "unexplained" else None
@@ -213,7 +213,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
     of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, told_by_kind)
     untried = _not_tried(stated, search, problem, findings)
-    around = Around(
+    around = StatementContext(
         slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
         contradictions=[entry["statement"] for entry in contradictory],
         reserves=[*reserves(findings), *untried],
@@ -231,7 +231,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         ahead = outweighed(search)
         statement = law_statement(leader.probability, leading, law, floor, around, left, outweighed=ahead)
     else:
-        of_answer = OfAnswer(
+        of_answer = AnswerFacts(
             groups=present,
             idle=_idle(diagnosis, named) if named is not None else (),
             at_bounds=[one.words for one in at_bounds(named)] if named is not None else (),

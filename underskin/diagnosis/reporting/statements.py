@@ -25,7 +25,7 @@ from underskin.diagnosis.localisation import (
 )
 from underskin.diagnosis.planning.optimal_design import WRONG_MODULUS, NextRecordings
 from underskin.diagnosis.reporting import numbers
-from underskin.diagnosis.reporting.unnamed_law import LeadingLaw
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.validation.cross_validation import REACHES_NOISE
 from underskin.diagnosis.validation.signatures import Confounding, HiddenShift, Likeness
@@ -427,7 +427,7 @@ def stated_d33(
 def _acts_outside_band(law: LeadingLaw) -> bool:
     """Whether an unlisted law leaves the size of the response as it is over most of the band: a peak, a notch, and a
     turn of the phase over frequency."""
-    return law.law.spoken.axis == "frequency_hz" and (law.is_phase or law.law.spoken.form == "peak")
+    return law.law.description.axis == "frequency_hz" and (law.is_phase or law.law.description.form == "peak")
 
 
 def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:

@@ -12,8 +12,8 @@ from underskin.diagnosis.reporting.figure_data import AXES
 from underskin.diagnosis.reporting.law_statement import capital
 from underskin.diagnosis.reporting.page_styles import FIELD_OF, with_minus, without_powers
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.vocabulary import AXES as FOLLOWED
-from underskin.mechanisms.unnamed.vocabulary import followed
+from underskin.mechanisms.unlisted.vocabulary import AXES as FOLLOWED
+from underskin.mechanisms.unlisted.vocabulary import followed
 from underskin.units import readable_unit
 
 _FINDINGS = {
@@ -88,11 +88,11 @@ def law_range(name: str, ends: Sequence[Any]) -> str:
     """Where such a law was measured: "the preload 0.2 to 3 N", or the words that a column has."""
     field = name.removesuffix("_over_own")
     unit = _UNITS.get(field.rpartition("_")[2], "")
-    spoken = followed(field if field in FOLLOWED else field.removesuffix("_h"))
+    description = followed(field if field in FOLLOWED else field.removesuffix("_h"))
     if all(isinstance(end, str) for end in ends):
-        return f"{spoken}: {', '.join(ends)}"
+        return f"{description}: {', '.join(ends)}"
     of_own = ", over its own range" if field != name else ""
-    return f"{spoken} {' to '.join(map(number, ends))} {unit}".rstrip() + of_own
+    return f"{description} {' to '.join(map(number, ends))} {unit}".rstrip() + of_own
 
 
 def group(name: str) -> str:

@@ -36,7 +36,7 @@ from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.composed import compose
-from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, SkinDescription
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, Indices

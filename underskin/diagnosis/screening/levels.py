@@ -37,7 +37,7 @@ from underskin.mechanisms.models.composed import compose
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.parameter import Normal
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.axes import axes_of, recording_order
+from underskin.mechanisms.unlisted.axes import axes_of, recording_order
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording
 from underskin.recordings.frf.estimation import advanced, common_delay, lines_of
 from underskin.recordings.frf.spectra import stacked

@@ -12,7 +12,7 @@ from underskin.diagnosis.screening.levels import aligned_lines
 from underskin.diagnosis.screening.no_response import no_response
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 
 _FEWEST = 2  # silent recordings of each of them

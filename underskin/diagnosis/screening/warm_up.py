@@ -13,7 +13,7 @@ import numpy as np
 from underskin.diagnosis.screening.levels import Cause, Levels, explained, smooth_along
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
-from underskin.mechanisms.unnamed.axes import recording_order
+from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats
 

@@ -33,7 +33,7 @@ from underskin.diagnosis.data.names import NONE_OF_THESE, NOTHING_MISSING
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.selection.gaussian_processes import Discrepancy
-from underskin.diagnosis.selection.other_kinds import Beside
+from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.priors import (
     declared_laws,
     guesses,
@@ -42,7 +42,7 @@ from underskin.diagnosis.selection.priors import (
     log_prior_of,
     must_gain,
 )
-from underskin.mechanisms.unnamed.laws import UnnamedLaw
+from underskin.mechanisms.unlisted.laws import UnlistedLaw
 from underskin.units import Floats
 
 _BEHIND = 1e-6  # of an equal: the leader stays the leader
@@ -83,8 +83,8 @@ def _leader(explanations: Sequence[Explanation], weights: Floats, sizes: Sequenc
 
 
 _OF_LAWS = 0.7  # of "none of these": laws of one form over one axis; the rest are processes of any course
-_IDEALISED = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
-UNTHOUGHT = 0.015  # probability that none of what was compared is right
+_CONTRADICTED_CURVE_FACTOR = 0.05  # of the probability of a set of mechanisms that leaves structure in a curve
+P_NOT_IN_MODEL_SPACE = 0.015  # probability that none of what was compared is right
 _EQUAL = 0.01  # nats, within which laws are equally probable
 
 
@@ -135,7 +135,7 @@ class Search:
     imitating: Mapping[tuple[str, ...], float] = field(default_factory=dict)
     laws: tuple[Explanation, ...] = ()  # sets with one law that nobody listed
     tried: int = 0  # sets, of which the explanations are those that were not left out early
-    beside: Beside | None = None  # curves of other kinds
+    beside: CurveLikelihood | None = None  # curves of other kinds
 
     @property
     def supported(self) -> int:
@@ -174,13 +174,13 @@ class Search:
         if not laws:
             return log_prior_of(explanation, self.supported)
         prior = log_prior_beneath_of(explanation, self.supported, laws=1)
-        return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnnamedLaw))
+        return prior + math.log(_OF_LAWS) + sum(law.log_share for law in laws if isinstance(law, UnlistedLaw))
 
     def log_prior_beneath(self, explanation: Explanation) -> float:
         """The logarithm of the prior of a law that nobody listed on top of a set."""
         return log_prior_beneath_of(explanation, self.supported) + math.log(_OF_LAWS)
 
-    def shows(self, explanation: Explanation) -> bool:
+    def is_supported(self, explanation: Explanation) -> bool:
         """Whether each mechanism of a set shows: without it, evidence is lost. A set that holds one that does not says
         no more than the smaller one, which stands for both."""
         evidence = {frozenset(entry.names): entry.log_evidence for entry in (*self.explanations, *self.laws)}
@@ -190,14 +190,14 @@ class Search:
             for name in whole
         )
 
-    def shown_or_nothing(self, answer: Answer) -> Explanation:
+    def fit_behind(self, answer: Answer) -> Explanation:
         """The explanation that an answer stands on: for `none_of_these` the best law that nobody listed, or else the
         one beneath its best process."""
         if answer.explanation is not None:
             return answer.explanation
         if self.law is not None:
             return self.law
-        beneath = [pair for pair in self.discrepancies if self.shows(pair[0])]
+        beneath = [pair for pair in self.discrepancies if self.is_supported(pair[0])]
         return max(beneath, key=lambda pair: self._log_weight_beneath(*pair))[0]
 
     def _log_weight_beneath(self, explanation: Explanation, process: Discrepancy) -> float:
@@ -219,7 +219,7 @@ class Search:
 
         Of equals that over the order of the recordings, which times and load cycles follow.
         """
-        showing = [entry for entry in self.laws if self.shows(entry)]
+        showing = [entry for entry in self.laws if self.is_supported(entry)]
         best = max(map(self.log_weight, showing), default=0.0)
         equal = [entry for entry in showing if self.log_weight(entry) > best - _EQUAL]
         return max(equal, key=lambda entry: (self._follows_order(entry), self.log_weight(entry)), default=None)
@@ -228,7 +228,7 @@ class Search:
     def _follows_order(explanation: Explanation) -> bool:
         known = explanation.best.hypothesis.lines.mechanisms
         laws = [known[name] for name in explanation.names]
-        return any(isinstance(law, UnnamedLaw) and law.spoken.axis == "order" for law in laws)
+        return any(isinstance(law, UnlistedLaw) and law.description.axis == "order" for law in laws)
 
     @cached_property
     def answers(self) -> list[Answer]:
@@ -240,18 +240,18 @@ class Search:
         `none_of_these` is always one of them, with its evidence where a process shows, and at least with the share that
         stays for what neither laws nor processes here can be.
         """
-        kept = [entry for entry in self.explanations if self.shows(entry)]
+        kept = [entry for entry in self.explanations if self.is_supported(entry)]
         sizes = [guesses(entry) for entry in kept]
         weights = without_occam(kept, [self.log_weight(entry) for entry in kept], sizes).tolist()
         for entry, weight in self._possible_beside(kept, weights):
             kept.append(entry)
             weights.append(weight)
         showing = [weight for _, weight in self.processes_showing]
-        showing += [self.log_weight(entry) for entry in self.laws if self.shows(entry)]
+        showing += [self.log_weight(entry) for entry in self.laws if self.is_supported(entry)]
         weights.append(float(np.logaddexp.reduce(showing)) if showing else -math.inf)
-        probabilities = (1 - UNTHOUGHT) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
-        probabilities[-1] += UNTHOUGHT
-        left = [self._left_to(entry) for entry in kept]
+        probabilities = (1 - P_NOT_IN_MODEL_SPACE) * np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        probabilities[-1] += P_NOT_IN_MODEL_SPACE
+        left = [self._contradiction_factor(entry) for entry in kept]
         probabilities[-1] += ((1 - np.array(left)) * probabilities[:-1]).sum()
         probabilities = self._beside_unlisted(kept, probabilities * [*left, 1.0])
         rivals: list[Explanation | None] = [*kept, None]
@@ -263,7 +263,7 @@ class Search:
         return leading_first(sorted(answers, key=lambda answer: -answer.probability))
 
     @staticmethod
-    def _with_own_of_curves(answer: Answer, beside: Beside) -> list[Answer]:
+    def _with_own_of_curves(answer: Answer, beside: CurveLikelihood) -> list[Answer]:
         """An answer with each set of mechanisms that act on the curves alone."""
         if answer.explanation is None:
             return [answer]
@@ -273,7 +273,7 @@ class Search:
     @property
     def weighed(self) -> list[tuple[Explanation, float]]:
         """The sets that show, and those beneath the processes that show, with the logarithm of prior times evidence."""
-        showing = [(entry, self.log_weight(entry)) for entry in self.explanations if self.shows(entry)]
+        showing = [(entry, self.log_weight(entry)) for entry in self.explanations if self.is_supported(entry)]
         return [*showing, *self.processes_showing]
 
     @property
@@ -306,12 +306,12 @@ class Search:
             possible.append((entry, max(each)))
         return possible
 
-    def _left_to(self, explanation: Explanation) -> float:
+    def _contradiction_factor(self, explanation: Explanation) -> float:
         """The share that stays of a probability: all, unless the residual contradicts the explanation; of curves a
         little even then, since laws of contact idealise and fits may miss."""
         if explanation.names not in self.contradicted:
             return 1.0
-        return _IDEALISED if explanation.names and explanation.best.hypothesis.lines.curves else 0.0
+        return _CONTRADICTED_CURVE_FACTOR if explanation.names and explanation.best.hypothesis.lines.curves else 0.0
 
     def _beside_unlisted(self, kept: Sequence[Explanation], probabilities: Floats) -> Floats:
         """With at least the unlisted laws that the leading set imitates among `none_of_these`, the last: some of them
@@ -330,12 +330,12 @@ class Search:
 _STANDS = 0.2  # probability of all answers together by which a contact lies within
 
 
-def within_as_found(problem: FittingProblem, result: Search) -> frozenset[str]:
+def inside_tables_under_posterior(problem: FittingProblem, result: Search) -> frozenset[str]:
     """The ids of the recordings whose contacts lie within the tables by answers that stand."""
     entries = problem.lines.campaign.recordings
     within = np.zeros(len(entries))
     for answer in result.answers:
-        best = result.shown_or_nothing(answer).best
+        best = result.fit_behind(answer).best
         outside = np.unique(best.hypothesis.lines.recording[~best.prediction.inside])
         within[np.isin(np.arange(len(entries)), outside, invert=True)] += answer.probability
     return frozenset(entries[number].id for number in np.flatnonzero(within > _STANDS).tolist())

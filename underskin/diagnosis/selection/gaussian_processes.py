@@ -360,9 +360,9 @@ class GainResidual:
             size, ur, uu = best.marginal.along(position)
             size = self._not_faint(size)
             second_order = best.hypothesis.curvature.square
-            placed = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
+            has_position_scatter = position**2 * (self._moving**2).sum(axis=0) + 0.5 * position**4 * second_order
             log_weights = GAIN_PRIOR.log_density(np.log(_GAINS)) + np.log(share) - np.log(np.abs(size)).sum()
-            variances = _GAINS[:, None] ** 2 + placed + uu / size**2
+            variances = _GAINS[:, None] ** 2 + has_position_scatter + uu / size**2
             scatters.append(ScatterNodes(log_weights, ur / size - self._known, variances))
         return scatters
 
@@ -528,6 +528,9 @@ def _refitted(hypothesis: Hypothesis, explanation: Explanation, place: int, leas
 def _along_curves(problem: FittingProblem, explanation: Explanation) -> Discrepancy:
     """The smooth error that every hypothesis has of curves, large: everything is fitted again beneath it."""
     log_evidence = _refitted(
-        replace(problem.hypothesis(explanation.names, placed=False), smooth=UNNAMED), explanation, 2, UNNAMED.low
+        replace(problem.hypothesis(explanation.names, has_position_scatter=False), smooth=UNNAMED),
+        explanation,
+        2,
+        UNNAMED.low,
     )
     return Discrepancy(log_evidence, {"displacement_mm": log_evidence - explanation.log_evidence})

@@ -27,7 +27,7 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
 from underskin.diagnosis.inference.evidence import parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import Knowledge, own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import Gaussian, own_places, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
 from underskin.mechanisms.base import Kind, Unsupported, Values
 from underskin.mechanisms.laws.layered_contact import LayeredContact
@@ -35,7 +35,7 @@ from underskin.mechanisms.laws.thickness_error import ThicknessError
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.models.curve_state import Curve
 from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.registry import Known
+from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign, Conditions
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats, to_si
@@ -128,7 +128,7 @@ class OtherKind:
 
     def _supports(self, name: str) -> bool:
         try:
-            self.problem.hypothesis((name,), placed=False)
+            self.problem.hypothesis((name,), has_position_scatter=False)
         except Unsupported:
             return False
         return True
@@ -186,7 +186,9 @@ class OtherKind:
         return self._explanations[names]
 
 
-def may_hide(mechanisms: Known, conditions: Conditions, names: Iterable[str]) -> Mapping[str, Sequence[float]]:
+def may_hide(
+    mechanisms: ActiveCatalogue, conditions: Conditions, names: Iterable[str]
+) -> Mapping[str, Sequence[float]]:
     """Mechanisms that an apparent modulus may hide, with the logarithms of by how much it may be too large."""
     hidden = {name: mechanisms[name].hidden_in_modulus(conditions) for name in names}
     return {name: values for name, values in hidden.items() if values}
@@ -205,7 +207,7 @@ def hidden_factors(hiding: Mapping[str, Sequence[float]], shown: Collection[str]
 def of_curves(campaign: Campaign, kind: Kind, table: SigmaTable, without: Sequence[str]) -> FittingProblem:
     """The curves of one kind of a campaign, its modulus free and, of a layer, its thickness; mechanisms `without` which
     all is to be explained."""
-    mechanisms = Known({MODULUS_ERROR, *without})
+    mechanisms = ActiveCatalogue({MODULUS_ERROR, *without})
     free = replace(campaign, skin=replace(campaign.skin, youngs_modulus_mpa=None))
     mechanisms.bind(free, table, kind)
     mechanisms.replace(LayerOfUnknownThickness())
@@ -279,7 +281,7 @@ _LEAST_CORRELATION = 1e-11  # eigenvalue of correlations: less is rounding
 Moments = tuple[float, float, bool, float]
 
 
-class Beside:
+class CurveLikelihood:
     """What the curves of all other kinds tell of models of one kind."""
 
     def __init__(self, kinds: Sequence[OtherKind], alone: Sequence[Explanation]) -> None:
@@ -288,7 +290,7 @@ class Beside:
         self._alone = sorted(alone, key=lambda entry: -entry.log_evidence)
         self._of_both: dict[Kind, tuple[str, ...]] = {}
 
-    def __call__(self, model: Model, lines: Lines) -> Knowledge:
+    def __call__(self, model: Model, lines: Lines) -> Gaussian:
         """Of this model's parameters, in their fit coordinates."""
         self._bind(lines)
         each = [self._of_kind(kind, model, lines) for kind in self.kinds]
@@ -307,7 +309,7 @@ class Beside:
         """What curves of a kind say under the set that they alone find the most probable."""
         return self.told(kind, tuple(self._most_probable(kind)[0]))
 
-    def asked_for(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
+    def required_sets(self, lines: Lines, alone: Sequence[frozenset[str]]) -> list[frozenset[str]]:
         """Sets by which recordings of both kinds may be explained: what the curves find the most probable and nothing,
         each by itself or with an error of the modulus, and with the sets that explain the other recordings `alone`."""
         self._bind(lines)
@@ -350,7 +352,7 @@ class Beside:
             combined = [((*one, *other), share * more) for one, share in combined for other, more in own]
         return combined
 
-    def _of_kind(self, kind: OtherKind, model: Model, lines: Lines) -> Knowledge:
+    def _of_kind(self, kind: OtherKind, model: Model, lines: Lines) -> Gaussian:
         told = self.told(kind, model.names)
         matrix, offset, priors = _in_model(told, model, lines, self._begun(model.names, lines))
         return _likelihood(told, matrix, offset, priors)
@@ -434,14 +436,14 @@ def _moments(entry: Parameter, mean: float) -> Moments:
     return centre, 1 / precision, False, entry.log_prior(inside) - normal
 
 
-def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Knowledge:
+def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence[Moments]) -> Gaussian:
     """ln L(x), so that ∫ L(q) p(q) dq over the quantities' prior is the curves' evidence; normal."""
     centre, variance, flat, higher = (np.array(column) for column in zip(*priors, strict=True))
     flat = flat.astype(bool)
     widest = np.where(flat, variance * (2 * np.pi / 12), variance)  # between bounds: a uniform distribution's
     known = matrix.any(axis=1) & (np.diag(told.covariance) < _INFORMED**2 * widest)
     if not known.any():
-        return Knowledge(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
+        return Gaussian(np.zeros((matrix.shape[1],) * 2), np.zeros(matrix.shape[1]), told.log_weight)
     after = _inverse(told.covariance[np.ix_(known, known)])
     centre, variance, flat = centre[known], variance[known], flat[known]
     before = np.diag(np.where(flat, 0.0, 1 / variance))
@@ -458,7 +460,7 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     loose = np.eye(len(mean)) + precision @ batch
     height -= 0.5 * np.linalg.slogdet(loose)[1]
     tolerant: Floats = np.linalg.solve(loose, precision).astype(np.float64)
-    return Knowledge.of(matrix, offset, mean, tolerant, float(height))
+    return Gaussian.of(matrix, offset, mean, tolerant, float(height))
 
 
 def _inverse(covariance: Floats) -> Floats:

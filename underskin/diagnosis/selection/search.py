@@ -46,10 +46,10 @@ from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.gaussian_processes import discrepancy
-from underskin.diagnosis.selection.other_kinds import Beside, OtherKind, of_curves
+from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, of_curves
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
-from underskin.mechanisms.registry import Known
+from underskin.mechanisms.registry import ActiveCatalogue
 from underskin.recordings.campaign import Campaign
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Floats
@@ -65,7 +65,7 @@ def was_stuck(before: Explanation | None, found: Explanation) -> bool:
     return before is None or found.best.cost < before.best.cost - _STUCK
 
 
-def from_larger(
+def refitted_from_larger(
     problem: FittingProblem, explanations: Explanations, weight: Callable[[Explanation], float]
 ) -> Explanations:
     """The sets with one mechanism less than the best ones, or than those among them that fit better for it, which fit
@@ -93,11 +93,11 @@ _LEFT = 15.0  # nats of a smooth error: noise alone has 8 to 12, since the prior
 _ROUGHER = np.geomspace(1.0, 12.0, 12)  # times the level of the noise
 
 
-def afresh(problem: FittingProblem, explanations: Explanations, pairs: Sequence[Request]) -> Explanations:
+def refitted_from_prior(problem: FittingProblem, explanations: Explanations, pairs: Sequence[Request]) -> Explanations:
     """The pairs that fit better from starts over the parameters of both than from one of the two alone, where the best
     set leaves something for that to matter."""
     best = min(explanations.values(), key=lambda entry: entry.best.cost)
-    if left_smooth(best) < _LEFT:
+    if smooth_error_gain(best) < _LEFT:
         return {}
     known = problem.lines.mechanisms
     requests = [
@@ -111,7 +111,7 @@ def afresh(problem: FittingProblem, explanations: Explanations, pairs: Sequence[
     return better
 
 
-def left_smooth(explanation: Explanation) -> float:
+def smooth_error_gain(explanation: Explanation) -> float:
     """Nats that a smooth error brings an explanation of curves over the least one and rougher noise: what it leaves."""
     fitter = Fitter([explanation.best.hypothesis])
     at = fitter.evaluate(fitter.at(explanation.point), slopes=False)
@@ -132,23 +132,25 @@ _BEHIND = 12.0  # nats behind the best beyond which a single is no parent
 
 
 def search(
-    problem: FittingProblem, known: Sequence[Explanation] = (), asked_for: Sequence[frozenset[str]] = ()
+    problem: FittingProblem, known: Sequence[Explanation] = (), required_sets: Sequence[frozenset[str]] = ()
 ) -> Search:
-    """Fit nothing, every single, sets that other kinds of recordings have `asked_for`, then what grows from the best.
+    """Fit nothing, every single, the `required_sets` of other kinds of recordings, then what grows from the best.
 
     What is `known` of them is taken over.
     """
     explained = {frozenset(entry.names): entry for entry in known}
-    sets = _Sets(problem, explained, _unsupported(problem), asked_for)
+    sets = _Sets(problem, explained, _unsupported(problem), required_sets)
     catalogue = problem.lines.mechanisms.named
     nothing, singles = Request(()), [Request((name,)) for name in sets.names]
     if problem.lines.curves:  # whose contact points the null hypothesis finds once for all
         sets.explain([nothing])
         singles = [replace(request, begin=sets.explanations[frozenset()].point) for request in singles]
     sets.explain([nothing, *singles])
-    beside = [Request(tuple(name for name in catalogue if name in one), kept=True) for one in asked_for if len(one) > 1]
+    beside = [
+        Request(tuple(name for name in catalogue if name in one), kept=True) for one in required_sets if len(one) > 1
+    ]
     sets.explain(beside)
-    largest = LARGEST if asked_for else _LARGEST
+    largest = LARGEST if required_sets else _LARGEST
     sets.grow(largest)
     if sets.refit_smaller() and not problem.lines.curves:  # of which all pairs were fitted
         sets.grow(largest)
@@ -164,7 +166,7 @@ def _unsupported(problem: FittingProblem) -> dict[str, str]:
     unsupported: dict[str, str] = {}
     for name in problem.lines.mechanisms.named:
         try:
-            problem.hypothesis((name,), placed=False)
+            problem.hypothesis((name,), has_position_scatter=False)
         except Unsupported as refusal:
             unsupported[name] = refusal.reason
     return unsupported
@@ -173,12 +175,12 @@ def _unsupported(problem: FittingProblem) -> dict[str, str]:
 @dataclass
 class _Sets:
     """The sets that were fitted so far, those that were `tried`, and those whose evidence is `integrated` over their
-    loose parameters; other kinds of recordings `asked_for` some."""
+    loose parameters; other kinds of recordings `required_sets` some."""
 
     problem: FittingProblem
     explanations: Explanations
     unsupported: dict[str, str]
-    asked_for: Sequence[frozenset[str]] = ()
+    required_sets: Sequence[frozenset[str]] = ()
     tried: set[frozenset[str]] = field(default_factory=set)
     integrated: set[frozenset[str]] = field(default_factory=set)
 
@@ -235,7 +237,7 @@ class _Sets:
             if curves and size == 2:
                 requests = self._all_pairs(self.names)
                 self.explain(requests)
-                self.explanations |= afresh(self.problem, self.explanations, requests)
+                self.explanations |= refitted_from_prior(self.problem, self.explanations, requests)
             else:
                 self.explain(self._larger(size))
 
@@ -248,7 +250,7 @@ class _Sets:
         """
         known, catalogue = self.problem.lines.mechanisms, self.problem.lines.mechanisms.named
         requests, over_both = [], []
-        parents = _parents(self.search, size, self.asked_for)
+        parents = _parents(self.search, size, self.required_sets)
         for parent in parents:
             rings = any(known[name].needs_stiffness for name in parent.names)
             for name in self.names:
@@ -279,20 +281,22 @@ class _Sets:
 
     def refit_smaller(self) -> bool:
         """Fit the best sets again without each of their mechanisms; whether any fits better for it."""
-        refitted = from_larger(self.problem, self.explanations, self.search.log_weight)
+        refitted = refitted_from_larger(self.problem, self.explanations, self.search.log_weight)
         self.explanations |= refitted
         self.integrated -= set(refitted)
         return bool(refitted)
 
 
-def _parents(result: Search, size: int, asked_for: Sequence[frozenset[str]]) -> list[Explanation]:
+def _parents(result: Search, size: int, required_sets: Sequence[frozenset[str]]) -> list[Explanation]:
     """The explanations, one mechanism smaller, from which sets of this size grow: the best of all, and of those that
     were asked for, some of which are larger."""
     ranked = sorted(result.explanations, key=result.log_weight, reverse=True)
     best = result.log_weight(ranked[0])
     if size > 2:
         own = next(entry for entry in ranked if len(entry.names) < size)
-        asked = next((one for one in ranked if len(one.names) == size - 1 and frozenset(one.names) in asked_for), own)
+        asked = next(
+            (one for one in ranked if len(one.names) == size - 1 and frozenset(one.names) in required_sets), own
+        )
         return [one for one in ([own] if asked is own else [own, asked]) if len(one.names) == size - 1]
     smaller = [entry for entry in ranked if len(entry.names) == size - 1][:_PARENTS]
     return [entry for entry in smaller if result.log_weight(entry) > best - _BEHIND]
@@ -303,7 +307,7 @@ _CHANGED = 0.03  # change of the noise of some line, relative, below which it st
 
 
 def frf_problem(
-    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: Known
+    campaign: Campaign, uneven: Mapping[str, Floats], table: SigmaTable, mechanisms: ActiveCatalogue
 ) -> tuple[FittingProblem, list[Explanation]]:
     """The lines of a campaign's FRFs with their noise, ready to be explained; and the explanations that are known."""
     measured = replace(lines(campaign, uneven), mechanisms=mechanisms)
@@ -327,7 +331,7 @@ def _along_frequency(problem: FittingProblem) -> list[Explanation]:
         if "frf" not in mechanism.kinds or not mechanism.needs_lines:
             continue
         try:
-            problem.hypothesis((name,), placed=False)
+            problem.hypothesis((name,), has_position_scatter=False)
         except Unsupported:
             continue
         requests.append(Request((name,)))
@@ -339,11 +343,11 @@ _TOLD = 0.05  # standard deviation of the logarithm of a modulus that is told
 _APART = 3e-3  # prior of kinds that are not of one material
 
 # Recordings explained beside the curves of other kinds, with sets that are to be among those tried; or alone
-Fitted = Callable[[Beside | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
+Fitted = Callable[[CurveLikelihood | None, Sequence[frozenset[str]]], tuple[FittingProblem, Search]]
 
 
 @dataclass(frozen=True)
-class Joined:
+class KindsTogether:
     """The recordings of the kind that gives the verdict, with what the others tell.
 
     `search` on the `problem` that stands; `apart` is the search on these recordings alone, None where there is no
@@ -352,7 +356,7 @@ class Joined:
 
     problem: FittingProblem
     search: Search
-    beside: Beside | None = None
+    beside: CurveLikelihood | None = None
     apart: Search | None = None
     contradictory: float = 0.0
 
@@ -371,7 +375,7 @@ class Joined:
         return any(whole.log_weight > smaller.log_weight + least_evidence(whole.best) for whole, smaller in both)
 
 
-class Others:
+class OtherKinds:
     """The curves of other kinds than the one that gives the verdict."""
 
     def __init__(self, campaigns: Mapping[Kind, Campaign], table: SigmaTable, without: Sequence[str]) -> None:
@@ -387,24 +391,24 @@ class Others:
             found.append(OtherKind(kind, problem, search(problem).explanations))
         return found
 
-    def joined(self, fitted: Fitted) -> Joined:
+    def joined(self, fitted: Fitted) -> KindsTogether:
         """With the recordings that `fitted` explains, beside these or alone."""
         if not self._campaigns:
-            return Joined(*fitted(None, ()))
+            return KindsTogether(*fitted(None, ()))
         alone, apart = fitted(None, ())
-        beside = Beside(self._kinds, apart.explanations)
+        beside = CurveLikelihood(self._kinds, apart.explanations)
         best = [frozenset(one.explanation.names) for one in apart.answers[:_ALSO] if one.explanation is not None]
-        problem, together = fitted(beside, beside.asked_for(alone.lines, best))
+        problem, together = fitted(beside, beside.required_sets(alone.lines, best))
         log_apart = _log_apart(apart, beside) + np.log(_APART)
         log_together = together.log_total + np.log1p(-_APART)
         contradictory = float(np.exp(log_apart - np.logaddexp(log_apart, log_together)))
-        explained_alone = Joined(alone, apart, beside, apart, contradictory)
+        explained_alone = KindsTogether(alone, apart, beside, apart, contradictory)
         if explained_alone.apart_is_likelier:
             return explained_alone
-        return Joined(problem, replace(together, beside=beside), beside, apart, contradictory)
+        return KindsTogether(problem, replace(together, beside=beside), beside, apart, contradictory)
 
 
-def telling_modulus(joined: Joined | None, names: Sequence[str]) -> frozenset[Kind]:
+def telling_modulus(joined: KindsTogether | None, names: Sequence[str]) -> frozenset[Kind]:
     """The other kinds that tell the modulus, under a set of mechanisms, as well as it must be known for d33."""
     if joined is None or joined.beside is None:
         return frozenset()
@@ -412,7 +416,7 @@ def telling_modulus(joined: Joined | None, names: Sequence[str]) -> frozenset[Ki
     return frozenset(kind.kind for kind in beside.kinds if beside.told(kind, names).modulus_deviation < _TOLD)
 
 
-def _log_apart(apart: Search, beside: Beside) -> float:
+def _log_apart(apart: Search, beside: CurveLikelihood) -> float:
     """The logarithm of the sum over what recordings alone say, times what curves say with parameters of their own."""
     return float(
         np.logaddexp.reduce(

@@ -18,7 +18,7 @@ from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.report import DiagnosisResult, reported
 from underskin.diagnosis.several.course import Shared, values
 from underskin.diagnosis.several.sensors import (
-    Dated,
+    CampaignDates,
     SensorsOfCampaign,
     Values,
     changes,
@@ -97,7 +97,7 @@ def _report(
     if len(usable) < 2:
         lacking = (own.document for number, own in enumerate(reports) if number not in usable)
         return next(lacking, reports[0].document)
-    dated = Dated([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
+    dated = CampaignDates([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
     return together_report(name, ordered, results, reports, usable, dated, alone, table)
 
 

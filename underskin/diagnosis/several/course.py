@@ -25,7 +25,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.fit import GAIN
 from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.noise import Plateau
-from underskin.diagnosis.selection.answers import UNTHOUGHT, Search
+from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
 from underskin.diagnosis.selection.priors import log_prior
 from underskin.mechanisms.parameter import Parameter
 from underskin.recordings.usual_scatter import NO_POSITION_SCATTER
@@ -144,10 +144,10 @@ class Candidate:
         return {frozenset(entry.names): entry for entry in self.search.explanations}
 
     @property
-    def asked_for(self) -> list[frozenset[str]]:
+    def required_sets(self) -> list[frozenset[str]]:
         """The sets that may matter."""
         showing = sorted(
-            (entry for entry in self.search.explanations if self.search.shows(entry)), key=self.search.log_weight
+            (entry for entry in self.search.explanations if self.search.is_supported(entry)), key=self.search.log_weight
         )[::-1]
         least = self.search.log_weight(showing[0]) - _BEHIND
         return [frozenset(entry.names) for entry in showing[:_MOST_SETS] if self.search.log_weight(entry) > least]
@@ -157,7 +157,7 @@ class Candidate:
         """The probability that what is missing in this campaign has no name, beyond what stays for what nobody thought
         of, which is the same in all campaigns."""
         share = sum(answer.probability for answer in self.search.answers if answer.explanation is None)
-        return max(share - UNTHOUGHT, 0.0) / (1 - UNTHOUGHT)
+        return max(share - P_NOT_IN_MODEL_SPACE, 0.0) / (1 - P_NOT_IN_MODEL_SPACE)
 
     def supported(self, names: frozenset[str]) -> frozenset[str]:
         """Those of the mechanisms that this campaign can show."""
@@ -193,7 +193,7 @@ class Courses:
 
 def courses(candidates: Sequence[Candidate], supported: int) -> Courses:
     """Of campaigns in the order of their dates; `supported` mechanisms."""
-    sets = list(dict.fromkeys(one for candidate in candidates for one in (frozenset[str](), *candidate.asked_for)))
+    sets = list(dict.fromkeys(one for candidate in candidates for one in (frozenset[str](), *candidate.required_sets)))
     log_evidence = np.full((len(candidates), len(sets)), -np.inf)
     for number, candidate in enumerate(candidates):
         for place, names in enumerate(sets):
@@ -269,22 +269,22 @@ class Bench:
     """The prior of the gain scatter's logarithm, and the probability that positions scatter."""
 
     gain: Plateau
-    placed: float
+    has_position_scatter: float
 
 
 def benches(candidates: Sequence[Candidate]) -> list[Bench]:
     """Of each skin, by what its sisters say, one at least."""
-    leaders = [one.search.shown_or_nothing(one.search.answers[0]) for one in candidates]
+    leaders = [one.search.fit_behind(one.search.answers[0]) for one in candidates]
     said = np.array([one.point.covariance[GAIN] for one in leaders])
     recordings = np.array([one.best.hypothesis.lines.recordings for one in leaders])
     precision = 1 / (_FROM_SKIN_TO_SKIN**2 + 0.5 / np.maximum(recordings - 1, 1))
     usual = logit(1 - NO_POSITION_SCATTER)
-    gained = logit(np.clip([one.placed for one in leaders], _UNSURE, 1 - _UNSURE)) - usual
+    gained = logit(np.clip([one.has_position_scatter for one in leaders], _UNSURE, 1 - _UNSURE)) - usual
     found = []
     for number in range(len(candidates)):
-        sisters = np.arange(len(candidates)) != number
-        own = np.where(sisters, precision, 0.0)
+        other_specimens = np.arange(len(candidates)) != number
+        own = np.where(other_specimens, precision, 0.0)
         deviation = float(np.hypot(_FROM_SKIN_TO_SKIN, own.sum() ** -0.5))
-        placed = float(np.clip(expit(usual + gained[sisters].sum()), _UNSURE, 1 - _UNSURE))
-        found.append(Bench(Plateau.normal(float(own @ said / own.sum()), deviation), placed))
+        has_position_scatter = float(np.clip(expit(usual + gained[other_specimens].sum()), _UNSURE, 1 - _UNSURE))
+        found.append(Bench(Plateau.normal(float(own @ said / own.sum()), deviation), has_position_scatter))
     return found

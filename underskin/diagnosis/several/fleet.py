@@ -24,12 +24,12 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import Knowledge, own_places, quadratic_of_prior
+from underskin.diagnosis.inference.hypothesis import Gaussian, own_places, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, report, reported
-from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.selection.priors import SHOWS, log_prior
 from underskin.diagnosis.several import together_report
 from underskin.diagnosis.several.campaigns import by_frfs, curves_once, refuse_copies, with_curves
@@ -42,14 +42,14 @@ from underskin.diagnosis.several.population import (
     QUANTITIES,
     REGULAR,
     STATED,
+    Batch,
     FleetSkin,
-    Make,
     Populations,
     Spread,
     State,
     populations,
 )
-from underskin.diagnosis.several.sensors import Dated, date_of, in_order
+from underskin.diagnosis.several.sensors import CampaignDates, date_of, in_order
 from underskin.diagnosis.several.together_report import of_kinds
 from underskin.errors import InvalidInput
 from underskin.findings.formatting import in_percent
@@ -64,20 +64,20 @@ _DIFFERS = 0.03  # probability that a skin differs from its sisters by one mecha
 @dataclass(frozen=True)
 class CommonSet:
     """The most probable common set and set of each skin, with the probability of each of these; `probability` is that
-    of all of them together. `from_sisters`: of each skin the logarithms of the sets' probabilities by what its sisters
-    say alone. `log_evidence`: of all recordings, over all sets."""
+    of all of them together. `from_other_specimens`: of each skin the logarithms of the sets' probabilities by the
+    recordings of the others alone. `log_evidence`: of all recordings, over all sets."""
 
     common: Names
     sets: tuple[Names, ...]
     each: tuple[float, ...]
     probability: float
-    from_sisters: tuple[Mapping[frozenset[str], float], ...]
+    from_other_specimens: tuple[Mapping[frozenset[str], float], ...]
     log_evidence: float
 
 
 def sets_of(candidates: Sequence[Candidate]) -> list[frozenset[str]]:
     """The sets that any skin asks for, beside errors of E and of the thickness."""
-    asked = (names.difference(ERRORS) for candidate in candidates for names in candidate.asked_for)
+    asked = (names.difference(ERRORS) for candidate in candidates for names in candidate.required_sets)
     return list(dict.fromkeys((frozenset[str](), *asked)))
 
 
@@ -119,11 +119,11 @@ def common_set(skins: Sequence[FleetSkin], sets: Sequence[frozenset[str]], suppo
     at_best = weights[np.arange(len(chosen)), best, chosen] - of_skins[:, best]
     probability = float(share[best] * np.exp(at_best.sum()))
     of_each = tuple(named(one.candidate.supported(sets[place])) for one, place in zip(skins, chosen, strict=True))
-    of_sisters = np.logaddexp.reduce((log_common - of_skins)[..., None] + change, axis=1)
-    of_sisters -= np.logaddexp.reduce(of_sisters, axis=1, keepdims=True)
-    from_sisters = tuple(dict(zip(sets, row.tolist(), strict=True)) for row in of_sisters)
+    of_other_specimens = np.logaddexp.reduce((log_common - of_skins)[..., None] + change, axis=1)
+    of_other_specimens -= np.logaddexp.reduce(of_other_specimens, axis=1, keepdims=True)
+    from_other_specimens = tuple(dict(zip(sets, row.tolist(), strict=True)) for row in of_other_specimens)
     total = float(np.logaddexp.reduce(log_common) + evidence.max(axis=1).sum())
-    return CommonSet(named(sets[best]), of_each, each, probability, from_sisters, total)
+    return CommonSet(named(sets[best]), of_each, each, probability, from_other_specimens, total)
 
 
 def _shows(skin: FleetSkin, names: frozenset[str], skins: int) -> bool:
@@ -164,15 +164,15 @@ def of_strengths(candidates: Mapping[str, Candidate], common: CommonSet) -> list
                 if entry.scale == "log" and likelihood is not None:
                     states = [State(REGULAR, likelihood, np.zeros(1)), State(DEPARTS, likelihood, np.array([_FAR**2]))]
                     said.setdefault((f"{mechanism}.{entry.name}", entry.unit), {})[skin] = states
-    make = Make(0.0, np.zeros(1), np.array([_WIDEST**-2]))
+    batch = Batch(0.0, np.zeros(1), np.array([_WIDEST**-2]))
     return [
-        Strength(parameter, unit, tuple(own), populations(list(own.values()), [make], [_SPREAD]))
+        Strength(parameter, unit, tuple(own), populations(list(own.values()), [batch], [_SPREAD]))
         for (parameter, unit), own in said.items()
         if len(own) >= _LEAST_SKINS_OF_STRENGTH
     ]
 
 
-def _likelihood(fit: Explanation, place: int) -> Knowledge | None:
+def _likelihood(fit: Explanation, place: int) -> Gaussian | None:
     """Of one fit coordinate by the recordings alone, the prior taken out; None where they say next to nothing of it, or
     it moves the covariance alone."""
     hypothesis = fit.best.hypothesis
@@ -184,7 +184,7 @@ def _likelihood(fit: Explanation, place: int) -> Knowledge | None:
     precision = after - prior
     if precision < _INFORMS * prior:
         return None
-    return Knowledge(np.array([[precision]]), np.array([after * fit.point.fit[place] - prior * centre]), 0.0)
+    return Gaussian(np.array([[precision]]), np.array([after * fit.point.fit[place] - prior * centre]), 0.0)
 
 
 _MOST_TOLD = 3  # skins that depart in the statement
@@ -224,7 +224,7 @@ def fleet_report(
     departs = any(entry["departures"] for entry in populations)
     undescribed = {skin: one.undescribed for skin, one in fleet.candidates.items()}
     unexplained = [skin for skin, share in undescribed.items() if share > STATED]
-    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed.values()]))
+    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in undescribed.values()]))
     wrongly = max(fleet.declared_wrongly.values(), default=0.0)
     declared = wrongly if wrongly > STATED else 1 - sum(fleet.declared_wrongly.values())
     of_sets = fleet.common.probability * declared * described
@@ -461,7 +461,9 @@ def diagnose_fleet(
             raise InvalidInput("skins", skin, "must have a campaign with recordings of kind frf")
         results[skin] = _latest([with_curves(one, of_curves) for one in with_frf], table, without)
         if len(with_frf) > 1:
-            orders[skin] = Dated([one.name for one in with_frf], [date_of(one) for one in with_frf]).order_clause()
+            orders[skin] = CampaignDates(
+                [one.name for one in with_frf], [date_of(one) for one in with_frf]
+            ).order_clause()
         progress((number + 1) / (len(skins) + 1))
     campaigns_named = [campaign.name for own in skins.values() for campaign in own]
     candidates = {
@@ -517,10 +519,10 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
     weights = np.array([one.log_weight for one in attempts])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     best = attempts[int(np.argmax(shares))]
-    pooled, makes = _pooled(best, odds)
+    pooled, batches = _pooled(best, odds)
     if best.error:
-        _, makes = _pooled(attempts[0], odds)
-    wrongly = declared_wrongly(dict(zip((one.error for one in attempts), shares.tolist(), strict=True)), makes)
+        _, batches = _pooled(attempts[0], odds)
+    wrongly = declared_wrongly(dict(zip((one.error for one in attempts), shares.tolist(), strict=True)), batches)
     declared = np.array([skin.declared for skin in best.skins])
     return Fleet(candidates, best.common, pooled, declared, wrongly, of_strengths(candidates, best.common))
 
@@ -528,19 +530,19 @@ def _found(candidates: Mapping[str, Candidate]) -> Fleet:
 def _pooled(attempt: _Attempt, odds: float) -> tuple[Populations, dict[str, float]]:
     """The populations by one attempt, and by its skins the probability that what is declared of all is right or has an
     error."""
-    states = [skin.states(own) for skin, own in zip(attempt.skins, attempt.common.from_sisters, strict=True)]
-    makes, errors = _makes(attempt.skins, odds)
+    states = [skin.states(own) for skin, own in zip(attempt.skins, attempt.common.from_other_specimens, strict=True)]
+    batches, errors = _batches(attempt.skins, odds)
     if attempt.error:
-        makes, errors = [makes[errors.index(attempt.error)]], [attempt.error]
-    pooled = populations(states, makes, SPREADS)
-    return pooled, dict(zip(errors, pooled.makes.tolist(), strict=True))
+        batches, errors = [batches[errors.index(attempt.error)]], [attempt.error]
+    pooled = populations(states, batches, SPREADS)
+    return pooled, dict(zip(errors, pooled.batches.tolist(), strict=True))
 
 
-def declared_wrongly(attempts: Mapping[str, float], makes: Mapping[str, float]) -> dict[str, float]:
+def declared_wrongly(attempts: Mapping[str, float], batches: Mapping[str, float]) -> dict[str, float]:
     """The probability of each error of what is declared of all skins: `attempts` those of each attempt, by error, and
-    `makes` those of each error by the attempt that has none."""
-    errors = [error for error in dict.fromkeys((*makes, *attempts)) if error]
-    return {error: attempts[""] * makes.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
+    `batches` those of each error by the attempt that has none."""
+    errors = [error for error in dict.fromkeys((*batches, *attempts)) if error]
+    return {error: attempts[""] * batches.get(error, 0.0) + attempts.get(error, 0.0) for error in errors}
 
 
 def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float]:
@@ -553,14 +555,14 @@ def _off(skins: Sequence[FleetSkin], row: int, error: str) -> tuple[float, float
     return float(precision @ means / precision.sum()), float(precision.sum() ** -0.5)
 
 
-def _makes(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Make], list[str]]:
+def _batches(skins: Sequence[FleetSkin], odds: float) -> tuple[list[Batch], list[str]]:
     """The priors of the make's quantities, and by each the error of what is declared of all skins, with its odds."""
     usual, centre = np.array([*_DECLARED, D33_PRIOR[1]]), np.array([0.0, 0.0, D33_PRIOR[0]])
-    makes, errors = [Make(0.0, centre, usual**-2)], [""]
+    batches, errors = [Batch(0.0, centre, usual**-2)], [""]
     for row, error in enumerate(ERRORS):
         if all(error in skin.errors for skin in skins):
             loose = usual.copy()
             loose[row] = FAR[row]
-            makes.append(Make(odds, centre, loose**-2))
+            batches.append(Batch(odds, centre, loose**-2))
             errors.append(error)
-    return makes, errors
+    return batches, errors

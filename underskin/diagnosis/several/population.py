@@ -27,7 +27,7 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import Knowledge, curvature_of_prior, own_places
+from underskin.diagnosis.inference.hypothesis import Gaussian, curvature_of_prior, own_places
 from underskin.diagnosis.reporting.numbers import mixture_quantile
 from underskin.diagnosis.several.course import Bench, Candidate
 from underskin.mechanisms.models.composed import Model
@@ -37,7 +37,7 @@ from underskin.units import Floats, Indices
 _INFORMS = 0.2  # of a prior's precision: what recordings add at least to say anything
 
 
-def of_posterior(log_evidence: float, mean: Floats, covariance: Floats, centre: Floats, precision: Floats) -> Knowledge:
+def of_posterior(log_evidence: float, mean: Floats, covariance: Floats, centre: Floats, precision: Floats) -> Gaussian:
     """The likelihood that turns independent normal priors, of this centre and precision (quantities,), into a normal
     posterior of this mean and covariance, with this evidence.
 
@@ -50,10 +50,10 @@ def of_posterior(log_evidence: float, mean: Floats, covariance: Floats, centre: 
     added = values[values > 1 + _INFORMS]
     own = (informing * (added - 1)) @ informing.T * np.outer(root, root)
     linear = own @ centre + root * (informing @ (added * (informing.T @ (root * (mean - centre)))))
-    return Knowledge(own, linear, log_evidence - log_integral(Knowledge(own, linear, 0.0), centre, precision).item())
+    return Gaussian(own, linear, log_evidence - log_integral(Gaussian(own, linear, 0.0), centre, precision).item())
 
 
-def posterior(likelihood: Knowledge, centre: Floats, precision: Floats) -> tuple[Floats, Floats]:
+def posterior(likelihood: Gaussian, centre: Floats, precision: Floats) -> tuple[Floats, Floats]:
     """Mean and covariance under independent normal priors of this centre and precision (quantities,); of a stack of
     likelihoods one each."""
     covariance = np.linalg.inv(likelihood.precision + np.diag(precision))
@@ -61,7 +61,7 @@ def posterior(likelihood: Knowledge, centre: Floats, precision: Floats) -> tuple
     return np.asarray(mean), np.asarray(covariance, float)
 
 
-def log_integral(likelihood: Knowledge, centre: Floats, precision: Floats) -> Floats:
+def log_integral(likelihood: Gaussian, centre: Floats, precision: Floats) -> Floats:
     """ln ∫ L(q) N(q; centre, 1/precision) dq; of a stack of likelihoods one each."""
     towards = likelihood.linear + precision * centre
     mean, covariance = posterior(likelihood, centre, precision)
@@ -70,17 +70,17 @@ def log_integral(likelihood: Knowledge, centre: Floats, precision: Floats) -> Fl
     return np.asarray(likelihood.height + 0.5 * (volume + square))
 
 
-def of_mean(likelihood: Knowledge, variance: Floats) -> Knowledge:
+def of_mean(likelihood: Gaussian, variance: Floats) -> Gaussian:
     """∫ L(q) N(q; μ, variance) dq, as a likelihood of μ; of variances (…, quantities) a stack (…)."""
     loose = np.eye(len(likelihood.linear)) + likelihood.precision * variance[..., None, :]
     shrunk = np.linalg.inv(loose)
     linear = shrunk @ likelihood.linear
     square = (likelihood.linear * variance * linear).sum(axis=-1)
     height = likelihood.height + 0.5 * (square - np.linalg.slogdet(loose)[1])
-    return Knowledge(shrunk @ likelihood.precision, linear, height)
+    return Gaussian(shrunk @ likelihood.precision, linear, height)
 
 
-def mixed(each: Sequence[tuple[float, Knowledge]], centre: Floats, precision: Floats) -> Knowledge:
+def mixed(each: Sequence[tuple[float, Gaussian]], centre: Floats, precision: Floats) -> Gaussian:
     """A mixture of likelihoods, with log weights, as one: that of the evidence, mean and covariance which the mixture
     has under independent normal priors."""
     log_weights = np.array([share + log_integral(one, centre, precision).item() for share, one in each])
@@ -111,12 +111,12 @@ class State:
     of the departure (quantities,)."""
 
     departs: str
-    likelihood: Knowledge
+    likelihood: Gaussian
     further: Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Make:
+class Batch:
     """A prior of μ: the logarithm of its probability, centre and precision (quantities,)."""
 
     log_prior: float
@@ -151,7 +151,7 @@ class Populations:
     spread: Floats
     of_skins: Floats
     departs: tuple[dict[str, float], ...]
-    makes: Floats
+    batches: Floats
     together: Mapping[tuple[str, ...], float]
 
     @property
@@ -168,10 +168,10 @@ def log_odds_of_departure(skins: int) -> float:
     return float(np.log(np.expm1(-np.log1p(-_SOME_DEPARTS) / skins)))
 
 
-def populations(skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> Populations:
+def populations(skins: Sequence[Sequence[State]], batches: Sequence[Batch], spreads: Sequence[Spread]) -> Populations:
     """Of the states of each skin, the regular one first, the priors of μ, and those of τ (quantities,)."""
     assert all(own and own[0].departs == REGULAR for own in skins)
-    return _Fleet(skins, makes, spreads).populations
+    return _Fleet(skins, batches, spreads).populations
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,14 +180,14 @@ class _Part:
     probabilities."""
 
     states: tuple[int, ...]
-    make: Make
+    batch: Batch
     kept: Indices
     weights: Floats
 
 
 class _Fleet:
-    def __init__(self, skins: Sequence[Sequence[State]], makes: Sequence[Make], spreads: Sequence[Spread]) -> None:
-        self.skins, self.makes = skins, makes
+    def __init__(self, skins: Sequence[Sequence[State]], batches: Sequence[Batch], spreads: Sequence[Spread]) -> None:
+        self.skins, self.batches = skins, batches
         nodes = list(product(*(one.nodes for one in spreads)))
         self.spreads = np.array([[value for value, _ in node] for node in nodes])  # (spreads, quantities)
         shares = np.array([sum(share for _, share in node) for node in nodes])
@@ -195,7 +195,7 @@ class _Fleet:
         # What each skin in each state says of μ, (spreads,) each
         self.said = [[of_mean(one.likelihood, self.spreads**2 + one.further) for one in own] for own in skins]
 
-    def together(self, states: Sequence[int], without: int | None = None) -> Knowledge:
+    def together(self, states: Sequence[int], without: int | None = None) -> Gaussian:
         """What the skins in these states say of μ, but for one."""
         each = [own[state] for number, (own, state) in enumerate(zip(self.said, states, strict=True))
                 if number != without]  # fmt: skip
@@ -206,7 +206,7 @@ class _Fleet:
         odds = log_odds_of_departure(len(self.skins))
         prior = sum(odds - np.log(len(own) - 1) for own, state in zip(self.skins, states, strict=True) if state)
         said = self.together(states)
-        each = [one.log_prior + log_integral(said, one.centre, one.precision) for one in self.makes]
+        each = [one.log_prior + log_integral(said, one.centre, one.precision) for one in self.batches]
         return np.asarray(np.array(each) + self.log_shares + prior)
 
     @cached_property
@@ -243,9 +243,9 @@ class _Fleet:
             for number, own in enumerate(self.skins)
         )
         parts = [
-            _Part(states, make, kept, own[kept])
+            _Part(states, batch, kept, own[kept])
             for states, of_makes in zip(self.found, share, strict=True)
-            for make, own in zip(self.makes, of_makes, strict=True)
+            for batch, own in zip(self.batches, of_makes, strict=True)
             if len(kept := np.flatnonzero(own > _COUNTS))
         ]
         weights = np.concatenate([part.weights for part in parts])
@@ -266,15 +266,17 @@ class _Fleet:
         )
 
     def _mean(self, part: _Part) -> Floats:
-        return posterior(self.together(part.states), part.make.centre, part.make.precision)[0][part.kept]
+        return posterior(self.together(part.states), part.batch.centre, part.batch.precision)[0][part.kept]
 
     def _of_skin(self, number: int, parts: Sequence[_Part], weights: Floats) -> Floats:
         """Median and ends of the 95 % interval of its quantities (3, quantities)."""
         middles, deviations = [], []
         for part in parts:
             state = self.skins[number][part.states[number]]
-            sisters = self.together(part.states, number)
-            mean, covariance = (one[part.kept] for one in posterior(sisters, part.make.centre, part.make.precision))
+            other_specimens = self.together(part.states, number)
+            mean, covariance = (
+                one[part.kept] for one in posterior(other_specimens, part.batch.centre, part.batch.precision)
+            )
             own = self.spreads[part.kept] ** 2 + state.further
             before = np.linalg.inv(covariance + own[:, None] * np.eye(own.shape[1]))
             after = np.linalg.inv(before + state.likelihood.precision)
@@ -289,14 +291,14 @@ class _Fleet:
 MODULUS, THICKNESS, D33 = "modulus_error", "thickness_error", "d33"
 ERRORS = (MODULUS, THICKNESS)
 QUANTITIES = {MODULUS: "youngs_modulus", THICKNESS: "thickness", D33: "d33"}  # by what a skin departs in
-_ABOUT_MAKE = (0.1, 0.01)  # deviations of ln E and ln h about the make's within which a regular skin is fitted
+_ABOUT_BATCH = (0.1, 0.01)  # deviations of ln E and ln h about the make's within which a regular skin is fitted
 _FAR_IN_D33 = 0.4  # an amplifier's other range
 FAR = (*(curvature_of_prior(CATALOGUE[name].parameters_stated[0])[0] ** -0.5 for name in ERRORS), _FAR_IN_D33)
 # Deviations of ln E, ln h and ln d33 of one that departs, those of errors as the mechanisms have their scales
 D33_PRIOR = (float(np.log(15.0)), 1.5)
 _BEYOND = 2.0  # deviations about the make, beyond which a fit says no more than that the skin departs
 
-Likelihoods = dict[tuple[frozenset[str], str], Knowledge]  # by set and departure
+Likelihoods = dict[tuple[frozenset[str], str], Gaussian]  # by set and departure
 
 
 class FleetSkin:
@@ -361,9 +363,9 @@ class FleetSkin:
     def _prior(self, departs: str) -> tuple[Floats, Floats]:
         """Centre and precision of the quantities before any recording."""
         centre = np.array([*self._centre, D33_PRIOR[0]])
-        return centre, 1 / (np.array([*_ABOUT_MAKE, D33_PRIOR[1]]) ** 2 + self._further(departs))
+        return centre, 1 / (np.array([*_ABOUT_BATCH, D33_PRIOR[1]]) ** 2 + self._further(departs))
 
-    def _log_integral(self, likelihood: Knowledge, departs: str) -> float:
+    def _log_integral(self, likelihood: Gaussian, departs: str) -> float:
         return log_integral(likelihood, *self._prior(departs)).item()
 
     def _fits(self, sets: Sequence[frozenset[str]], bench: Bench) -> Likelihoods:
@@ -373,8 +375,8 @@ class FleetSkin:
         for departs in (REGULAR, *self.errors):
             held = tuple(name for name in self.errors if name != departs)
 
-            def beside(model: Model, lines: Lines, held: Sequence[str] = held) -> Knowledge:
-                return self._about_make(model, lines, held)
+            def beside(model: Model, lines: Lines, held: Sequence[str] = held) -> Gaussian:
+                return self._about_batch(model, lines, held)
 
             problem = FittingProblem(lines, table, beside, bench.gain)
             for names, fit in zip(sets, _explained(problem, [{*names, *self.errors} for names in sets]), strict=True):
@@ -401,18 +403,18 @@ class FleetSkin:
             nearest = max(others, key=lambda name: self._log_integral(found[names, name], name))
             found[names, REGULAR] = found[names, nearest]
 
-    def _about_make(self, model: Model, lines: Lines, held: Sequence[str]) -> Knowledge:
+    def _about_batch(self, model: Model, lines: Lines, held: Sequence[str]) -> Gaussian:
         """That E and thickness are about the make's, as far as held, beside what recordings of other kinds say."""
         other = self.candidate.problem.beside
         places = own_places(model.names, lines)
         rows = [ERRORS.index(name) for name in held]
         matrix = np.eye(len(model.parameters))[[places[name].start for name in held]]
-        centre, precision = np.array(self._centre)[rows], np.diag(np.array(_ABOUT_MAKE)[rows] ** -2.0)
-        about = Knowledge.of(matrix, np.zeros(len(rows)), centre, precision, 0.0)
+        centre, precision = np.array(self._centre)[rows], np.diag(np.array(_ABOUT_BATCH)[rows] ** -2.0)
+        about = Gaussian.of(matrix, np.zeros(len(rows)), centre, precision, 0.0)
         known = None if other is None else other(model, lines)
         return about if known is None else known + about
 
-    def _said(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Knowledge:
+    def _said(self, fit: Explanation, best: Evidence, held: Sequence[str]) -> Gaussian:
         """The likelihood by one of its fits: the posterior over the priors, those of errors and the usual ones."""
         places = own_places(fit.names, best.hypothesis.lines)
         entries = [entry.name for entry in fit.model.parameters]
@@ -424,7 +426,7 @@ class FleetSkin:
                 matrix[row, place] = 1.0
                 precision, middle = curvature_of_prior(fit.model.parameters[place])
                 if place in of_error and error in held:
-                    about, also = self._centre[row], _ABOUT_MAKE[row] ** -2
+                    about, also = self._centre[row], _ABOUT_BATCH[row] ** -2
                     both = 1 / precision + 1 / also
                     log_evidence += 0.5 * (np.log(both * also) + (about - middle) ** 2 / both)
                     precision, middle = precision + also, (precision * middle + also * about) / (precision + also)
@@ -439,7 +441,9 @@ def _log_share(fit: Explanation, one: Evidence, bench: Bench) -> float:
     """ln of the prior of a fit with or without positioning scatter, where there are both."""
     if len(fit.each) == 1:
         return 0.0
-    return float(np.log(bench.placed if one.hypothesis.placed else 1 - bench.placed))
+    return float(
+        np.log(bench.has_position_scatter if one.hypothesis.has_position_scatter else 1 - bench.has_position_scatter)
+    )
 
 
 def _explained(problem: FittingProblem, sets: Sequence[set[str]]) -> list[Explanation | None]:

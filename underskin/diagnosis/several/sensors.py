@@ -41,7 +41,7 @@ from underskin.units import Floats, to_lab
 
 
 @dataclass(frozen=True)
-class Dated:
+class CampaignDates:
     """Names of campaigns in their order, with the dates of their first recordings, None of those without a time."""
 
     names: Sequence[str]
@@ -390,7 +390,7 @@ def changed_once(changes: Sequence[Change]) -> Iterator[Change]:
     yield from (change for change in changes if change.exchanged_with is None)
 
 
-def findings(changes: Sequence[Change], dated: Dated) -> list[Finding]:
+def findings(changes: Sequence[Change], dated: CampaignDates) -> list[Finding]:
     """One of each exchange."""
     return [
         Finding(

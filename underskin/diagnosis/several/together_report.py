@@ -21,7 +21,7 @@ from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, rounded
 from underskin.diagnosis.reporting.report import SCHEMA, DiagnosisResult, Reported
 from underskin.diagnosis.reporting.statements import StatedD33, listed
-from underskin.diagnosis.selection.answers import UNTHOUGHT
+from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE
 from underskin.diagnosis.several.course import (
     Candidate,
     Course,
@@ -35,8 +35,8 @@ from underskin.diagnosis.several.course import (
 from underskin.diagnosis.several.sensors import (
     AGEING,
     ArrayOverDates,
+    CampaignDates,
     Change,
-    Dated,
     SensorsOfCampaign,
     array_over_dates,
     causes,
@@ -95,8 +95,8 @@ def of_skins(mean: float, unit: str, each: Mapping[str, StatedD33], lacking: Map
     may: list[str] = []
     by_reason: dict[str, list[str]] = {}
     for skin, own in each.items():
-        sisters = [f"its own diagnosis lacks {in_words(lacking[skin])}"] if lacking.get(skin) else []
-        reason = " and ".join(own.reasons or sisters)
+        other_specimens = [f"its own diagnosis lacks {in_words(lacking[skin])}"] if lacking.get(skin) else []
+        reason = " and ".join(own.reasons or other_specimens)
         (by_reason.setdefault(reason, []) if reason else may).append(skin)
     others = [f"not of {_few(skins)} ({reason})" for reason, skins in by_reason.items()]
     told = ", ".join([f"of {_few(may) if may else 'none'}", *others])
@@ -171,7 +171,9 @@ def _fault(codes: set[FindingCode]) -> Fault:
     return Fault.WEAK if FindingCode.WEAK in codes else Fault.OTHER
 
 
-def left_out_in_words(each: Sequence[Faults], sensors: Sequence[SensorsOfCampaign | None], dated: Dated) -> list[str]:
+def left_out_in_words(
+    each: Sequence[Faults], sensors: Sequence[SensorsOfCampaign | None], dated: CampaignDates
+) -> list[str]:
     """A clause on all sensors that share a fault and its dates, those that came between two campaigns first."""
     runs: dict[_Run, list[str]] = {}
     for sensor in dict.fromkeys(sensor for one in each for sensor in one):
@@ -201,7 +203,7 @@ def _runs_of_dates(states: Sequence[Fault | str | None]) -> list[_Run]:
     return found if current is None else [*found, current]
 
 
-def _clause(run: _Run, own: Sequence[str], sensors: Sequence[SensorsOfCampaign | None], dated: Dated) -> str:
+def _clause(run: _Run, own: Sequence[str], sensors: Sequence[SensorsOfCampaign | None], dated: CampaignDates) -> str:
     """ "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
     one = len(own) == 1
     who = f"sensor {own[0]}" if one else f"sensors {listed(own)}"
@@ -228,7 +230,7 @@ _MOST_TOLD, _MOST_CAUSES = 3, 3  # changes in a statement, and mechanisms that w
 _OF_THE_CHAIN = ("an amplifier's gain", "the temperature")
 
 
-def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: Dated) -> list[str]:
+def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: CampaignDates) -> list[str]:
     """What a statement says of d33: of the array first where it changed, and of sensors beside it, of more than a few
     how many."""
     dates = 0 if over is None else len(over.numbers)
@@ -244,7 +246,7 @@ def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: 
     return [*of_array, *said] if changed_at_all else [*said, *of_array]
 
 
-def change_in_words(change: Change, dated: Dated) -> str:
+def change_in_words(change: Change, dated: CampaignDates) -> str:
     """A clause on d33 of one sensor or of the array; of the array, that a change of level tells nothing of its
     cause."""
     if change.exchanged_with is not None:
@@ -260,7 +262,7 @@ def change_in_words(change: Change, dated: Dated) -> str:
     return f"d33 {whose} {way} by {size} between {before} and {after}{level}"
 
 
-def _array_in_words(over: ArrayOverDates, changed: Sequence[Change], dated: Dated) -> list[str]:
+def _array_in_words(over: ArrayOverDates, changed: Sequence[Change], dated: CampaignDates) -> list[str]:
     """From the first to the last campaign."""
     first, last = over.numbers[0], over.numbers[-1]
     between = f"between {dated.called(first)} and {dated.called(last)}"
@@ -290,7 +292,7 @@ def together_report(
     results: Sequence[DiagnosisResult],
     reports: Sequence[Reported],
     usable: Sequence[int],
-    dated: Dated,
+    dated: CampaignDates,
     alone: Sequence[frozenset[str]],
     table: SigmaTable,
 ) -> dict[str, Any]:
@@ -304,7 +306,7 @@ def together_report(
     names = dated.names
     found = courses(candidates, min(candidate.search.supported for candidate in candidates))
     undescribed = [candidate.undescribed for candidate in candidates]
-    described = (1 - UNTHOUGHT) * float(np.prod([1 - share for share in undescribed]))
+    described = (1 - P_NOT_IN_MODEL_SPACE) * float(np.prod([1 - share for share in undescribed]))
     leader = found.best[0]
     strengths = _strengths(candidates, leader)
     sensors = [
@@ -436,7 +438,9 @@ def _verdict(leader: Course, described: float, undescribed: Sequence[float], cha
     return "explained" if any(leader.sets) or changed else "no_mismatch"
 
 
-def _mechanisms(candidates: Sequence[Candidate], found: Courses, leader: Course, dated: Dated) -> list[dict[str, Any]]:
+def _mechanisms(
+    candidates: Sequence[Candidate], found: Courses, leader: Course, dated: CampaignDates
+) -> list[dict[str, Any]]:
     entries = []
     for mechanism in dict.fromkeys(name for own in leader.sets for name in own):
         for run in _runs(candidates, leader, mechanism):
@@ -467,14 +471,14 @@ def _shown_in(candidates: Sequence[Candidate], mechanism: str) -> list[int]:
     return [number for number, one in enumerate(candidates) if mechanism not in one.search.unsupported]
 
 
-def _scope(where: Sequence[int], able: Sequence[int], dated: Dated) -> dict[str, Any]:
+def _scope(where: Sequence[int], able: Sequence[int], dated: CampaignDates) -> dict[str, Any]:
     """In which campaigns; `since` where it is there from one date on in all that can show it, and not before."""
     from_on = list(where) == [number for number in able if number >= where[0]] and where[0] > min(able)
     since = dated.since(where[0]) if from_on else None
     return {"campaigns": [dated.names[number] for number in where], **({"since": since} if since else {})}
 
 
-def _aged(changed: Sequence[Change], dated: Dated) -> list[dict[str, Any]]:
+def _aged(changed: Sequence[Change], dated: CampaignDates) -> list[dict[str, Any]]:
     """A d33 that changed from one campaign to the next, under the most probable mechanism that would do that: of one
     sensor ageing, where it fell.
 
@@ -543,7 +547,7 @@ def _statement(
     leader: Course,
     undescribed: Sequence[float],
     mechanisms: Sequence[dict[str, Any]],
-    dated: Dated,
+    dated: CampaignDates,
     decisive: Sequence[str],
     of_levels: Sequence[str],
     of_d33: str,

@@ -24,12 +24,12 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import cell_response
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.search import left_smooth
-from underskin.diagnosis.selection.unnamed_search import law_of, nearest_law
+from underskin.diagnosis.selection.search import smooth_error_gain
+from underskin.diagnosis.selection.unlisted_search import law_of, nearest_law
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
 from underskin.mechanisms.models.frf import FrfModel
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, in_plain_words
+from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, in_plain_words
 from underskin.recordings.campaign import curves_of, frf_of
 from underskin.units import Floats, Indices, Mask
 
@@ -201,7 +201,7 @@ def _predict(
     smaller: FittingProblem, explanation: Explanation, problem: FittingProblem, rows: Mask, left: Lines
 ) -> PredictionScore:
     """Some of the rows, `left` alone, from a fit to others; sensors that were seen keep the gain found for them."""
-    model = problem.hypothesis(explanation.names, placed=False, whole=True).model
+    model = problem.hypothesis(explanation.names, has_position_scatter=False, whole=True).model
     point, levels = explanation.point, explanation.best.levels
     if not isinstance(model, FrfModel):
         whole = model.predict(point.fit)
@@ -219,8 +219,8 @@ def _predict(
     value = value * np.exp(0.5 * p2 * curvature.laplacian)[recording]
     scatter = levels.gain**2 + np.where(seen, 0.0, levels.spread**2)
     noise = scatter[left.recording] * np.abs(value) ** 2 + 2 * (levels.level * left.deviation) ** 2
-    placed = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
-    noise = noise + placed[recording] * np.abs(whole.value[rows]) ** 2
+    has_position_scatter = p2 * (model.relative_place_slopes(point.fit) ** 2).sum(axis=0)
+    noise = noise + has_position_scatter[recording] * np.abs(whole.value[rows]) ** 2
     noise = noise + 0.5 * p2**2 * curvature.square[recording] * np.abs(value) ** 2
     pickup_noise = 2 * whole.pickup_variance[rows]
     noise = noise + pickup_noise
@@ -274,7 +274,7 @@ def held_out(
     law = result.law
     if result.answers[0].explanation is not None or law is None:
         return hold_out(problem, ranked, nothing, result.log_prior, groups(problem.lines))
-    laws = sorted((entry for entry in result.laws if result.shows(entry)), key=result.log_weight, reverse=True)
+    laws = sorted((entry for entry in result.laws if result.is_supported(entry)), key=result.log_weight, reverse=True)
     both = sorted([*laws[:_LAWS_HELD_OUT], *ranked[:_LAWS_HELD_OUT]], key=result.log_weight, reverse=True)
     return hold_out(problem, both, nothing, result.log_prior, _along(problem, law))
 
@@ -308,7 +308,7 @@ def of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation
         return []
     arguments = {
         "tried": nearest.tried,
-        "law": law.spoken.words,
+        "law": law.description.words,
         "part": "samples" if problem.lines.curves else "recordings",
         "after_percent": after.rmse_percent,
         "before_percent": before.rmse_percent,
@@ -348,7 +348,7 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
     return findings
 
 
-def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
+def has_structured_residual(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
     """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
 
     Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
@@ -367,7 +367,7 @@ def keeps_structure(problem: FittingProblem, explanation: Explanation, null: Exp
     if smooth <= max(_LEAST_STRUCTURE, _SLOW * slow):
         return False
     known = explanation.best.levels.level > _LEAST_LEVEL
-    if smooth <= _STRUCTURED * noise and not (known and left_smooth(explanation) > _PLAIN_STRUCTURE):
+    if smooth <= _STRUCTURED * noise and not (known and smooth_error_gain(explanation) > _PLAIN_STRUCTURE):
         return False
     return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
 

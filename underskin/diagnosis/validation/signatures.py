@@ -34,7 +34,7 @@ beyond what the nuisances take up, under the noise that was found. It is imitate
 it: its parameters leave too little to be named, and without any one of its mechanisms more than that is left (all to
 first order in the parameters). The prior of unlisted physics times the share of such laws that are imitated is the
 weight of those beside the set's own prior, and never more than that: laws that are more probable are fitted themselves
-(selection/unnamed_search.py).
+(selection/unlisted_search.py).
 
 Where nothing is missing as far as one can see, an unlisted law of a usual strength may still be there and not show,
 since the nuisances take it up: the prior of unlisted physics times the share of such laws stands beside that of
@@ -92,7 +92,7 @@ class Signatures:
     def __init__(self, problem: FittingProblem) -> None:
         """Predict them around the base model as declared."""
         self._problem = problem
-        self._fitter = Fitter([problem.hypothesis((), placed=False)])
+        self._fitter = Fitter([problem.hypothesis((), has_position_scatter=False)])
         point = self._fitter.begin([np.zeros((1, 0))]).points.fit[0]
         self._base = self._fitter.hypotheses[0].model.predict(point)
         self.owners: list[str] = []
@@ -108,7 +108,7 @@ class Signatures:
             if any(entry.moves_covariance for entry in parameters):
                 continue
             try:
-                hypothesis = problem.hypothesis((name,), placed=False)
+                hypothesis = problem.hypothesis((name,), has_position_scatter=False)
             except Unsupported:
                 continue
             shapes = np.array([[*own, *point] for own in _shapes(parameters)])
@@ -147,7 +147,7 @@ class Signatures:
         own, shared, beside = self._parts(levels)
         return own - shared @ np.linalg.solve(beside, shared.T), own
 
-    def taken_up(self, levels: NoiseLevels) -> Floats:
+    def project_out_parameters(self, levels: NoiseLevels) -> Floats:
         """By how much the nuisances move, in fit coordinates, to take up each signature (nuisances, signatures)."""
         _, shared, beside = self._parts(levels)
         return np.asarray(np.linalg.solve(beside, shared.T))
@@ -171,7 +171,7 @@ class Signatures:
 
     def _information(self, levels: NoiseLevels) -> Floats:
         """On the nuisances and then on every signature."""
-        hypothesis = self._problem.hypothesis((), placed=levels.position > 0)
+        hypothesis = self._problem.hypothesis((), has_position_scatter=levels.position > 0)
         fitter = Fitter([hypothesis])
         base = fitter.begin([np.zeros((1, 0))])
         gain, level, position, spread, smooth = (
@@ -179,7 +179,9 @@ class Signatures:
             for value in (levels.gain, levels.level, levels.position, levels.spread, levels.smooth)
         )
         several = SeveralLevels(gain, level, position, spread, None, smooth)
-        likelihood = Likelihoods(fitter.lines, self._problem.curvature, base.products, several, base.points.bend)
+        likelihood = Likelihoods(
+            fitter.lines, self._problem.curvature, base.products, several, base.points.sensor_log_gain
+        )
         along, square = self._products(levels.smooth if fitter.lines.curves else 0.0)
         return likelihood.information(along / levels.level**2, square / levels.level**2)[0]
 
@@ -341,7 +343,7 @@ def hidden_shifts(
 
 def _of_d33(signatures: Signatures, levels: NoiseLevels) -> Floats:
     """What ln d33 is off by for each signature (signatures,)."""
-    return signatures.taken_up(levels)[signatures.nuisances.index("d33")]
+    return signatures.project_out_parameters(levels)[signatures.nuisances.index("d33")]
 
 
 _LEAST_CHI2 = 9.0

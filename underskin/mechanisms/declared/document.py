@@ -41,7 +41,7 @@ from underskin.mechanisms.declared.mechanism import (
     together,
 )
 from underskin.mechanisms.parameter import Normal, Parameter, Prior, Uniform
-from underskin.mechanisms.unnamed.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
+from underskin.mechanisms.unlisted.vocabulary import OF_CURVES, OF_SAMPLES, ActsOn
 from underskin.recordings import validation
 from underskin.recordings.readers import json_file, plain_yaml
 from underskin.recordings.readers.sandbox import call_apart

@@ -24,9 +24,9 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.curve_state import Curve, Samples, numbers
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import Parameter
-from underskin.mechanisms.unnamed.axes import every_axis
-from underskin.mechanisms.unnamed.laws import LevelTables, log_of, log_positive
-from underskin.mechanisms.unnamed.vocabulary import ActsOn
+from underskin.mechanisms.unlisted.axes import every_axis
+from underskin.mechanisms.unlisted.laws import LevelTables, log_of, log_positive
+from underskin.mechanisms.unlisted.vocabulary import ActsOn
 from underskin.recordings.campaign import Conditions, IndentationConditions, curves_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Array, Floats

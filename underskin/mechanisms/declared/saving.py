@@ -8,9 +8,9 @@ import yaml
 
 from underskin.errors import InvalidInput
 from underskin.mechanisms.declared.document import SCHEMA
-from underskin.mechanisms.unnamed.forms import EVERYWHERE
-from underskin.mechanisms.unnamed.laws import PREFIX
-from underskin.mechanisms.unnamed.vocabulary import OF_SAMPLES
+from underskin.mechanisms.unlisted.forms import EVERYWHERE
+from underskin.mechanisms.unlisted.laws import PREFIX
+from underskin.mechanisms.unlisted.vocabulary import OF_SAMPLES
 
 _WIDER = 0.5  # of a value, or of its logarithm: the prior's sd in later campaigns
 _MARGIN = 0.05  # of the range, off its ends

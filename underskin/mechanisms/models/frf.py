@@ -53,7 +53,7 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices, Mask, to_si
 
 
-class Seeds:
+class ParameterBatch:
     """Points of fit coordinates as values in their units, with derivatives by each point's own coordinates.
 
     Attributes: `owner`, which model each point is of; `variables`, by how many the derivatives are; `position`, two
@@ -84,7 +84,7 @@ class Seeds:
         return Differentiated(self._value[points, place][:, None], slopes)
 
 
-class Acting:
+class MechanismInModels:
     """A mechanism with certain parameters, in those of several models that have it. Attribute: `has` (models,)."""
 
     def __init__(self, mechanism: Mechanism, parameters: Mapping[str, Parameter], models: int) -> None:
@@ -105,7 +105,7 @@ class Acting:
         """Whether it has one of these hooks."""
         return not self._hooks.isdisjoint(hooks)
 
-    def values(self, points: Indices, seeds: Seeds) -> Values:
+    def values(self, points: Indices, seeds: ParameterBatch) -> Values:
         """Its parameters in their units at points whose models have it."""
         values = {name: seeds.of(points, places) for name, places in self._places.items()}
         for name, other in self._relative:
@@ -137,7 +137,7 @@ class FrfModels:
         self._count = max(len(model.parameters) for model in models)
         self._log = np.zeros((len(models), self._count), dtype=bool)
         self._nuisances = {name: np.zeros(len(models), dtype=np.intp) for name in models[0].places_of_nuisances}
-        mechanisms: dict[Hashable, Acting] = {}
+        mechanisms: dict[Hashable, MechanismInModels] = {}
         self._alike: dict[Hashable, list[int]] = {}
         for number, model in enumerate(models):
             self._log[number, : len(model.parameters)] = [entry.scale == "log" for entry in model.parameters]
@@ -147,13 +147,13 @@ class FrfModels:
                 places = model.places_of(mechanism)
                 key = mechanism.name, tuple(places)
                 if key not in mechanisms:
-                    mechanisms[key] = Acting(
+                    mechanisms[key] = MechanismInModels(
                         mechanism, {name: model.parameters[at] for name, at in places.items()}, len(models)
                     )
                 mechanisms[key].add(number, places)
             self._alike.setdefault(model.structure, []).append(number)
         self._mechanisms = sorted(mechanisms.values(), key=_place_in_order)
-        self._with_hook: dict[str, list[Acting]] = {}
+        self._with_hook: dict[str, list[MechanismInModels]] = {}
 
     def respond(self, owner: Indices, fit: Floats, *, slopes: bool, place: bool, lines: bool = True) -> list[Part]:
         """The responses at points (points, parameters) of these models, in rising order of `owner`; each part holds
@@ -161,7 +161,7 @@ class FrfModels:
 
         Derivatives by the parameters and by the contact's place on request; without `lines`, no line factors.
         """
-        seeds = Seeds(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
+        seeds = ParameterBatch(fit, self._log[owner], owner, slopes=slopes, further=_POSITION if place else 0)
         edges = np.searchsorted(owner, np.arange(len(self._models) + 1))
         parts: list[Part] = []
         for members in self._alike.values():
@@ -174,10 +174,10 @@ class FrfModels:
                     parts.append((points, _response(level, inside, of_lines, seeds)))
         return parts
 
-    def _pressed(self, rows: dict[int, Indices], seeds: Seeds) -> list[tuple[Indices, Contacts]]:
+    def _pressed(self, rows: dict[int, Indices], seeds: ParameterBatch) -> list[tuple[Indices, Contacts]]:
         """The contacts of these models' points as declared and as their mechanisms change them, those of one structure
         together."""
-        sets: dict[tuple[Acting, ...], list[int]] = {}
+        sets: dict[tuple[MechanismInModels, ...], list[int]] = {}
         for number in rows:
             key = tuple(entry for entry in self._mechanisms if entry.has[number] and entry.on(*_MATERIAL))
             sets.setdefault(key, []).append(number)
@@ -201,7 +201,7 @@ class FrfModels:
             for lengths in ([len(points) for points, _ in group],)
         ]
 
-    def _contacts(self, model: FrfModel, points: Indices, seeds: Seeds) -> Contacts:
+    def _contacts(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Contacts:
         """The contacts at all force nodes, one node after another, as declared."""
         nodes, design = len(model.force), model.design
         of = {name: seeds.of(points, places) for name, places in self._nuisances.items() if name != "d33"}
@@ -214,7 +214,9 @@ class FrfModels:
             poisson_ratio=constant(model.poisson_ratio, seeds.variables, (len(points),)),
         )
 
-    def _acting(self, hook: str, points: Indices, seeds: Seeds) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
+    def _acting(
+        self, hook: str, points: Indices, seeds: ParameterBatch
+    ) -> Iterator[tuple[Mechanism, Indices | None, Values]]:
         """The mechanisms with this hook: each with those among the points whose models have it, None where all have,
         and their values."""
         if hook not in self._with_hook:
@@ -228,7 +230,7 @@ class FrfModels:
                 yield entry.mechanism, some, entry.values(points[some], seeds)
 
     def _level_and_inside(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[Differentiated, Mask]:
         """The FRF before the dynamics [C/N] and which recordings are inside the table, at points whose contacts have
         one structure; `model` is one of theirs."""
@@ -237,7 +239,7 @@ class FrfModels:
         return level, np.broadcast_to(inside, (len(points), inside.shape[-1]))[:, model.design.point]
 
     def _sigma_at_points(
-        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
     ) -> tuple[list[Differentiated], Mask]:
         """σ of each place at each force node, and which places are inside the table at all of them.
 
@@ -269,7 +271,7 @@ class FrfModels:
             contacts.stiffness = stiffness(contacts, pressed, layer)
         return SigmaOfContacts(table, contacts, model.sensor_radius, pressed, layer if contacts.layered else None)
 
-    def _offset(self, model: FrfModel, points: Indices, seeds: Seeds) -> Differentiated:
+    def _offset(self, model: FrfModel, points: Indices, seeds: ParameterBatch) -> Differentiated:
         """The distance of each place's contact from its sensor's centre [m], where positions vary, with them."""
         design = model.design
         moved = [(some, mechanism.offset(values)) for mechanism, some, values in self._acting("offset", points, seeds)]
@@ -289,7 +291,7 @@ class FrfModels:
         return chain(distance, (x.value / away, x), (y.value / away, y))
 
     def _level(
-        self, model: FrfModel, points: Indices, contacts: Contacts, sigma: list[Differentiated], seeds: Seeds
+        self, model: FrfModel, points: Indices, contacts: Contacts, sigma: list[Differentiated], seeds: ParameterBatch
     ) -> Differentiated:
         """The FRF of each recording before the dynamics [C/N]."""
         design, count = model.design, len(points)
@@ -316,7 +318,9 @@ class FrfModels:
             level = level.times(mechanism.on_recordings(design, values), some, count)
         return level
 
-    def _line_factor(self, model: FrfModel, points: Indices, contacts: Contacts, seeds: Seeds) -> Differentiated | None:
+    def _line_factor(
+        self, model: FrfModel, points: Indices, contacts: Contacts, seeds: ParameterBatch
+    ) -> Differentiated | None:
         """The complex factor of each distinct line; None where no mechanism has one."""
         product: Differentiated | None = None
         count, lines = len(points), len(model.design.line_frequency)
@@ -334,7 +338,7 @@ class FrfModels:
         return product
 
 
-def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: Seeds) -> Response:
+def _response(level: Differentiated, inside: Mask, lines: Differentiated | None, seeds: ParameterBatch) -> Response:
     """With the derivatives by the contact's place apart from the others."""
     count, place = seeds.variables - len(seeds.position), None
     if seeds.position:
@@ -344,7 +348,7 @@ def _response(level: Differentiated, inside: Mask, lines: Differentiated | None,
     return Response(Differentiated(level.value, level.slopes[:count]), place, lines, inside)
 
 
-def _place_in_order(entry: Acting) -> tuple[int, int, str]:
+def _place_in_order(entry: MechanismInModels) -> tuple[int, int, str]:
     """Of composition."""
     mechanism = entry.mechanism
     return mechanism.stage.place, mechanism.order, mechanism.name

@@ -22,11 +22,11 @@ from underskin.autodiff import Differentiated, exp
 from underskin.mechanisms.base import Kind, Stage, Values
 from underskin.mechanisms.models.curve_state import Curve, Samples
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unnamed.axes import Axis
-from underskin.mechanisms.unnamed.forms import EVERYWHERE, Feature, Shape, reference, shapes
-from underskin.mechanisms.unnamed.grammar import FrequencyLaw
-from underskin.mechanisms.unnamed.laws import PREFIX, LagLaw, RecordingLaw, Spoken, UnnamedLaw, changes
-from underskin.mechanisms.unnamed.vocabulary import ACTS_ON, AXES, ActsOn, Form
+from underskin.mechanisms.unlisted.axes import Axis
+from underskin.mechanisms.unlisted.forms import EVERYWHERE, Feature, Shape, reference, shapes
+from underskin.mechanisms.unlisted.grammar import FrequencyLaw
+from underskin.mechanisms.unlisted.laws import PREFIX, LagLaw, LawDescription, RecordingLaw, UnlistedLaw, changes
+from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, AXES, ActsOn, Form
 from underskin.units import Array, Floats
 
 _ENTERS: tuple[tuple[ActsOn, str, tuple[Form, ...]], ...] = (  # where, what it follows, and the forms it may have there
@@ -61,7 +61,7 @@ class Extent:
     turns: Mapping[str, float]
 
 
-class CurveLaw(UnnamedLaw):
+class CurveLaw(UnlistedLaw):
     """A law that changes what each sample of a curve shows."""
 
     kinds: ClassVar[tuple[Kind, ...]] = ("indentation",)
@@ -71,7 +71,7 @@ class CurveLaw(UnnamedLaw):
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, extent: Extent) -> None:
         """Bind the form to how far the curves of a campaign reach."""
         self.name = PREFIX + "__".join(filter(None, (acts_on, axis.name, shape.form, shape.variant)))
-        self.spoken = Spoken(acts_on, axis.name, shape.form)
+        self.description = LawDescription(acts_on, axis.name, shape.form)
         self.axis, self.shape = axis, shape
         self._extent = extent
         unit, share, whole = {
@@ -111,16 +111,16 @@ class _Bound:
 
     def moved(self, samples: Samples, travel: Floats) -> Floats:
         """The travel [m] at which a sphere presses."""
-        if self.law.spoken.acts_on != "position":
+        if self.law.description.acts_on != "position":
             return travel
         return travel + 1e-3 * self._change(samples, np.zeros_like(travel))
 
     def read(self, samples: Samples, force: Floats) -> Floats:
         """The force [N] that is read where the contact bears `force`."""
-        if self.law.spoken.acts_on == "position":
+        if self.law.description.acts_on == "position":
             return force
         change = self._change(samples, force)
-        return force + change if self.law.spoken.acts_on == "force" else force * (1 + change)
+        return force + change if self.law.description.acts_on == "force" else force * (1 + change)
 
     def _change(self, samples: Samples, force: Floats) -> Floats:
         features = self.law.features(samples, force, self.values)
@@ -189,7 +189,7 @@ def symbol(axis: Axis | str) -> str:
     return f"{own}/F" if isinstance(axis, Axis) and axis.relative else own
 
 
-def expression(law: UnnamedLaw, values: Numbers) -> str:
+def expression(law: UnlistedLaw, values: Numbers) -> str:
     """What the law is."""
     if isinstance(law, RecordingLaw):
         return _of_recordings(law, values)
@@ -201,7 +201,7 @@ def expression(law: UnnamedLaw, values: Numbers) -> str:
     return _of_frequency(law, values)
 
 
-def course(law: UnnamedLaw, values: Numbers, x: Floats) -> Array:
+def course(law: UnlistedLaw, values: Numbers, x: Floats) -> Array:
     """The change at values x of the axis: relative, of a force in N, of a place in mm (rows, 1 or 2), of a lag in rad
     or as an exponent; over frequency the complex factor less 1."""
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in values.items()}
@@ -219,7 +219,7 @@ def course(law: UnnamedLaw, values: Numbers, x: Floats) -> Array:
         sum(a * f for a, f in zip(amplitudes[part * len(features) :], features, strict=False)) + np.zeros(len(x))
         for part in range(parts)
     ]
-    if isinstance(law, RecordingLaw) and law.shape.logarithmic and law.spoken.acts_on != "position":
+    if isinstance(law, RecordingLaw) and law.shape.logarithmic and law.description.acts_on != "position":
         return np.exp(totals[0]) - 1
     return totals[0] if parts == 1 else np.stack(totals, axis=1)
 
@@ -296,7 +296,7 @@ def wave(law: RecordingLaw | LagLaw | CurveLaw, values: Numbers, amplitudes: lis
 
 
 def _of_recordings(law: RecordingLaw, values: Numbers) -> str:
-    acts_on, axis = law.spoken.acts_on, law.axis
+    acts_on, axis = law.description.acts_on, law.axis
     quantity = ACTS_ON[acts_on][1]
     amplitudes = [values[name] for name in law.amplitudes]
     if acts_on == "position":
@@ -336,7 +336,7 @@ def _of_lag(law: LagLaw, values: Numbers) -> str:
 def _of_curves(law: CurveLaw, values: Numbers) -> str:
     amplitudes = [values[name] for name in law.amplitudes]
     sign, size = _signed(amplitudes[0])
-    match law.spoken.form:
+    match law.description.form:
         case "power":
             over = f"{symbol(law.axis)}/{_with_unit(law.axis.high, law.axis.unit)}"
             change = f"{sign} {size}·({over})^{number(values['law_exponent'])}"
@@ -349,14 +349,14 @@ def _of_curves(law: CurveLaw, values: Numbers) -> str:
         "gain": f"F read = F·(1 {change})",
         "force": f"F read = F {change} N",
         "position": f"d = d0 {change} mm",
-    }[law.spoken.acts_on]
+    }[law.description.acts_on]
 
 
 def _of_frequency(law: FrequencyLaw, values: Numbers) -> str:
     def said(name: str) -> str:
         return number(values[name])
 
-    if law.spoken.form == "peak":
+    if law.description.form == "peak":
         change = values["law_change"]
         numerator = {"inertia": "u²", "loss": f"2i·{said('law_damping')}·u", "spring": "1"}[law.variant]
         sign, size = _signed(change)

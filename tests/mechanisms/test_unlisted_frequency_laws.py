@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.mechanisms.test_unnamed_laws import coordinates
+from tests.mechanisms.test_unlisted_laws import coordinates
 from underskin.autodiff import Differentiated
 from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.saving import document
-from underskin.mechanisms.unnamed.grammar import frequency_laws, phase_of_bump
+from underskin.mechanisms.unlisted.grammar import frequency_laws, phase_of_bump
 from underskin.units import Floats
 
 
@@ -59,10 +59,10 @@ def test_what_is_kept_of_a_law_over_frequency_is_that_law() -> None:
     for law in frequency_laws(np.geomspace(1.0, 1000.0, 30)):
         values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
         found = {"law": law.name, "parameters": values}
-        said = {"acts_on": "frequency_response", "axis": "frequency_hz", "form": law.spoken.form}
+        said = {"acts_on": "frequency_response", "axis": "frequency_hz", "form": law.description.form}
         stated = {**said, "expression": "FRF", "range": {"frequency_hz": [1.0, 1000.0]}}
         report = {"unnamed": stated, "provenance": {"unnamed": found}, "campaign": "c", "verdict": "unexplained"}
-        if law.spoken.form == "free":
+        if law.description.form == "free":
             continue
         kept = parse(document(report, "kept").encode(), "kept.yaml")
         short = {name.removeprefix("law_"): value for name, value in values.items()}

@@ -12,11 +12,11 @@ from underskin.mechanisms.declared.document import parse
 from underskin.mechanisms.declared.saving import document
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.reference_campaigns import reference_campaign
-from underskin.mechanisms.unnamed.axes import Axis, axes_of, recording_order
-from underskin.mechanisms.unnamed.expressions import course, expression
-from underskin.mechanisms.unnamed.forms import shapes
-from underskin.mechanisms.unnamed.grammar import Grammar, combination
-from underskin.mechanisms.unnamed.laws import LevelTables, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unlisted.axes import Axis, axes_of, recording_order
+from underskin.mechanisms.unlisted.expressions import course, expression
+from underskin.mechanisms.unlisted.forms import shapes
+from underskin.mechanisms.unlisted.grammar import Grammar, combination
+from underskin.mechanisms.unlisted.laws import LevelTables, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import Campaign, Conditions, FrfRecording, frf_of
 from underskin.surrogate.sigma_table import SigmaTable, load_table
 from underskin.units import Array, Floats
@@ -50,7 +50,7 @@ def lines_of(conditions: Conditions) -> Floats:
     return lines
 
 
-def of_each_combination(grammar: Grammar) -> list[UnnamedLaw]:
+def of_each_combination(grammar: Grammar) -> list[UnlistedLaw]:
     return list({(*combination(law), law.name.split("__")[-1][:3]): law for law in grammar.laws}.values())
 
 
@@ -64,7 +64,7 @@ def point(model: FrfModel, own: Sequence[float]) -> Floats:
     return fit
 
 
-def coordinates(law: UnnamedLaw, amplitude: float) -> list[float]:
+def coordinates(law: UnlistedLaw, amplitude: float) -> list[float]:
     """All amplitudes at a share of their priors' sd, what bends the law at the first of its grid."""
     count = len(law.amplitudes)
     sds = [entry.prior.sd for entry in law.parameters_bound[:count]]  # type: ignore[union-attr]
@@ -173,10 +173,10 @@ def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign:
 @pytest.mark.slow
 def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
     for law in grammar.laws[:: 1 if SOAK else 4]:
-        if not isinstance(law, RecordingLaw) or law.axis.words or law.spoken.form == "free":
+        if not isinstance(law, RecordingLaw) or law.axis.words or law.description.form == "free":
             continue
         values = {entry.name: entry.from_fit(entry.quantile(0.7)) for entry in law.parameters_bound}
-        said = {"acts_on": law.spoken.acts_on, "axis": law.axis.name, "form": law.spoken.form}
+        said = {"acts_on": law.description.acts_on, "axis": law.axis.name, "form": law.description.form}
         stated = {**said, "expression": "E", "range": {law.axis.name: [law.axis.low, law.axis.high]}}
         found = {"law": law.name, "parameters": values}
         report = {"unnamed": stated, "provenance": {"unnamed": found}, "campaign": "c", "verdict": "unexplained"}
@@ -187,7 +187,7 @@ def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> 
         axes = {law.axis.name: x, **({"preload_n": np.ones(len(x))} if law.axis.relative else {})}
         for place, expected in zip(kept.laws, exact.T, strict=True):
             told = np.broadcast_to(np.asarray(place({**short, **axes})), x.shape)
-            change = told if law.spoken.acts_on in ("force", "position") else told - 1
+            change = told if law.description.acts_on in ("force", "position") else told - 1
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 
 
@@ -229,8 +229,8 @@ def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, ta
         Conditions("many", campaign.skin, entries), lines_of(campaign), table, tuple(CATALOGUE.values()), CATALOGUE
     )
     shares = np.exp(many.log_shares)
-    added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.spoken.axis)
-    one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.spoken.axis == "order")
+    added = sum(share for law, share in zip(many.laws, shares, strict=True) if "column" in law.description.axis)
+    one = sum(share for law, share in zip(many.laws, shares, strict=True) if law.description.axis == "order")
     assert added < 2 * one
 
 

@@ -25,10 +25,18 @@ from underskin.mechanisms.base import Mechanism, Stage, Values
 from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unnamed.axes import BUILT_IN, Axis, axes_of, every_axis
-from underskin.mechanisms.unnamed.forms import Shape, constant, shapes
-from underskin.mechanisms.unnamed.laws import LAG_KINDS, PREFIX, LagLaw, LevelTables, RecordingLaw, Spoken, UnnamedLaw
-from underskin.mechanisms.unnamed.vocabulary import ActsOn, Form
+from underskin.mechanisms.unlisted.axes import BUILT_IN, Axis, axes_of, every_axis
+from underskin.mechanisms.unlisted.forms import Shape, constant, shapes
+from underskin.mechanisms.unlisted.laws import (
+    LAG_KINDS,
+    PREFIX,
+    LagLaw,
+    LawDescription,
+    LevelTables,
+    RecordingLaw,
+    UnlistedLaw,
+)
+from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Mask
@@ -52,7 +60,7 @@ class _Law:
     share: float = 1.0
 
 
-class FrequencyLaw(UnnamedLaw):
+class FrequencyLaw(UnlistedLaw):
     """One of them, with the band that it was found in."""
 
     stage = Stage.LINES
@@ -61,7 +69,7 @@ class FrequencyLaw(UnnamedLaw):
     def __init__(self, law: _Law, middle: float) -> None:
         """`middle` of the band [Hz], to which powers refer."""
         self.name = "__".join([f"{PREFIX}frequency_response", "frequency_hz", law.form, law.variant])
-        self.spoken = Spoken("frequency_response", "frequency_hz", law.form)
+        self.description = LawDescription("frequency_response", "frequency_hz", law.form)
         self.variant = law.variant
         self.share = law.share
         self.amplitudes = tuple(entry.name for entry in law.amplitudes)
@@ -270,7 +278,7 @@ _OF_LEVELS: tuple[ActsOn, ...] = ("gain", "modulus", "thickness", "contact_radiu
 class Grammar:
     """The laws of one campaign, by combination of where, what and form, and the log prior share of each law."""
 
-    laws: Sequence[UnnamedLaw]
+    laws: Sequence[UnlistedLaw]
     log_shares: Floats  # (laws,)
 
     @classmethod
@@ -284,7 +292,7 @@ class Grammar:
     ) -> "Grammar":
         """Of FRFs at these distinct lines [Hz]; `beside` mechanisms for which σ has room. What one of those `named`
         does exactly is no law."""
-        laws: list[UnnamedLaw] = []
+        laws: list[UnlistedLaw] = []
         shares: list[float] = []
         axes = axes_of(conditions) if len(conditions.recordings) >= _LEAST_RECORDINGS else []
         columns = [axis for axis in axes if axis.name not in BUILT_IN]
@@ -302,17 +310,17 @@ class Grammar:
         return cls([*laws, *over_frequency], np.append(log_shares, np.log(own)))
 
 
-def combination(law: UnnamedLaw) -> tuple[str, str, str]:
+def combination(law: UnlistedLaw) -> tuple[str, str, str]:
     """Where it enters, what it follows, and its form."""
-    return law.spoken.acts_on, law.spoken.axis, law.spoken.form
+    return law.description.acts_on, law.description.axis, law.description.form
 
 
-def _share(law: UnnamedLaw) -> float:
-    return _ACTS_ON[law.spoken.acts_on] * _FORMS[law.spoken.form] * law.share
+def _share(law: UnlistedLaw) -> float:
+    return _ACTS_ON[law.description.acts_on] * _FORMS[law.description.form] * law.share
 
 
-def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, named: Collection[str]) -> list[UnnamedLaw]:
-    each: list[UnnamedLaw] = []
+def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
+    each: list[UnlistedLaw] = []
     for shape in shapes(axis):
         each += [
             RecordingLaw(acts_on, axis, shape, tables)
@@ -327,7 +335,7 @@ def _over_recordings(axis: Axis, lines: Floats, tables: LevelTables, named: Coll
     return each
 
 
-def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, named: Collection[str]) -> list[UnnamedLaw]:
+def _constants(axis: Axis, axes: Sequence[Axis], tables: LevelTables, named: Collection[str]) -> list[UnlistedLaw]:
     """Changes that are the same in all recordings, on the axis that shows them best."""
     available = {entry.name for entry in axes}
     return [
@@ -353,8 +361,8 @@ OF_ONE_CAMPAIGN = ("order",)  # axes that say nothing of other recordings
 
 
 def bound_to(
-    law: UnnamedLaw, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]
-) -> tuple[UnnamedLaw, Mask]:
+    law: UnlistedLaw, conditions: Conditions, table: SigmaTable, beside: Sequence[Mechanism]
+) -> tuple[UnlistedLaw, Mask]:
     """The law on these recordings, and which of them (recordings,) lie in its range.
 
     A recording beyond the range, or that does not say where it lies, is predicted at the range's end.

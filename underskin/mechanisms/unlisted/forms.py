@@ -15,8 +15,8 @@ import numpy as np
 from underskin.autodiff import Differentiated, exp, where
 from underskin.mechanisms.base import Values
 from underskin.mechanisms.parameter import Normal, Parameter, Uniform
-from underskin.mechanisms.unnamed.axes import Axis
-from underskin.mechanisms.unnamed.vocabulary import Form
+from underskin.mechanisms.unlisted.axes import Axis
+from underskin.mechanisms.unlisted.vocabulary import Form
 from underskin.units import Floats
 
 Feature = Differentiated | Floats

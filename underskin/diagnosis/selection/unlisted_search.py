@@ -36,15 +36,15 @@ from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.parameter import Normal, Parameter
 from underskin.mechanisms.registry import CATALOGUE
-from underskin.mechanisms.unnamed.axes import Axis
-from underskin.mechanisms.unnamed.expressions import CurveLaw, Extent, curve_laws, of_samples
-from underskin.mechanisms.unnamed.forms import Shape
-from underskin.mechanisms.unnamed.grammar import FrequencyLaw, Grammar, combination
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
+from underskin.mechanisms.unlisted.axes import Axis
+from underskin.mechanisms.unlisted.expressions import CurveLaw, Extent, curve_laws, of_samples
+from underskin.mechanisms.unlisted.forms import Shape
+from underskin.mechanisms.unlisted.grammar import FrequencyLaw, Grammar, combination
+from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.recordings.campaign import curves_of
 from underskin.units import Array, Floats, Indices
 
-Law = TypeVar("Law", bound=UnnamedLaw)
+Law = TypeVar("Law", bound=UnlistedLaw)
 _USUAL_CHANGE = np.array([1.0])  # times the sd of each amplitude's prior
 
 
@@ -53,7 +53,7 @@ class Score:
     """What a law gains in log evidence on top of an explanation; where it gains most, its amplitudes over the sds of
     their priors, and what bends it; `others` are fit coordinates elsewhere from which a fit may begin as well."""
 
-    law: UnnamedLaw
+    law: UnlistedLaw
     gain: float
     log_share: float
     amplitudes: Floats
@@ -123,7 +123,7 @@ class Screening:
             laws = zip(grammar.laws, grammar.log_shares.tolist(), strict=True)
             return [(law, log_share) for law, log_share in laws if isinstance(law, kind)]
 
-        self._of_recordings = _Group.of(some(RecordingLaw), lambda law: law.spoken.acts_on)
+        self._of_recordings = _Group.of(some(RecordingLaw), lambda law: law.description.acts_on)
         self._over_frequency = _Group.of(some(FrequencyLaw), lambda _: "")
         self._lags = _Group.of(some(LagLaw), lambda law: law.kind)
 
@@ -136,7 +136,7 @@ class Screening:
         residual = GainResidual(self._problem, explanation)
         for group in self._of_recordings:
             features = np.concatenate([self._features_of(law) for law in group.laws])
-            columns = self._sensitivity[group.laws[0].spoken.acts_on].T
+            columns = self._sensitivity[group.laws[0].description.acts_on].T
             changes = np.concatenate([features * column[:, None] for column in columns], axis=2)
             changes *= group.scale[:, None]
             yield from group.scores(residual.gains(changes, _USUAL_CHANGE), residual.amplitudes(changes))
@@ -162,7 +162,7 @@ class Screening:
     @cached_property
     def _sensitivity(self) -> dict[str, Floats]:
         """∂ ln level by the features of laws that act on this (recordings, 1 or 2)."""
-        laws = {law.spoken.acts_on: law for group in self._of_recordings for law in group.laws[:1]}
+        laws = {law.description.acts_on: law for group in self._of_recordings for law in group.laws[:1]}
         return {acts_on: law.sensitivity(self._ids) for acts_on, law in laws.items()}
 
     def _lag(self, law: LagLaw) -> Floats:
@@ -206,7 +206,7 @@ def grid_values(bending: Sequence[Parameter], grid: Floats) -> dict[str, Differe
     return values
 
 
-def prior_deviations(law: UnnamedLaw) -> Floats:
+def prior_deviations(law: UnlistedLaw) -> Floats:
     """Of the amplitudes (amplitudes,)."""
     priors = [entry.prior for entry in law.parameters_bound[: len(law.amplitudes)]]
     return np.array([prior.sd for prior in priors if isinstance(prior, Normal)])
@@ -301,7 +301,7 @@ class CurveScreening:
     def _changes(law: CurveLaw, samples: Samples, force: Floats, stiffness: Floats) -> Floats:
         """What each feature changes in the force by an amplitude of its prior's deviation (grid, features, samples)."""
         values = {name: of_samples(value) for name, value in grid_values(law.shape.bending, law.grid).items()}
-        unit = {"force": np.ones_like(force), "position": stiffness}.get(law.spoken.acts_on, force)
+        unit = {"force": np.ones_like(force), "position": stiffness}.get(law.description.acts_on, force)
         each = []
         for feature, deviation in zip(
             law.features(samples, force[None, :, None], values), prior_deviations(law), strict=True
@@ -335,7 +335,7 @@ _INTEGRATED, _WITHIN = 4, 6.0
 def with_laws(problem: FittingProblem, search: Search) -> list[Explanation]:
     """The explanations that hold a law, fitted, of those that may matter; none of recordings that show too little."""
     nothing = next(entry for entry in search.explanations if not entry.names)
-    ranked = sorted((entry for entry in search.explanations if search.shows(entry)), key=search.log_weight)[::-1]
+    ranked = sorted((entry for entry in search.explanations if search.is_supported(entry)), key=search.log_weight)[::-1]
     screening = _screening(problem, nothing, ranked[0])
     if screening is None:
         return []
@@ -479,7 +479,7 @@ class NearestLaw:
 def nearest_law(problem: FittingProblem, search: Search) -> NearestLaw | None:
     """Of recordings that no law that shows describes; None where none could be."""
     nothing = next(entry for entry in search.explanations if not entry.names)
-    best = max((entry for entry in search.explanations if search.shows(entry)), key=search.log_weight)
+    best = max((entry for entry in search.explanations if search.is_supported(entry)), key=search.log_weight)
     screening = _screening(problem, nothing, best)
     if screening is None:
         return None
@@ -492,10 +492,10 @@ def nearest_law(problem: FittingProblem, search: Search) -> NearestLaw | None:
     return NearestLaw(tried, max(fitted, key=lambda entry: entry.log_evidence, default=None))
 
 
-def law_of(problem: FittingProblem, explanation: Explanation) -> UnnamedLaw | None:
+def law_of(problem: FittingProblem, explanation: Explanation) -> UnlistedLaw | None:
     """The law that an explanation holds."""
     for name in explanation.names:
         mechanism = problem.lines.mechanisms[name]
-        if isinstance(mechanism, UnnamedLaw):
+        if isinstance(mechanism, UnlistedLaw):
             return mechanism
     return None

@@ -22,15 +22,15 @@ from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.planning.rig_limits import RigLimits
 from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, rounded
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.unnamed_search import law_of
+from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
 from underskin.findings.formatting import in_percent
-from underskin.mechanisms.unnamed.axes import Axis
-from underskin.mechanisms.unnamed.expressions import CurveLaw, course, expression, wave
-from underskin.mechanisms.unnamed.forms import EVERYWHERE
-from underskin.mechanisms.unnamed.grammar import FrequencyLaw
-from underskin.mechanisms.unnamed.laws import LagLaw, RecordingLaw, UnnamedLaw
-from underskin.mechanisms.unnamed.vocabulary import AXES
+from underskin.mechanisms.unlisted.axes import Axis
+from underskin.mechanisms.unlisted.expressions import CurveLaw, course, expression, wave
+from underskin.mechanisms.unlisted.forms import EVERYWHERE
+from underskin.mechanisms.unlisted.grammar import FrequencyLaw
+from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
+from underskin.mechanisms.unlisted.vocabulary import AXES
 from underskin.recordings.campaign import FrfConditions, frf_of
 from underskin.units import Floats
 
@@ -47,7 +47,7 @@ SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
 class LeadingLaw:
     """The law of an explanation that leads, its parameters in their units, and the quadratic around them."""
 
-    law: UnnamedLaw
+    law: UnlistedLaw
     values: Mapping[str, float]
     explanation: Explanation
 
@@ -71,9 +71,9 @@ class LeadingLaw:
     @property
     def form(self) -> str:
         """A peak of negative size is a notch; that of a place or of a lag has a direction and no such sign."""
-        if self.law.spoken.form == "peak" and self.values.get("law_change", 0.0) < 0:
+        if self.law.description.form == "peak" and self.values.get("law_change", 0.0) < 0:
             return "notch"
-        return self.law.spoken.form
+        return self.law.description.form
 
     @property
     def axis(self) -> Axis | None:
@@ -148,8 +148,8 @@ def unnamed(
     before, after = cross_validation.total(groups)
     low, high = leading.ends
     return {
-        "acts_on": leading.law.spoken.acts_on,
-        "axis": leading.law.spoken.axis,
+        "acts_on": leading.law.description.acts_on,
+        "axis": leading.law.description.axis,
         "form": leading.form,
         "expression": expression(leading.law, leading.values),
         "parameters": _parameters(leading),
@@ -194,7 +194,7 @@ def _places(axis: Axis, most: int) -> Floats:
 
 
 def _range_name(leading: LeadingLaw) -> str:
-    name = leading.law.spoken.axis
+    name = leading.law.description.axis
     if name in SHOWN_AS_HOURS:
         return f"{name}_h"
     return f"{name}_over_own" if leading.axis is not None and leading.axis.relative else name
@@ -209,14 +209,14 @@ def _range(leading: LeadingLaw, low: float, high: float) -> list[Any]:
 def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str, str, str]:
     leading = LeadingLaw.of(problem, explanation)
     assert leading is not None
-    return leading.law.spoken.acts_on, leading.law.spoken.axis, leading.form
+    return leading.law.description.acts_on, leading.law.description.axis, leading.form
 
 
 def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
     """Of each combination in all of them, the largest first."""
     weights: dict[tuple[str, str, str], float] = {}
     for entry in search.laws:
-        if search.shows(entry):
+        if search.is_supported(entry):
             key = _combination(problem, entry)
             weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(entry)))
     total = np.logaddexp.reduce(list(weights.values()))
@@ -259,7 +259,7 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
 
 def outweighed(search: Search) -> bool:
     """Whether a smooth course of no form is much more probable than all laws together."""
-    laws = [search.log_weight(entry) for entry in search.laws if search.shows(entry)]
+    laws = [search.log_weight(entry) for entry in search.laws if search.is_supported(entry)]
     processes = [weight for _, weight in search.processes_showing]
     if not laws or not processes:
         return False

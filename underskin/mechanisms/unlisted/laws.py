@@ -25,9 +25,9 @@ from underskin.mechanisms.models.contact_state import Contacts
 from underskin.mechanisms.models.frf import FrfModel
 from underskin.mechanisms.models.frf_design import FrfDesign
 from underskin.mechanisms.parameter import Normal, Parameter
-from underskin.mechanisms.unnamed.axes import Axis
-from underskin.mechanisms.unnamed.forms import Feature, Shape
-from underskin.mechanisms.unnamed.vocabulary import ActsOn, Form, acted_on, followed
+from underskin.mechanisms.unlisted.axes import Axis
+from underskin.mechanisms.unlisted.forms import Feature, Shape
+from underskin.mechanisms.unlisted.vocabulary import ActsOn, Form, acted_on, followed
 from underskin.recordings.campaign import Conditions, frf_of
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Array, Floats, Indices
@@ -196,7 +196,7 @@ _EXPONENTS = np.array([[-2.0], [-1.0], [-0.5], [0.0], [0.5], [1.0], [2.0]])
 
 
 @dataclass(frozen=True, eq=False)
-class Spoken:
+class LawDescription:
     """What a report says of a law: where it enters, what it follows, its form."""
 
     acts_on: ActsOn
@@ -209,8 +209,8 @@ class Spoken:
         return f"{acted_on(self.acts_on, self.axis)} over {followed(self.axis)}, {self.form}"
 
 
-class UnnamedLaw(Mechanism):
-    """What all laws share. Attributes: `spoken`, `share` of the prior of its combination, `grid` of values of
+class UnlistedLaw(Mechanism):
+    """What all laws share. Attributes: `description`, `share` of the prior of its combination, `grid` of values of
     what bends it (points, parameters), and `amplitudes`, the names of its other parameters."""
 
     plain = "Nobody listed it."
@@ -220,7 +220,7 @@ class UnnamedLaw(Mechanism):
     kinds: ClassVar[tuple[Kind, ...]] = ("frf",)
     axes: ClassVar[tuple[str, ...]] = ()
     begins_at_guesses = True
-    spoken: Spoken
+    description: LawDescription
     share: float
     grid: Floats
     amplitudes: tuple[str, ...]
@@ -243,10 +243,10 @@ class UnnamedLaw(Mechanism):
 
 def in_plain_words(mechanism: Mechanism) -> str:
     """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
-    return mechanism.spoken.words if isinstance(mechanism, UnnamedLaw) else mechanism.name
+    return mechanism.description.words if isinstance(mechanism, UnlistedLaw) else mechanism.name
 
 
-class RecordingLaw(UnnamedLaw):
+class RecordingLaw(UnlistedLaw):
     """A law that changes the level of each recording: by its gain, what is pressed, how hard, or where."""
 
     stage = Stage.RECORDING
@@ -256,7 +256,7 @@ class RecordingLaw(UnnamedLaw):
     def __init__(self, acts_on: ActsOn, axis: Axis, shape: Shape, tables: LevelTables) -> None:
         """Bind the form to the axis of a campaign and to its levels."""
         self.name = _name(acts_on, axis, shape)
-        self.spoken = Spoken(acts_on, axis.name, shape.form)
+        self.description = LawDescription(acts_on, axis.name, shape.form)
         self.axis, self.shape = axis, shape
         self.share = shape.share
         self._acts_on, self.tables = acts_on, tables
@@ -365,7 +365,7 @@ def _name(acts_on: ActsOn, axis: Axis, shape: Shape, variant: str = "") -> str:
     return PREFIX + "__".join(filter(None, (acts_on, axis.name, relative, shape.form, variant, shape.variant)))
 
 
-class LagLaw(UnnamedLaw):
+class LagLaw(UnlistedLaw):
     """A response that lags, or whose lines fall off, by something that follows an axis of the recordings.
 
     `kind`: an angle, the same at all frequencies; a delay, ∝ f; a power (if)^n; the corner of a high pass. Of the lag φ
@@ -379,7 +379,7 @@ class LagLaw(UnnamedLaw):
     def __init__(self, kind: LagKind, axis: Axis, shape: Shape, lines: Floats) -> None:
         """Over the band of these lines [Hz]."""
         self.name = _name("frequency_response", axis, shape, kind)
-        self.spoken = Spoken("frequency_response", axis.name, shape.form)
+        self.description = LawDescription("frequency_response", axis.name, shape.form)
         self.axis, self.shape, self.kind = axis, shape, kind
         self.share = shape.share / len(LAG_KINDS)
         self.lowest_hz, self.highest_hz = float(lines[0]), float(lines[-1])
