@@ -138,9 +138,8 @@ def test_import_tells_them(own_server: Server, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("document", "told"), [(BOTH, [YEAR, PLACE]), (COMPRESSION, [YEAR])])
-def test_the_upload_page_tells_them_before_anything_is_kept(
-    document: dict[str, Any], told: list[str], own_server: Server
-) -> None:
+def test_upload_page_tells_before_anything_kept(document: dict[str, Any], told: list[str], own_server: Server) -> None:
+    """The upload page tells them before anything is kept."""
     with httpx.Client(base_url=own_server.url, headers=BROWSING, timeout=60) as browser:
         form = {"form_token": token_of(browser.get("/upload").text)}
         files = {"file": ("again.json", json.dumps({**document, "name": "looked at"}).encode())}

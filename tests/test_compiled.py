@@ -22,11 +22,13 @@ for function in (log_likelihoods, sigma_rows):
 """
 
 
-def test_what_set_up_compiled_is_loaded_and_not_compiled_again() -> None:
+def test_set_up_compiled_loaded_not_compiled() -> None:
+    """What set up compiled is loaded and not compiled again."""
     subprocess.run([sys.executable, "-m", "underskin.compiled"], check=True)
     subprocess.run([sys.executable, "-c", _LOADED], check=True)
 
 
-def test_the_command_line_and_small_tables_do_without() -> None:
+def test_command_line_small_tables() -> None:
+    """The command line and small tables do without."""
     small = "import sys, underskin.cli.app; from underskin import load_table; load_table().sigma([0.5, 1.0], 0.5, 0.01)"
     subprocess.run([sys.executable, "-c", f"{small}; assert 'numba' not in sys.modules"], check=True)

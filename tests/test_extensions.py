@@ -105,14 +105,17 @@ def test_one_that_keeps_the_contract_is_taken() -> None:
         ({"parameters": lambda *_: None}, "parameters", "tuple"),
     ],
 )
-def test_the_field_that_breaks_the_contract_is_named(attributes: dict[str, Any], field: str, allowed: str) -> None:
+def test_field_breaks_contract_named(attributes: dict[str, Any], field: str, allowed: str) -> None:
+    """The field that breaks the contract is named."""
     with pytest.raises(InvalidInput) as refusal:
         check(changed(**attributes), built_in())
     assert refusal.value.field == field
     assert allowed in refusal.value.allowed
 
 
-def test_a_law_that_is_not_finite_at_a_bound_is_refused_there() -> None:
+def test_law_not_finite_bound_refused() -> None:
+    """A law that is not finite at a bound is refused there."""
+
     class Diverging(LowPass):
         def parameters(self, conditions: Conditions, kind: Kind = "frf") -> tuple[Parameter, ...]:
             """From a limit at which the law divides by zero."""
@@ -132,7 +135,8 @@ def test_two_parameters_of_one_name_are_refused() -> None:
         check(changed(parameters=lambda *_: twice), built_in())
 
 
-def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
+def test_second_spread_sensors_gains_refused() -> None:
+    """A second spread of the sensors gains is refused."""
     attributes: dict[str, Any] = {
         "stage": Stage.SENSOR,
         "moves_predictions": False,
@@ -144,7 +148,8 @@ def test_a_second_spread_of_the_sensors_gains_is_refused() -> None:
         check(changed(**attributes), built_in())
 
 
-def test_charges_of_several_mechanisms_add_their_variances() -> None:
+def test_charges_several_mechanisms_add() -> None:
+    """Charges of several mechanisms add their variances."""
     one = Pickup(np.array([0, 2]), lambda values: 3.0 * values["q"] * np.ones(2))
     two = Pickup(np.array([2, 5]), lambda values: 4.0 * values["q"] * np.ones(2))
     both = together([one, two])
@@ -156,7 +161,8 @@ def test_charges_of_several_mechanisms_add_their_variances() -> None:
     assert together([]) is None
 
 
-def test_the_page_lists_all_that_a_mechanism_may_state() -> None:
+def test_page_lists_mechanism_state() -> None:
+    """The page lists all that a mechanism may state."""
     page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
     traits = [name for name in vars(Mechanism)["__annotations__"] if not name.startswith("_")]
     for name in (*UNITS, *AXES, *NEEDED_FIELDS, *Stage.__members__, *traits, *get_args(ActsOn), *get_args(Kind)):
@@ -183,7 +189,8 @@ class Other(Ageing):
 @pytest.mark.parametrize(
     "command", first(1, [["serve", "--port", "0"], ["diagnose", "examples/campaigns/2017-07.json"]])
 )
-def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(command: list[str], tmp_path: Path) -> None:
+def test_command_line_start_service_say_refused(command: list[str], tmp_path: Path) -> None:
+    """The command line and the start of the service say what is refused."""
     folder = installed(tmp_path / "site", GROUP, "Other", TAKEN)
     if command[0] == "diagnose":
         command = [*command, "--output-dir", str(tmp_path / "reports")]
@@ -202,9 +209,10 @@ def test_the_command_line_and_the_start_of_the_service_say_what_is_refused(comma
         ("", "the entry point lab_tools:Other", "AttributeError: module 'lab_tools' has no attribute 'Other'"),
     ],
 )
-def test_a_module_that_cannot_be_imported_is_refused(
+def test_module_cannot_imported_refused(
     source: str, field: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """A module that cannot be imported is refused."""
     monkeypatch.syspath_prepend(installed(tmp_path, "underskin.test", "Other", source))
     monkeypatch.delitem(sys.modules, "lab_tools", raising=False)
     with pytest.raises(ExtensionError) as refusal:
@@ -214,7 +222,8 @@ def test_a_module_that_cannot_be_imported_is_refused(
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
 
 
-def test_without_other_packages_the_catalogue_is_that_of_this_one() -> None:
+def test_without_packages_catalogue() -> None:
+    """Without other packages the catalogue is that of this one."""
     assert tuple(CATALOGUE.values()) == built_in()
     assert CATALOGUE.packages == {}
 
@@ -249,7 +258,8 @@ if __name__ == "__main__":
 
 
 @pytest.mark.slow
-def test_one_of_another_package_is_composed_drawn_adopted_and_found_by_worker_processes(tmp_path: Path) -> None:
+def test_package_composed_drawn_adopted_found(tmp_path: Path) -> None:
+    """One of another package is composed drawn adopted and found by worker processes."""
     site = tmp_path / "site"
     shutil.copytree(EXAMPLE / "lab_skin", site / "lab_skin")
     (site / "lab_skin-1.0.dist-info").mkdir()

@@ -114,9 +114,8 @@ def test_workers_end_with_what_started_them(
 
 
 @pytest.mark.slow
-def test_reports_are_the_same_bytes_whatever_the_number_of_processes_and_threads_and_whichever_is_killed(
-    files: list[Path], tmp_path: Path
-) -> None:
+def test_reports_bytes_whatever_number_processes(files: list[Path], tmp_path: Path) -> None:
+    """Reports are the same bytes whatever the number of processes and threads and whichever is killed."""
     found = []
     for workers, threads in ((1, "1"), (2, "2")):
         folder = tmp_path / str(workers)

@@ -81,7 +81,8 @@ def test_its_line_and_column_are_told(text: str, key: str, line: int, column: in
     assert repeated_key(text.encode()) == (key, f"line {line}, column {column}")
 
 
-def test_the_search_costs_less_than_parsing_numbers_does() -> None:
+def test_search_costs_less_parsing_numbers() -> None:
+    """The search costs less than parsing numbers does."""
     numbers = [n / 7 for n in range(100_000)]
     document = orjson.dumps([{"frequency_hz": numbers, "frf_re_pc_per_n": numbers, "frf_im_pc_per_n": numbers}])
     assert len(document) > 5e6
@@ -94,7 +95,8 @@ def test_the_search_costs_less_than_parsing_numbers_does() -> None:
     assert min(seconds(repeated_key) for _ in range(5)) < 0.5 * min(seconds(orjson.loads) for _ in range(5))
 
 
-def test_every_route_that_takes_json_refuses_a_repeated_key(http: httpx.Client) -> None:
+def test_every_route_takes_json_refuses_repeated(http: httpx.Client) -> None:
+    """Every route that takes json refuses a repeated key."""
     paths = http.get("/openapi.json").json()["paths"]
     routes = [
         (method, path.replace("{", "").replace("}", ""))
@@ -139,7 +141,8 @@ def test_a_problem_says_what_comes_twice(http: httpx.Client) -> None:
 
 
 @pytest.mark.slow
-def test_the_command_line_names_file_line_and_column(tmp_path: Path) -> None:
+def test_command_line_names_file_line_column(tmp_path: Path) -> None:
+    """The command line names file line and column."""
     (tmp_path / "monday.json").write_text(TWICE)
     found = preloaded.run("d33", "monday.json", folder=tmp_path)
     assert found.returncode == 2

@@ -12,19 +12,22 @@ def upper(mention: Mention) -> str:
     return mention.field.upper()
 
 
-def test_mentions_are_worded_apart_from_the_rest_of_the_sentence() -> None:
+def test_mentions_worded_apart_rest_sentence() -> None:
+    """Mentions are worded apart from the rest of the sentence."""
     requirement = Requirement("must have 3 rows, as many as ", Mention("preload_n"), "; preload_n is a name")
     assert requirement == "must have 3 rows, as many as preload_n; preload_n is a name"
     assert requirement.worded(upper) == "must have 3 rows, as many as PRELOAD_N; preload_n is a name"
     assert orjson.loads(orjson.dumps({"allowed": requirement})) == {"allowed": str(requirement)}
 
 
-def test_requirements_are_joined_with_their_mentions() -> None:
+def test_requirements_joined_mentions() -> None:
+    """Requirements are joined with their mentions."""
     inner = Requirement("say a sign for ", Mention("force_n"))
     assert Requirement(Mention("time_s"), ": ", inner).worded(upper) == "TIME_S: say a sign for FORCE_N"
 
 
-def test_what_is_unlikely_is_known_without_reading_the_sentence() -> None:
+def test_unlikely_known_without_reading_sentence() -> None:
+    """What is unlikely is known without reading the sentence."""
     with pytest.raises(InvalidInput) as refused:
         checked("thickness_mm", 2500.0)
     assert isinstance(refused.value.allowed, Requirement)

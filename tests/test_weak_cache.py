@@ -15,7 +15,8 @@ class Made:
     number = 1
 
 
-def test_a_result_is_worked_out_once_for_each_object_and_argument_and_ends_with_the_object() -> None:
+def test_result_worked_out_once_object_argument() -> None:
+    """A result is worked out once for each object and argument and ends with the object."""
     calls: list[int] = []
 
     @cached_while_alive

@@ -43,7 +43,8 @@ def test_frf_agrees_with_the_service(server_url: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
+def test_d33_no_sensor_answered_named() -> None:
+    """A d33 that no sensor has is answered and named."""
     for frf, said in (("7400", "more than sensors have"), ("0.0074", "less than sensors have"), ("-7.4", "negative")):
         found = run("d33", *SKIN, "--preload-n", "1", "--frf-pc-per-n", frf)
         assert found.returncode == 0
@@ -51,7 +52,8 @@ def test_a_d33_that_no_sensor_has_is_answered_and_named() -> None:
 
 
 @pytest.mark.slow
-def test_d33_takes_back_what_frf_gave_through_csv() -> None:
+def test_d33_takes_back_frf_gave_through_csv() -> None:
+    """D33 takes back what frf gave through csv."""
     frf = columns(*FRF, "--preload-n", "1,3")["frf_pc_per_n"]
     table = f"preload_n,frf_pc_per_n\n1,{frf[0]}\n\n3,{frf[1]}\n"
     back = columns("d33", *SKIN, "--input", "-", "--frf-uncertainty-pc-per-n", "0.074", given=table)
@@ -72,7 +74,8 @@ def test_sigma_of_both_models() -> None:
 
 
 @pytest.mark.slow
-def test_table_shows_units_and_what_a_status_means() -> None:
+def test_table_shows_units_status_means() -> None:
+    """Table shows units and what a status means."""
     shown = run(*FRF, "--preload-n", "1,300").stdout
     for text in (
         "thickness h",
@@ -167,7 +170,8 @@ def test_bad_csv_is_one_line_and_status_2(text: str, says: str) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_read_otherwise_than_headed_or_left_out_is_told() -> None:
+def test_read_otherwise_headed_left_out_told() -> None:
+    """What is read otherwise than headed or left out is told."""
     table = "preload_n,indenter_diameter_mm,frf_pc_per_n\n1,8,7\n\nmeasured by mb, in the cold room\n"
     found = run("d33", *SKIN[:6], "--input", "-", "--csv", given=table)
     assert found.stderr.splitlines() == [
@@ -184,7 +188,8 @@ def test_missing_table_says_what_to_do(tmp_path: Path) -> None:
     assert "sigma.h5 cannot be read: No such file or directory. Restore it" in line
 
 
-def test_help_lists_all_commands_without_loading_them() -> None:
+def test_help_lists_commands_without_loading() -> None:
+    """Help lists all commands without loading them."""
     report = run("--help", PYTHONPROFILEIMPORTTIME="1")
     for command in ("sigma", "frf", "d33", "serve", "key", "tablegen"):
         assert command in report.stdout
@@ -201,7 +206,8 @@ def test_units_stand_in_the_help() -> None:
 
 
 @pytest.mark.slow
-def test_commands_of_other_packages_get_their_arguments(tmp_path: Path) -> None:
+def test_commands_packages_get_arguments(tmp_path: Path) -> None:
+    """Commands of other packages get their arguments."""
     made = run("key", "create", "bench-1", UNDERSKIN_DATA=str(tmp_path))
     assert (made.returncode, made.stderr) == (0, "")
     assert "bench-1" in run("key", "list", UNDERSKIN_DATA=str(tmp_path)).stdout
@@ -223,7 +229,8 @@ def test_reader_that_goes_away() -> None:
 
 
 @pytest.mark.slow
-def test_python_m_on_a_terminal_without_greek_letters() -> None:
+def test_python_m_terminal_without_greek_letters() -> None:
+    """Python m on a terminal without greek letters."""
     shown = subprocess.run(
         [sys.executable, "-m", "underskin", "sigma", "--a-over-h", "0.3", "--rt-over-h", "0.6"],
         env=os.environ | {"PYTHONIOENCODING": "ascii"},
@@ -235,7 +242,8 @@ def test_python_m_on_a_terminal_without_greek_letters() -> None:
 
 
 @pytest.mark.slow
-def test_columns_come_from_a_sheet_of_a_workbook_by_its_name(tmp_path: Path) -> None:
+def test_columns_come_sheet_workbook_name(tmp_path: Path) -> None:
+    """Columns come from a sheet of a workbook by its name."""
     book = openpyxl.Workbook()
     book.active.append(["measured by", "mb"])
     sheet = book.create_sheet("Day 2")

@@ -69,7 +69,8 @@ def test_csv_has_the_inversions_numbers(palm: Campaign, file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_table_shows_array_sensors_band_and_what_is_left_out(palm: Campaign, file: Path) -> None:
+def test_table_shows_array_sensors_band_left(palm: Campaign, file: Path) -> None:
+    """The table shows array sensors band and what is left out."""
     shown = run("d33", str(file)).stdout
     found = invert(palm, load_table())
     assert f"palm ({file})" in shown
@@ -92,7 +93,8 @@ def test_a_band_of_ones_own(file: Path) -> None:
 
 
 @pytest.mark.slow
-def test_unreadable_files_and_recordings_are_named_and_the_others_inverted(palm: Campaign, tmp_path: Path) -> None:
+def test_unreadable_files_recordings_named(palm: Campaign, tmp_path: Path) -> None:
+    """Unreadable files and recordings are named and the others inverted."""
     document = json.loads(json_file.write(palm))
     document["recordings"][3]["preload_n"] = -1
     (tmp_path / "one.json").write_text(json.dumps(document))
@@ -133,7 +135,8 @@ def test_a_campaign_that_tells_nothing_says_why(palm: Campaign, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_instrument_files_need_a_rig_and_tell_the_modulus(tmp_path: Path) -> None:
+def test_instrument_files_need_rig_tell_modulus(tmp_path: Path) -> None:
+    """Instrument files need a rig and tell the modulus."""
     (tmp_path / "block.csv").write_text(CURVE)
     rig = tmp_path / "rig.yaml"
     text = (EXAMPLES / "rigs" / "silicone-compression.yaml").read_text()
@@ -188,7 +191,8 @@ def test_values_in_the_wrong_unit_are_a_finding(palm: Campaign, tmp_path: Path) 
 
 
 @pytest.mark.slow
-def test_figures_are_pages_that_need_nothing_else(file: Path, tmp_path: Path) -> None:
+def test_figures_pages_need_nothing_else(file: Path, tmp_path: Path) -> None:
+    """Figures are pages that need nothing else."""
     assert run("d33", str(file), "--figures", str(tmp_path / "new" / "figures")).returncode == 0
     (page,) = (tmp_path / "new" / "figures").iterdir()
     assert page.name == "palm.json.html"
@@ -205,7 +209,8 @@ def test_figures_are_pages_that_need_nothing_else(file: Path, tmp_path: Path) ->
     assert "sensor s5: weak" in text
 
 
-def test_figures_of_two_files_of_one_name_are_refused(file: Path, tmp_path: Path) -> None:
+def test_figures_two_files_name_refused(file: Path, tmp_path: Path) -> None:
+    """Figures of two files of one name are refused."""
     (tmp_path / "other").mkdir()
     other = tmp_path / "other" / "palm.json"
     other.write_bytes(file.read_bytes())

@@ -37,8 +37,11 @@ ANSWERS: dict[str, type[Document]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(sources()))
-def test_the_classes_are_those_of_the_services_models(name: str) -> None:
-    """Rerun scripts/client_documents.py where the service's models have changed."""
+def test_classes_services_models(name: str) -> None:
+    """The classes are those of the services models.
+
+    Rerun scripts/client_documents.py where the service's models have changed.
+    """
     assert (FOLDER / f"{name}.py").read_text() == formatted(sources()[name])
 
 
@@ -81,7 +84,8 @@ def test_fields_have_types_that_editors_complete() -> None:
     assert diagnosis.report["d33"]["value"] == diagnosis.report.d33.value
 
 
-def test_every_class_can_be_resolved_and_is_documented() -> None:
+def test_every_class_resolved_documented() -> None:
+    """Every class can be resolved and is documented."""
     seen = 0
     for name in sources():
         for kind in vars(importlib.import_module(f"underskin.client.documents.{name}")).values():
@@ -92,7 +96,8 @@ def test_every_class_can_be_resolved_and_is_documented() -> None:
     assert seen > 50
 
 
-def test_what_a_newer_or_an_older_server_answers_is_no_error() -> None:
+def test_newer_older_server_answers_no_error() -> None:
+    """What a newer or an older server answers is no error."""
     answer = MechanismEntry.of({"name": "adhesion", "own": False, "colour": "green"})
     assert (answer.name, answer["colour"], answer.package, answer.kinds) == ("adhesion", "green", None, ())
 

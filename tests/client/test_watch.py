@@ -38,7 +38,8 @@ def small(name: str) -> dict[str, Any]:
     return campaign(name, sensors=1, lines=5)
 
 
-def test_what_is_saved_is_sent_once_complete_and_once_only(server: Server, tmp_path: Path) -> None:
+def test_saved_sent_once_complete_once(server: Server, tmp_path: Path) -> None:
+    """What is saved is sent once complete and once only."""
     with bench(tmp_path, address(server), "once") as at:
         at.save("before.json", small("before"))
         at.start()
@@ -72,7 +73,8 @@ def test_what_is_saved_is_sent_once_complete_and_once_only(server: Server, tmp_p
         assert {entry["file"] for entry in at.journal()} == saved
 
 
-def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server: Server, tmp_path: Path) -> None:
+def test_refused_told_once_sent_again_changed(server: Server, tmp_path: Path) -> None:
+    """What is refused is told once and sent again when it has changed."""
     with bench(tmp_path, address(server), "refused") as at:
         spoilt = small("spoilt")
         for recording in spoilt["recordings"]:
@@ -93,9 +95,8 @@ def test_what_is_refused_is_told_once_and_sent_again_when_it_has_changed(server:
         assert names(server, "refused") == ["good", "spoilt"]
 
 
-def test_a_rig_description_is_used_and_one_that_makes_sense_of_a_file_has_it_sent_again(
-    server: Server, tmp_path: Path
-) -> None:
+def test_rig_description_used_makes_sense_file(server: Server, tmp_path: Path) -> None:
+    """A rig description is used and one that makes sense of a file has it sent again."""
     rig = tmp_path / "rig.yaml"
     described = Path("examples/campaigns/testing-machine.yaml").read_text()
     rig.write_text(described.replace("Stroke [mm]", "Depth [mm]"))
@@ -117,7 +118,8 @@ def test_a_rig_description_is_used_and_one_that_makes_sense_of_a_file_has_it_sen
         assert names(server, "rig") == ["block", "other"]
 
 
-def test_a_kill_between_the_sending_and_the_journal_doubles_nothing(server: Server, tmp_path: Path) -> None:
+def test_kill_sending_journal_doubles_nothing(server: Server, tmp_path: Path) -> None:
+    """A kill between the sending and the journal doubles nothing."""
     through = Network(address(server))
     with network(through) as url, bench(tmp_path, url, "killed") as at:
         at.save("first.json", small("first"))
@@ -135,7 +137,8 @@ def test_a_kill_between_the_sending_and_the_journal_doubles_nothing(server: Serv
 
 
 @pytest.mark.parametrize("status", first(2, [401, 507, 502, 503]))
-def test_what_is_not_the_files_fault_is_tried_again(server: Server, tmp_path: Path, status: int) -> None:
+def test_not_files_fault_tried(server: Server, tmp_path: Path, status: int) -> None:
+    """What is not the files fault is tried again."""
     through = Network(address(server), status=status)
     with network(through) as url, bench(tmp_path, url, f"status-{status}") as at:
         at.save("first.json", small("first"))
@@ -166,8 +169,11 @@ def test_a_refusal_by_a_proxy_is_no_final_one(server: Server, tmp_path: Path, st
 
 
 @pytest.mark.slow
-def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_path: Path) -> None:
-    """Two files are saved for each watch that is killed: in the end there is each of them, once."""
+def test_kills_random_moments_lose_double(server: Server, tmp_path: Path) -> None:
+    """Kills at random moments lose and double nothing.
+
+    Two files are saved for each watch that is killed: in the end there is each of them, once.
+    """
     kills = 30 if os.environ.get("UNDERSKIN_SOAK") else 3
     moments = np.random.default_rng(900_013).uniform(SETTLE_S, SETTLE_S + 1.5, kills)
     with bench(tmp_path, address(server), "random") as at:
@@ -185,7 +191,8 @@ def test_kills_at_random_moments_lose_and_double_nothing(server: Server, tmp_pat
     assert names(server, "random") == sorted(["last", *(f"{number} {one}" for number in range(kills) for one in "ab")])
 
 
-def test_a_server_that_goes_and_comes_back_gets_everything_once(tmp_path: Path) -> None:
+def test_server_goes_comes_back_gets_everything(tmp_path: Path) -> None:
+    """A server that goes and comes back gets everything once."""
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     through = Network()
@@ -211,7 +218,8 @@ def test_a_server_that_goes_and_comes_back_gets_everything_once(tmp_path: Path) 
             assert at.end() == 0
 
 
-def test_one_process_watches_a_folder_and_what_cannot_be_used_is_said(server: Server, tmp_path: Path) -> None:
+def test_process_watches_folder_cannot_used_said(server: Server, tmp_path: Path) -> None:
+    """One process watches a folder and what cannot be used is said."""
     with bench(tmp_path, address(server), "alone") as at:
         at.start()
         at.wait_for("watching")
@@ -231,7 +239,8 @@ def test_one_process_watches_a_folder_and_what_cannot_be_used_is_said(server: Se
         assert "cannot be read" in refused(str(at.folder))
 
 
-def test_a_key_that_is_not_known_ends_it_at_the_start(tmp_path: Path) -> None:
+def test_key_not_known_ends_start(tmp_path: Path) -> None:
+    """A key that is not known ends it at the start."""
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     key = place.command("key", "create", "bench", "--scope", "write").stdout.strip()

@@ -42,7 +42,8 @@ def test_an_entry_is_appended_and_read_again(tmp_path: Path) -> None:
         assert entry.file == os.fsdecode(b"\xfcber Nacht.csv")
 
 
-def test_a_line_that_a_power_cut_left_unfinished_is_ignored(tmp_path: Path) -> None:
+def test_line_power_cut_left_unfinished_ignored(tmp_path: Path) -> None:
+    """A line that a power cut left unfinished is ignored."""
     with opened(tmp_path) as journal:
         for digest in ("a", "b"):
             journal.add(TARGET, digest, "file.csv", ["c-1"])
@@ -55,7 +56,8 @@ def test_a_line_that_a_power_cut_left_unfinished_is_ignored(tmp_path: Path) -> N
         assert known(tmp_path, "a", "b", "c") == [True, False, True]
 
 
-def test_a_journal_of_the_first_schema_is_read_and_gone_on_with(tmp_path: Path) -> None:
+def test_journal_first_schema_read_gone(tmp_path: Path) -> None:
+    """A journal of the first schema is read and gone on with."""
     entry = {"sha256": "a", "file": "file.csv", "url": "http://bench", "skin": "palm", "terms": "terms"}
     first = {"schema": "watch/1", "entries": [{**entry, "campaigns": ["c-1"], "at": "2026-01-01T00:00:00+00:00"}]}
     (tmp_path / NAME).write_text(json.dumps(first, indent=1))
@@ -65,7 +67,8 @@ def test_a_journal_of_the_first_schema_is_read_and_gone_on_with(tmp_path: Path) 
     assert known(tmp_path, "a", "b") == [True, True]
 
 
-def test_a_journal_that_was_deleted_meanwhile_is_written_again(tmp_path: Path) -> None:
+def test_journal_deleted_meanwhile_written(tmp_path: Path) -> None:
+    """A journal that was deleted meanwhile is written again."""
     with opened(tmp_path) as journal:
         journal.add(TARGET, "a", "file.csv", ["c-1"])
         (tmp_path / NAME).unlink()
@@ -74,13 +77,15 @@ def test_a_journal_that_was_deleted_meanwhile_is_written_again(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("text", ["", "{", '{"schema": "watch/3"}\n', '{"schema": "watch/2"}\n{"sha256": 1}\n'])
-def test_a_journal_that_cannot_be_understood_is_refused(tmp_path: Path, text: str) -> None:
+def test_journal_cannot_understood_refused(tmp_path: Path, text: str) -> None:
+    """A journal that cannot be understood is refused."""
     (tmp_path / NAME).write_text(text)
     with pytest.raises(UnderskinError, match=r"cannot be read: .*move it away"):
         Journal(tmp_path)
 
 
-def test_what_was_added_is_on_the_disk_with_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_added_disk_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was added is on the disk with its name."""
     synced: list[Path] = []
     sync = os.fsync
 

@@ -93,7 +93,8 @@ def at(tmp_path: Path, clock: list[float]) -> Iterator[Bench]:
         yield bench
 
 
-def test_what_cannot_be_looked_at_is_told_once_and_the_others_are_sent(at: Bench) -> None:
+def test_cannot_looked_told_once_sent(at: Bench) -> None:
+    """What cannot be looked at is told once and the others are sent."""
     (at.folder / "loop.csv").symlink_to(at.folder / "loop.csv")
     (at.folder / "gone.csv").symlink_to(at.folder / "nothing.csv")
     inside = os.open(at.folder, os.O_RDONLY)
@@ -112,7 +113,8 @@ def test_what_cannot_be_looked_at_is_told_once_and_the_others_are_sent(at: Bench
     assert len(at.told) == 3, at.told
 
 
-def test_a_watched_folder_that_is_gone_is_an_outage(at: Bench) -> None:
+def test_watched_folder_gone_outage(at: Bench) -> None:
+    """A watched folder that is gone is an outage."""
     moved = at.folder.with_name("moved")
     at.folder.rename(moved)
     assert [at.step(), at.step()] == [1.0, 2.0]
@@ -123,7 +125,8 @@ def test_a_watched_folder_that_is_gone_is_an_outage(at: Bench) -> None:
     assert at.told[1] == "sending goes on"
 
 
-def test_a_file_that_changes_while_another_one_is_sent_waits_until_it_is_complete(at: Bench) -> None:
+def test_file_changes_sent_waits_until_complete(at: Bench) -> None:
+    """A file that changes while another one is sent waits until it is complete."""
     complete = at.save("slow.json").read_bytes()
     os.utime(at.folder / "slow.json", (2000, 2000))
     at.save("first.json")
@@ -161,7 +164,9 @@ def _refused(status: int, allowed: str) -> ServiceError:
     ],
     ids=lambda error: str(error)[:60],
 )
-def test_a_refusal_that_may_pass_is_no_final_one_and_stops_no_other_file(at: Bench, error: ServiceError) -> None:
+def test_refusal_pass_no_final_stops_no_file(at: Bench, error: ServiceError) -> None:
+    """A refusal that may pass is no final one and stops no other file."""
+
     def refuse(path: Path) -> None:
         if path.name == "large.json":
             raise error
@@ -183,7 +188,9 @@ def test_a_refusal_that_may_pass_is_no_final_one_and_stops_no_other_file(at: Ben
     assert [name for name, _ in at.service.kept] == ["small.json", "large.json"]
 
 
-def test_retries_end_and_a_restart_sends_again_what_is_not_in_the_journal(tmp_path: Path, clock: list[float]) -> None:
+def test_retries_end_restart_sends(tmp_path: Path, clock: list[float]) -> None:
+    """Retries end and a restart sends again what is not in the journal."""
+
     def refuse(path: Path) -> None:
         if path.name == "large.json":
             raise _refused(413, "The body exceeds 100 MB; send less.")

@@ -38,10 +38,11 @@ def named(report: Report) -> dict[str, dict[str, float]]:
         ({"charge": delayed(60e-3)}, 60e3),
     ],
 )
-def test_a_delay_of_either_sign_and_any_size_is_named(
-    chain: dict[str, Any], delay_us: float, table: SigmaTable
-) -> None:
-    """FRFs that were computed here are not conjugated, and a late charge is not taken for a small one."""
+def test_delay_either_sign_size_named(chain: dict[str, Any], delay_us: float, table: SigmaTable) -> None:
+    """A delay of either sign and any size is named.
+
+    FRFs that were computed here are not conjugated, and a late charge is not taken for a small one.
+    """
     report = diagnosed(table, **chain)
     assert report.verdict == "explained", report.statement
     assert named(report)["timing_delay"]["delay"] == pytest.approx(delay_us, rel=0.01)
@@ -58,9 +59,10 @@ def test_a_delay_of_either_sign_and_any_size_is_named(
         (low_pass(120.0, 2), "amplifier_low_pass", "low_pass_corner", 120.0),
     ],
 )
-def test_a_filter_within_the_band_is_named_with_its_corner_and_d33(
+def test_filter_within_band_named_corner_d33(
     chain: Any, mechanism: str, parameter: str, corner_hz: float, table: SigmaTable
 ) -> None:
+    """A filter within the band is named with its corner and d33."""
     report = diagnosed(table, charge=chain)
     assert report.verdict == "explained", report.statement
     assert named(report)[mechanism][parameter] == pytest.approx(corner_hz, rel=0.05)
@@ -81,10 +83,11 @@ def test_noise_in_the_force_is_no_physics(share: float, table: SigmaTable) -> No
     assert "noise_in_frf" in {finding.code for finding in report.findings}
 
 
-def test_a_value_at_the_bound_of_its_search_explains_nothing(
-    table: SigmaTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As a corner of 150 Hz is where the search ends at 60 Hz: it is at or beyond that, and d33 is not to be quoted."""
+def test_value_bound_search_explains_nothing(table: SigmaTable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A value at the bound of its search explains nothing.
+
+    As a corner of 150 Hz is where the search ends at 60 Hz: it is at or beyond that, and d33 is not to be quoted.
+    """
     mechanism = CATALOGUE["amplifier_high_pass"]
     narrow = replace(mechanism.parameters_stated[0], high=60.0)
     monkeypatch.setattr(type(mechanism), "parameters_stated", (narrow,))
@@ -97,8 +100,11 @@ def test_a_value_at_the_bound_of_its_search_explains_nothing(
     assert report.verdict == "unexplained" or "at or beyond 60 Hz" in report.statement
 
 
-def test_an_unlisted_law_over_frequency_leaves_no_d33_to_quote(table: SigmaTable) -> None:
-    """A low-pass that no catalogue lists takes from the response within the band that d33 is read from."""
+def test_unlisted_law_over_frequency_leaves(table: SigmaTable) -> None:
+    """An unlisted law over frequency leaves no d33 to quote.
+
+    A low-pass that no catalogue lists takes from the response within the band that d33 is read from.
+    """
     left_out = [*OF_LINES, "amplifier_low_pass", "sensor_relaxation", "contact_resonance"]
     report = underskin.diagnose(shaken(charge=low_pass(100.0)), table, without=left_out)
     assert report.verdict == "unexplained", report.statement

@@ -57,7 +57,8 @@ def test_a_neo_hookean_block_lacks_nothing(largest: float) -> None:
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
 
 
-def test_a_pulled_strip_is_told_of_without_spheres() -> None:
+def test_pulled_strip_told_without_spheres() -> None:
+    """A pulled strip is told of without spheres."""
     strain = -np.linspace(0.0, 2.0, 120)
     stretch = 1 - strain
     stiffens = neo_hookean(strain) * (1 + 0.2 * (stretch**2 + 2 / stretch - 3))
@@ -77,7 +78,8 @@ def test_a_declared_layer_is_no_guess() -> None:
     assert "0.1 of the thickness" in report.statement
 
 
-def test_a_layer_of_unknown_thickness_is_not_told_from_stiffening() -> None:
+def test_layer_unknown_thickness_not_told() -> None:
+    """A layer of unknown thickness is not told from stiffening."""
     depth = ways(-0.05, 0.2, samples=400)
     report = diagnosed(campaign(depth, pressed(depth, bonded_layer(2.0, 2.0)), timed=False))
     assert report.verdict == "ambiguous"
@@ -94,7 +96,8 @@ def test_a_sphere_pressed_deep_lacks_nothing() -> None:
 
 
 @pytest.mark.parametrize("skin", [{}, {"thickness_mm": 20.0, "youngs_modulus_mpa": 1.0}])
-def test_a_flat_punch_stated_as_a_sphere_concludes_nothing(skin: dict[str, float]) -> None:
+def test_flat_punch_stated_sphere_concludes(skin: dict[str, float]) -> None:
+    """A flat punch stated as a sphere concludes nothing."""
     depth = ways(-0.1, 0.3, samples=400)
     report = diagnosed(
         campaign(depth, pressed(depth, lambda at: 8 / 3 * at), timed=False, skin=skin, indenter_radius_mm=1.0)
@@ -103,7 +106,8 @@ def test_a_flat_punch_stated_as_a_sphere_concludes_nothing(skin: dict[str, float
     assert "flat punch" in report.statement
 
 
-def test_a_cone_stated_as_a_sphere_explains_nothing_for_certain() -> None:
+def test_cone_stated_sphere_explains_nothing() -> None:
+    """A cone stated as a sphere explains nothing for certain."""
     depth = ways(-0.1, 0.3, samples=120)
     curve = campaign(depth, pressed(depth, lambda at: at**2), timed=False, indenter_radius_mm=5.0)
     report = diagnosed(curve)
@@ -111,7 +115,8 @@ def test_a_cone_stated_as_a_sphere_explains_nothing_for_certain() -> None:
     assert "cone" in report.statement
 
 
-def test_displacement_of_the_wrong_sign_is_turned_and_told() -> None:
+def test_displacement_wrong_sign_turned_told() -> None:
+    """Displacement of the wrong sign is turned and told."""
     depth = ways(-0.1, 0.25)
     report = diagnosed(campaign(-depth, pressed(depth), timed=False))
     assert report.verdict == "no_mismatch"
@@ -119,8 +124,11 @@ def test_displacement_of_the_wrong_sign_is_turned_and_told() -> None:
     assert modulus_mpa(report) == pytest.approx(1.0, rel=0.02)
 
 
-def test_what_was_not_tried_is_said_where_it_may_be_missing() -> None:
-    """Two presses in one recording, of what relaxes: creep is not tried, and the statement says why."""
+def test_not_tried_said_missing() -> None:
+    """What was not tried is said where it may be missing.
+
+    Two presses in one recording, of what relaxes: creep is not tried, and the statement says why.
+    """
     depth = ways(-0.1, 0.3, -0.1, 0.3, -0.1, samples=80)
     time = 0.02 * np.arange(len(depth))
     relaxed = 1 - 0.4 * (1 - np.exp(-(time % 3.2) / 0.8))
@@ -130,6 +138,7 @@ def test_what_was_not_tried_is_said_where_it_may_be_missing() -> None:
     assert "presses again" in report.statement
 
 
-def test_a_swapped_pair_of_columns_ends_in_no_traceback() -> None:
+def test_swapped_pair_columns_ends_no_traceback() -> None:
+    """A swapped pair of columns ends in no traceback."""
     depth = ways(-0.1, 0.3, -0.1, samples=60)
     assert diagnosed(campaign(pressed(depth), depth)).verdict in ("unexplained", "insufficient_data")

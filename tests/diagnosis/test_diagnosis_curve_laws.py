@@ -100,9 +100,8 @@ def reports(table: SigmaTable) -> Callable[[str], dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", first(1, LAWS))
-def test_a_law_is_found_with_its_numbers_and_predicts_what_was_held_out(
-    name: str, reports: Callable[[str], dict[str, Any]]
-) -> None:
+def test_law_found_numbers_predicts_held(name: str, reports: Callable[[str], dict[str, Any]]) -> None:
+    """A law is found with its numbers and predicts what was held out."""
     _, acts_on, axis, forms, true = LAWS[name]
     report = reports(name)
     assert report["verdict"] == "unexplained"
@@ -131,9 +130,10 @@ def turned(travel: Floats) -> Floats:
 
 
 @pytest.mark.soak
-def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_time(
+def test_changes_way_back_after_hold_told(
     reports: Callable[[str], dict[str, Any]],
 ) -> None:
+    """What changes on the way back after a hold is told from what changes in time."""
     report = reports("")
     law = report["unnamed"]
     assert (law["acts_on"], law["axis"], law["form"]) == ("modulus", "time_s", "step")
@@ -147,8 +147,11 @@ def test_what_changes_on_the_way_back_after_a_hold_is_told_from_what_changes_in_
 
 @pytest.mark.soak
 @pytest.mark.parametrize("back", first(1, [False, True]))
-def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaTable) -> None:
-    """Also where no way back tells it a second time."""
+def test_bump_third_force_keeps_size(back: bool, table: SigmaTable) -> None:
+    """A bump of a third of the force keeps its size.
+
+    Also where no way back tells it a second time.
+    """
     bump: dict[str, Change] = {"added": lambda travel, _: 0.3 * LARGEST / (1 + ((travel - 0.15) / 0.02) ** 2)}
     report = lean_report(parse(campaign(bump, back=back)), table, *FEW)
     law = report["unnamed"]
@@ -160,7 +163,8 @@ def test_a_bump_of_a_third_of_the_force_keeps_its_size(back: bool, table: SigmaT
 
 
 @pytest.mark.parametrize("seed", first(1, [6, 7, 8]))
-def test_where_nothing_is_missing_no_law_is_stated(seed: int, table: SigmaTable) -> None:
+def test_nothing_missing_no_law_stated(seed: int, table: SigmaTable) -> None:
+    """Where nothing is missing no law is stated."""
     report = lean_report(parse(campaign({}, seed)), table, *FEW)
     assert report["verdict"] == "no_mismatch"
     assert report["unnamed"] is None
@@ -181,8 +185,11 @@ def test_slow_noise_that_the_air_shows_is_no_law(seed: int, table: SigmaTable) -
     assert report["fit"]["after"]["youngs_modulus"]["value"] == pytest.approx(MODULUS_MPA, rel=0.02)
 
 
-def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: SigmaTable) -> None:
-    """A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it."""
+def test_named_law_stands_before_unnamed(table: SigmaTable) -> None:
+    """A named law that does the same stands before the unnamed one.
+
+    A stage that gives moves the surface by its deflection, which no law over the time can be told from beside it.
+    """
     stiffness = LARGEST / (0.05 * DEPTH_MM)
     travel = np.linspace(0.0, DEPTH_MM, 2000)
     commanded = travel + force_on(travel) / stiffness
@@ -193,13 +200,14 @@ def test_a_named_law_that_does_the_same_stands_before_the_unnamed_one(table: Sig
 
 
 @pytest.mark.parametrize("name", first(1, LAWS))
-def test_a_law_of_curves_is_kept_and_recognised_by_name(
+def test_law_curves_kept_recognised_name(
     name: str,
     reports: Callable[[str], dict[str, Any]],
     table: SigmaTable,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """A law of curves is kept and recognised by name."""
     changes = LAWS[name][0]
     (tmp_path / "kept.yaml").write_text(document(reports(name), "our_law"), encoding="utf-8")
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
@@ -217,8 +225,9 @@ def test_a_law_of_curves_is_kept_and_recognised_by_name(
     assert fitted is None or fitted["verdict"] == "no_mismatch"
 
 
-def test_a_step_where_the_sphere_turns_back_cannot_be_kept(
+def test_step_sphere_turns_back_cannot_kept(
     reports: Callable[[str], dict[str, Any]],
 ) -> None:
+    """A step where the sphere turns back cannot be kept."""
     with pytest.raises(InvalidInput, match="turns back is no expression"):
         document(reports(""), "softer_back")

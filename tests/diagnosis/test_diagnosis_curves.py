@@ -70,7 +70,8 @@ def ways(*ends: float, samples: int = 400) -> Floats:
 @pytest.mark.slow
 @pytest.mark.skipif("UNDERSKIN_RECORDINGS" not in os.environ, reason="UNDERSKIN_RECORDINGS names no folder")
 @pytest.mark.parametrize("name", first(1, ["compression-EF10", "tension-RTV615", "compression-EF50"]))
-def test_silicone_stiffens_and_does_not_creep_where_nothing_tells_time(name: str, table: SigmaTable) -> None:
+def test_silicone_stiffens_not_creep_nothing(name: str, table: SigmaTable) -> None:
+    """Silicone stiffens and does not creep where nothing tells time."""
     (entry,) = [entry for entry in recorded() if entry.name == name]
     report = lean_report(
         parse(entry.make(Path(os.environ["UNDERSKIN_RECORDINGS"]))), table,
@@ -123,9 +124,10 @@ UNLISTED: list[tuple[dict[str, Any], dict[str, float]]] = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("effect", "noisy"), first(1, UNLISTED))
-def test_physics_that_no_law_describes_is_unexplained_although_a_law_takes_part_of_it(
+def test_physics_no_law_describes_unexplained(
     effect: dict[str, Any], noisy: dict[str, float], table: SigmaTable
 ) -> None:
+    """Physics that no law describes is unexplained although a law takes part of it."""
     report = lean_report(made({**RIG, "curves": {**RIG["curves"], **noisy}, "effects": effect}), table, *STICKY)
     assert report["verdict"] == "unexplained"
     assert report["probability"] > 0.9
@@ -163,7 +165,8 @@ def nanoindentation(samples: int = 3100) -> tuple[Floats, Floats]:
 
 
 @pytest.mark.soak
-def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradict_it(table: SigmaTable) -> None:
+def test_remainder_small_beside_law_explains(table: SigmaTable) -> None:
+    """A remainder that is small beside what a law explains does not contradict it."""
     depth, force = nanoindentation()
     wave = 0.004 * force.max() * np.sin(2 * np.pi * (depth - depth.min()) / 0.5 / np.ptp(depth))
     curve = of_curve(depth, force + wave, 7.5e-3, thickness=2.0, time_s=0.002 * np.arange(len(depth)))
@@ -177,7 +180,8 @@ def test_a_remainder_that_is_small_beside_what_a_law_explains_does_not_contradic
 @pytest.mark.parametrize(
     "name", first(1, ["v1x2sxf5n", "v48jbeq3p", "v4j8zegt1", "v7bb8mnv4", "vb2c4z9ma", "v0w0qva2y"])
 )
-def test_curves_of_an_independent_rig_are_named_with_their_modulus(table: SigmaTable, name: str) -> None:
+def test_curves_independent_rig_named_modulus(table: SigmaTable, name: str) -> None:
+    """Curves of an independent rig are named with their modulus."""
     assert CAMPAIGNS is not None
     truth = json.loads((Path(CAMPAIGNS) / "curves-open-truth.json").read_text(encoding="utf-8"))[name]
     document = json.loads((Path(CAMPAIGNS) / "curves-open" / f"{name}.json").read_text(encoding="utf-8"))
@@ -188,8 +192,11 @@ def test_curves_of_an_independent_rig_are_named_with_their_modulus(table: SigmaT
 
 
 @pytest.mark.parametrize("stiffness", [None, 3e-3, 1e3])
-def test_the_known_stiffness_of_a_stage_decides_where_contact_ends(stiffness: float | None) -> None:
-    """Against JKR's equilibrium, from its two equations alone."""
+def test_known_stiffness_stage_decides_contact(stiffness: float | None) -> None:
+    """The known stiffness of a stage decides where contact ends.
+
+    Against JKR's equilibrium, from its two equations alone.
+    """
     radius, modulus, work = 7.5e-6, 1e6, 0.040
     reduced, a = modulus / 0.75, np.geomspace(1e-8, 6e-6, 100_001)
     depth = a**2 / radius - np.sqrt(2 * np.pi * work * a / reduced)
@@ -205,7 +212,8 @@ def test_the_known_stiffness_of_a_stage_decides_where_contact_ends(stiffness: fl
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("samples", "ripple"), first(1, [(360, 5e-3), (1500, 0.0)]))
-def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
+def test_plain_least_squares_leaves_scipy_leaves(samples: int, ripple: float, table: SigmaTable) -> None:
+    """Plain least squares leaves what scipy leaves."""
     random = np.random.default_rng(4)
     displacement = np.linspace(-0.1, 0.4, samples)
     depth = np.maximum(displacement - 0.02, 0.0)
@@ -225,10 +233,13 @@ def test_plain_least_squares_leaves_what_scipy_leaves(samples: int, ripple: floa
 
 
 @pytest.mark.slow
-def test_a_modulus_holds_the_true_value_wherever_the_displacement_has_its_zero_and_whatever_is_declared(
+def test_modulus_holds_true_value_wherever(
     table: SigmaTable,
 ) -> None:
-    """Its interval goes past the declared value; nor is a sensor's radius any matter of an indentation."""
+    """A modulus holds the true value wherever the displacement has its zero and whatever is declared.
+
+    Its interval goes past the declared value; nor is a sensor's radius any matter of an indentation.
+    """
     depth = ways(-0.1, 0.2)
     force = hertz(depth) + 1e-3 * hertz(depth).max() * np.random.default_rng(9).normal(size=len(depth))
     fits = []
@@ -259,8 +270,11 @@ def cylinders(heights_mm: list[float], table: SigmaTable, *known: str, **effects
 
 
 @pytest.mark.slow
-def test_friction_at_the_platens_is_told_from_the_modulus_by_two_shapes_alone(table: SigmaTable) -> None:
-    """Of cylinders of one shape the interval of the modulus holds both."""
+def test_friction_platens_told_modulus_two(table: SigmaTable) -> None:
+    """Friction at the platens is told from the modulus by two shapes alone.
+
+    Of cylinders of one shape the interval of the modulus holds both.
+    """
     for effects in ({}, {"platen_friction": {"friction": 0.9}}):
         modulus = cylinders([2.5], table, "platen_friction", **effects)["fit"]["before"]["youngs_modulus"]
         assert modulus["low"] < 12.0 < modulus["high"]
@@ -274,7 +288,8 @@ def test_friction_at_the_platens_is_told_from_the_modulus_by_two_shapes_alone(ta
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", first(1, [1, 2]))
-def test_a_seating_platen_is_no_stiffening_and_stiffening_no_seat(seed: int, table: SigmaTable) -> None:
+def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -> None:
+    """A seating platen is no stiffening and stiffening no seat."""
     curves = {
         "heights_mm": [10.0], "diameters_mm": [20.0], "largest_displacement_mm": 1.0, "samples": 120, "repeats": 6,
         "force_noise_n": 0.1, "contact_point_mm": 0.03, "modulus_declared": False,
@@ -291,8 +306,11 @@ def test_a_seating_platen_is_no_stiffening_and_stiffening_no_seat(seed: int, tab
 
 
 @pytest.mark.slow
-def test_laws_that_would_look_like_an_explanation_take_from_its_probability_and_are_said(table: SigmaTable) -> None:
-    """Fewer of them, the stronger the effect and the more spheres show it."""
+def test_laws_look_like_explanation_take(table: SigmaTable) -> None:
+    """Laws that would look like an explanation take from its probability and are said.
+
+    Fewer of them, the stronger the effect and the more spheres show it.
+    """
 
     def reported(stiffness: float, radii: Sequence[float]) -> dict[str, Any]:
         report = lean_report(pressed(stiffness, radii), table, *beside("instrument_compliance"))
@@ -311,8 +329,11 @@ def test_laws_that_would_look_like_an_explanation_take_from_its_probability_and_
 
 
 @pytest.mark.soak
-def test_two_mechanisms_that_share_a_bend_are_both_found(table: SigmaTable) -> None:
-    """An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike."""
+def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
+    """Two mechanisms that share a bend are both found.
+
+    An elastomer whose modulus grows with the strain, pressed by a stage that gives: each bends the curves alike.
+    """
     whole = parse(campaign_of_curves(*drawn_curves(777001, 109, INDENTATION, "pair")))
     report = lean_report(whole, table, *STAGE)
     found = {entry["name"]: entry["parameters"] for entry in report["mechanisms"]}
@@ -323,8 +344,11 @@ def test_two_mechanisms_that_share_a_bend_are_both_found(table: SigmaTable) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bend", [0.0, 0.012])
-def test_a_bend_below_the_noise_that_all_samples_show_contradicts_hertz(bend: float, table: SigmaTable) -> None:
-    """Noise and bend in shares of the largest force."""
+def test_bend_below_noise_samples_show(bend: float, table: SigmaTable) -> None:
+    """A bend below the noise that all samples show contradicts hertz.
+
+    Noise and bend in shares of the largest force.
+    """
     travel = ways(-0.1, 0.3, -0.1, samples=1500)
     force = np.maximum(travel / 0.3, 0.0) ** 1.5 * (1 + bend * np.sin(40 * travel))
     force += 0.01 * np.random.default_rng(8).normal(size=len(travel))
@@ -334,8 +358,11 @@ def test_a_bend_below_the_noise_that_all_samples_show_contradicts_hertz(bend: fl
 
 @pytest.mark.soak
 @pytest.mark.parametrize("work", [5e-6, 5e-5])
-def test_adhesion_of_a_gel_in_a_liquid_leaves_the_modulus_right(work: float, table: SigmaTable) -> None:
-    """Some µJ/m², a ten-thousandth of a silicone's in air; its forces of nanonewtons are meant."""
+def test_adhesion_gel_liquid_leaves_modulus(work: float, table: SigmaTable) -> None:
+    """Adhesion of a gel in a liquid leaves the modulus right.
+
+    Some µJ/m², a ten-thousandth of a silicone's in air; its forces of nanonewtons are meant.
+    """
     gel = {
         "seed": 5, "kind": "indentation",
         "skin": {"thickness_mm": 5.0, "youngs_modulus_mpa": 0.01, "sensor_radius_mm": 1.5, "d33_pc_per_n": 14.0},

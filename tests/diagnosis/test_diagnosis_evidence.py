@@ -64,10 +64,11 @@ def real(rows: np.ndarray) -> Floats:
 
 
 @pytest.mark.parametrize(("made", "has_position_scatter"), LIKELIHOODS)
-def test_the_likelihood_is_that_of_the_whole_covariance_matrix(
-    made: Made, has_position_scatter: bool, table: SigmaTable
-) -> None:
-    """Woodbury's identity against one dense covariance matrix over all rows."""
+def test_likelihood_whole_covariance_matrix(made: Made, has_position_scatter: bool, table: SigmaTable) -> None:
+    """The likelihood is that of the whole covariance matrix.
+
+    Woodbury's identity against one dense covariance matrix over all rows.
+    """
     problem = FittingProblem(lines(campaign(made, table)), table)
     hypothesis = problem.hypothesis(made.mechanisms, has_position_scatter, whole=True)
     own = [entry.to_fit(value) for entry, value in zip(hypothesis.model.parameters, made.parameters, strict=False)]
@@ -107,10 +108,13 @@ def laplace_of(names: tuple[str, ...], values: tuple[float, ...], table: SigmaTa
 
 
 @pytest.mark.parametrize(("names", "values"), [CASES[index] for index in first(3, (0, 1, 17, 10, 4))])
-def test_evidence_agrees_with_importance_sampling(
+def test_evidence_agrees_importance_sampling(
     names: tuple[str, ...], values: tuple[float, ...], table: SigmaTable
 ) -> None:
-    """Laplace's method against the mean of density over Student's t around the mode."""
+    """Evidence agrees with importance sampling.
+
+    Laplace's method against the mean of density over Student's t around the mode.
+    """
     found = laplace_of(names, values, table)
     assert found.log_evidence == pytest.approx(importance(found), abs=0.5)
 

@@ -44,7 +44,8 @@ def test_exchanged_labels_contradict_the_places(good: Campaign, table: SigmaTabl
     require_put_right(changed(two, exchanged("s0", "s1")), two, table, "'s0' and 's1'", "labels")
 
 
-def test_an_exchange_shows_nowhere_where_each_contact_is_on_its_own_sensor(good: Campaign, table: SigmaTable) -> None:
+def test_exchange_shows_nowhere_contact_sensor(good: Campaign, table: SigmaTable) -> None:
+    """An exchange shows nowhere where each contact is on its own sensor."""
     centred = changed(good, lambda entry, _: replace(entry, position_mm=None))
     assert named(changed(centred, exchanged("s0", "s2")), table) == []
 
@@ -61,24 +62,33 @@ def test_cables_exchanged_from_some_recording_on(good: Campaign, table: SigmaTab
 
 
 @pytest.mark.parametrize("since", first(1, [20, 0]))
-def test_a_rotated_connector_is_put_right_as_a_whole(since: int, good: Campaign, table: SigmaTable) -> None:
-    """A plug that is off by one: each label is the next sensor's."""
+def test_rotated_connector_put_right_whole(since: int, good: Campaign, table: SigmaTable) -> None:
+    """A rotated connector is put right as a whole.
+
+    A plug that is off by one: each label is the next sensor's.
+    """
     following = {"s0": "s1", "s1": "s2", "s2": "s0"}
     wrong = changed(good, lambda entry, n: replace(entry, sensor=following[entry.sensor]) if n >= since else entry)
     require_put_right(wrong, good, table, "s0", "s1", "s2")
 
 
 @pytest.mark.soak
-def test_a_rotation_is_put_right_where_not_every_sensor_would_show_it_alone(table: SigmaTable) -> None:
-    """The rig's contacts lie between the sensors: those of s05, labelled s09, might be of its neighbours."""
+def test_rotation_put_right_not_every_sensor(table: SigmaTable) -> None:
+    """A rotation is put right where not every sensor would show it alone.
+
+    The rig's contacts lie between the sensors: those of s05, labelled s09, might be of its neighbours.
+    """
     made, _ = from_dict(recorded_campaign(record(drawn(944001, 49, "single"))))
     label = {"s05": "s09", "s09": "s04", "s04": "s05"}
     wrong = changed(made, lambda entry, _: replace(entry, sensor=label.get(entry.sensor, entry.sensor)))
     require_put_right(wrong, made, table, "s04", "s05", "s09", known="thickness_error")
 
 
-def test_labels_that_no_permutation_explains_are_left_out(table: SigmaTable) -> None:
-    """The channel of s0 has the charge of s1, that of s1 the charge of s2, that of s2 none; s3 is right."""
+def test_labels_no_permutation_explains_left(table: SigmaTable) -> None:
+    """Labels that no permutation explains are left out.
+
+    The channel of s0 has the charge of s1, that of s1 the charge of s2, that of s2 none; s3 is right.
+    """
     random = np.random.default_rng(6)
 
     def shifted(entry: FrfRecording, _: int) -> FrfRecording:
@@ -96,10 +106,11 @@ def test_labels_that_no_permutation_explains_are_left_out(table: SigmaTable) -> 
     assert put_right(report, looked_at(s3, table))
 
 
-def test_an_exchange_with_a_sensor_that_has_no_recording_of_its_own_is_put_right(
-    good: Campaign, table: SigmaTable
-) -> None:
-    """The recordings at s2 are labelled s0, and none is labelled s2."""
+def test_exchange_sensor_no_recording_put_right(good: Campaign, table: SigmaTable) -> None:
+    """An exchange with a sensor that has no recording of its own is put right.
+
+    The recordings at s2 are labelled s0, and none is labelled s2.
+    """
     once = replace(good, recordings=good.recordings[:24])
     wrong = changed(once, lambda entry, n: replace(entry, sensor="s0") if n >= 16 else entry)
     require_put_right(wrong, once, table, "r16")
@@ -118,9 +129,8 @@ def unheard(silent: Collection[str], since: int) -> Change:
     return change
 
 
-def test_two_sensors_that_fall_silent_together_are_left_out_and_may_share_a_failure(
-    good: Campaign, table: SigmaTable
-) -> None:
+def test_two_sensors_fall_silent_together_left(good: Campaign, table: SigmaTable) -> None:
+    """Two sensors that fall silent together are left out and may share a failure."""
     report = looked_at(changed(good, unheard(("s0", "s2"), 26)), table)
     ((_, statement),) = slips(report)
     assert "both show no response since recording 'r26'" in statement
@@ -130,9 +140,12 @@ def test_two_sensors_that_fall_silent_together_are_left_out_and_may_share_a_fail
 
 
 @pytest.mark.soak
-def test_a_failure_that_sensors_do_not_share_is_no_exchange(good: Campaign, table: SigmaTable) -> None:
-    """The last recording of s0 and of s2, both before s1; all sensors, of which the amplifier may have failed; and a
-    sensor that steps to just the level that another one has."""
+def test_failure_sensors_not_share_no_exchange(good: Campaign, table: SigmaTable) -> None:
+    """A failure that sensors do not share is no exchange.
+
+    The last recording of s0 and of s2, both before s1; all sensors, of which the amplifier may have failed; and a
+    sensor that steps to just the level that another one has.
+    """
     at = {name: [n for n, entry in enumerate(frf_recordings(good)) if entry.sensor == name] for name in ("s0", "s2")}
     last = {own[-1] for own in at.values()}
     change, all_of_them = unheard(("s0", "s2"), 0), unheard(("s0", "s1", "s2"), 26)
@@ -151,16 +164,22 @@ def test_a_failure_that_sensors_do_not_share_is_no_exchange(good: Campaign, tabl
 
 
 @pytest.mark.soak
-def test_exchanged_labels_are_told_where_all_contacts_miss_their_places(table: SigmaTable) -> None:
-    """The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place."""
+def test_exchanged_labels_told_contacts_miss(table: SigmaTable) -> None:
+    """Exchanged labels are told where all contacts miss their places.
+
+    The rig's array of 2 × 2 sensors, pressed 0.7 mm beside every commanded place.
+    """
     description = drawn(934567, 56, "single")
     assert set(description["effects"]) == {"misalignment"}
     made, _ = from_dict(recorded_campaign(record(description)))
     require_put_right(changed(made, exchanged("s02", "s04")), made, table, "'s02' and 's04'", known="misalignment")
 
 
-def test_a_silent_recording_near_a_crossing_of_zero_is_physics(table: SigmaTable) -> None:
-    """The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero."""
+def test_silent_recording_near_crossing_zero(table: SigmaTable) -> None:
+    """A silent recording near a crossing of zero is physics.
+
+    The rig's layer is thinner than declared, so that one contact beside its sensor lies where σ crosses zero.
+    """
     description = drawn(956789, 88, "single")
     assert set(description["effects"]) == {"thickness_error"}
     made, _ = from_dict(recorded_campaign(record(description)))

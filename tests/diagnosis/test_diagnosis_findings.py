@@ -101,10 +101,13 @@ ONE = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("change", "which", "finding", "scale"), first(9, ONE))
-def test_what_is_wrong_is_named_and_does_not_count(
+def test_wrong_named_not_count(
     change: Change, which: Which, finding: tuple[str, str, str], scale: float, good: Campaign, table: SigmaTable
 ) -> None:
-    """The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it."""
+    """What is wrong is named and does not count.
+
+    The rest agrees with the model, at the d33 that it has without; of lines a thousandth, at a thousandth of it.
+    """
     report = looked_at(changed(good, change, which), table)
     assert finding in codes(report)
     assert {code for code, _, _ in codes(report)} - {"implausible_d33"} == {finding[0]}
@@ -161,10 +164,11 @@ def test_impossible_geometry_is_named(
         [("youngs_modulus_mpa", 1e3), ("sensor_radius_mm", 1e-3), ("youngs_modulus_mpa", 1e-3), ("thickness_mm", 1e3)],
     ),
 )
-def test_a_skin_in_other_units_is_named_and_tells_nothing(
-    name: str, factor: float, good: Campaign, table: SigmaTable
-) -> None:
-    """Also where the units are said to be checked, so that the diagnosis goes on."""
+def test_skin_units_named_tells_nothing(name: str, factor: float, good: Campaign, table: SigmaTable) -> None:
+    """A skin in other units is named and tells nothing.
+
+    Also where the units are said to be checked, so that the diagnosis goes on.
+    """
     wrong = replace(good, skin=replace(good.skin, **{name: factor * getattr(good.skin, name)}))
     report = looked_at(wrong, table)
     assert report["verdict"] == "insufficient_data"
@@ -197,14 +201,16 @@ def test_sensors_in_other_units_are_named(factor: float, good: Campaign, table: 
     assert {field for _, _, field in codes(report)} <= {"skin.sensors", "skin.sensor_radius_mm"}
 
 
-def test_offsets_in_metres_at_the_only_sensor_are_named(table: SigmaTable) -> None:
+def test_offsets_metres_sensor_named(table: SigmaTable) -> None:
+    """Offsets in metres at the only sensor are named."""
     made = campaign(Made(sensors=1, offsets_mm=(0.0, 1.0, 2.0), lines=8), table)
     report = looked_at(changed(made, away(1e-3), of_all), table)
     assert ("units_off_by_1000", "", "position_mm") in codes(report)
     assert report["verdict"] == "insufficient_data"
 
 
-def test_recordings_that_were_all_refused_are_said_to_be(good: Campaign, table: SigmaTable) -> None:
+def test_recordings_refused_said(good: Campaign, table: SigmaTable) -> None:
+    """Recordings that were all refused are said to be."""
     document = to_dict(changed(good, times(1e3, "indenter_radius_mm"), of_all))
     read, refused = from_dict(document)
     report = underskin.diagnose(Reading(read, refused, []), table)
@@ -221,7 +227,8 @@ def test_copies_are_found_through_rounding(good: Campaign, table: SigmaTable) ->
     assert report["d33"] == looked_at(good, table)["d33"]
 
 
-def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) -> None:
+def test_recordings_made_alike_frequency_tell(table: SigmaTable) -> None:
+    """Recordings made alike at one frequency tell nothing."""
     alike = campaign(Made(sensors=1, preloads_n=(1.0,), spheres_mm=(4.0,), repeats=6, lines=1), table)
     entries = [replace(entry, load_cycles=1, dwell_s=1.0, recorded_at=None) for entry in alike.recordings]
     report = looked_at(replace(alike, recordings=tuple(entries)), table)
@@ -230,7 +237,8 @@ def test_recordings_made_alike_at_one_frequency_tell_nothing(table: SigmaTable) 
 
 
 @pytest.mark.parametrize("factor", [1e3, -1.0])
-def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(factor: float, table: SigmaTable) -> None:
+def test_three_recordings_off_named_two_neither(factor: float, table: SigmaTable) -> None:
+    """Of three recordings the one that is off is named and of two neither."""
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.5, 1.0, 2.0)), table)
     wrong = changed(made, times(factor, *LINES), lambda entry: entry.id == "r1")
     code = "units_off_by_1000" if factor > 0 else "sign_flipped"
@@ -241,8 +249,11 @@ def test_of_three_recordings_the_one_that_is_off_is_named_and_of_two_neither(fac
 
 
 @pytest.mark.slow
-def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, table: SigmaTable) -> None:
-    """From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s."""
+def test_period_not_fit_recordings_named(good: Campaign, table: SigmaTable) -> None:
+    """A period that does not fit between recordings is named.
+
+    From 0.03 to 3.9 Hz is no impossible sweep, but not one in 20 s.
+    """
 
     def dated(entry: FrfRecording) -> FrfRecording:
         number = int(entry.id[1:])
@@ -257,8 +268,11 @@ def test_a_period_that_does_not_fit_between_recordings_is_named(good: Campaign, 
 
 
 @pytest.mark.slow
-def test_a_reversed_recording_is_told_beside_a_resonance(table: SigmaTable) -> None:
-    """Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence."""
+def test_reversed_recording_told_beside(table: SigmaTable) -> None:
+    """A reversed recording is told beside a resonance.
+
+    Few lines over a resonance differ as much as noise would, and their mean cancels: they are no silence.
+    """
     made = Made(("contact_resonance",), (6.0, 0.05), highest_hz=1000.0, lines=20, modulus_mpa=16.0)
     for parameters in ((30.0, 0.05), (6.0, 0.02)):
         resonant = campaign(replace(made, parameters=parameters), table)
@@ -268,8 +282,11 @@ def test_a_reversed_recording_is_told_beside_a_resonance(table: SigmaTable) -> N
 
 
 @pytest.mark.slow
-def test_where_little_is_expected_silence_is_kept(table: SigmaTable) -> None:
-    """Far beside the sensor the response is below the noise, as the model says: such recordings count."""
+def test_little_expected_silence_kept(table: SigmaTable) -> None:
+    """Where little is expected silence is kept.
+
+    Far beside the sensor the response is below the noise, as the model says: such recordings count.
+    """
     far = campaign(Made(offsets_mm=(0.0, 5.5), lines=20, line=0.01), table)
     random = np.random.default_rng(2)
 
@@ -292,8 +309,11 @@ def test_forces_within_a_percent_are_one_force(spread: float, differs: bool, goo
 
 
 @pytest.mark.slow
-def test_bands_and_stamps_that_may_be_meant_are_no_slips(table: SigmaTable) -> None:
-    """Three bands of one sensor; and three sensors recorded at once, saved one after the other."""
+def test_bands_stamps_meant_no_slips(table: SigmaTable) -> None:
+    """Bands and stamps that may be meant are no slips.
+
+    Three bands of one sensor; and three sensors recorded at once, saved one after the other.
+    """
     three = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     bands = ((0.1, 1.0), (1.0, 29.0), (30.0, 1000.0))
     banded = [
@@ -311,7 +331,8 @@ def test_bands_and_stamps_that_may_be_meant_are_no_slips(table: SigmaTable) -> N
         assert report["verdict"] != "insufficient_data"
 
 
-def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbers(table: SigmaTable) -> None:
+def test_places_rounding_leaves_zero_meant(table: SigmaTable) -> None:
+    """Places that rounding leaves where zero is meant are no impossible numbers."""
     made = campaign(Made(sensors=1, spheres_mm=(4.0,), preloads_n=(0.3, 2.0, 3.0), lines=40), table)
     places = np.arange(-0.6, 0.7, 0.2)[2:5]
     assert 0 < abs(places[1]) < 1e-15
@@ -325,8 +346,11 @@ def test_places_that_rounding_leaves_where_zero_is_meant_are_no_impossible_numbe
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("factor", "word"), [(1e3, "large"), (1e-3, "small")])
-def test_a_d33_far_from_the_declared_one_is_named(factor: float, word: str, table: SigmaTable) -> None:
-    """A thousandth of a ceramic's d33, or a weak polymer's times 1000, could be a sensor's."""
+def test_d33_far_declared_named(factor: float, word: str, table: SigmaTable) -> None:
+    """A d33 far from the declared one is named.
+
+    A thousandth of a ceramic's d33, or a weak polymer's times 1000, could be a sensor's.
+    """
     d33 = 0.5 if factor > 1 else 450.0
     weak = campaign(Made(sensors=3, lines=20, d33_pc_per_n=d33), table)
     wrong = changed(weak, times(factor, *LINES), of_all)

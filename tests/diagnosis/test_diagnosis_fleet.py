@@ -65,10 +65,13 @@ def departing(departing_and_page: tuple[dict[str, Any], str]) -> dict[str, Any]:
     return held(departing_and_page[0])
 
 
-def test_skins_that_depart_are_named_each_in_its_quantity_and_tell_nothing_of_the_others(
+def test_skins_depart_named_quantity_tell(
     departing: dict[str, Any],
 ) -> None:
-    """What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope."""
+    """Skins that depart are named each in its quantity and tell nothing of the others.
+
+    What is declared of all skins is wrong for one: `modulus_error` has that skin alone in its scope.
+    """
     assert departures(departing) == {"weak": "d33", "soft": "youngs_modulus", "thin": "thickness"}
     assert {entry["name"]: entry["scope"] for entry in departing["mechanisms"]} == {
         "modulus_error": {"skins": ["soft"]}, "thickness_error": {"skins": ["thin"]}
@@ -86,9 +89,10 @@ def test_skins_that_depart_are_named_each_in_its_quantity_and_tell_nothing_of_th
             assert own["low"] < truth < own["high"], (parameter, skin)
 
 
-def test_the_statement_tells_departures_in_words_and_of_which_skins_d33_may_be_quoted(
+def test_statement_tells_departures_words_skins(
     departing: dict[str, Any],
 ) -> None:
+    """The statement tells departures in words and of which skins d33 may be quoted."""
     statement = departing["statement"]
     assert "One departs, weak, in d33: " in statement
     assert "one departs, soft, in Young's modulus: " in statement
@@ -97,7 +101,8 @@ def test_the_statement_tells_departures_in_words_and_of_which_skins_d33_may_be_q
     assert "no skin's own" in statement
 
 
-def test_each_skin_stands_on_the_band_of_its_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
+def test_skin_stands_band_population(departing_and_page: tuple[dict[str, Any], str]) -> None:
+    """Each skin stands on the band of its population."""
     fleet, page = departing_and_page
     figure, d33 = figures_in(page)["population"], population(fleet, "d33")
     band = figure.layout.shapes[0]
@@ -114,7 +119,8 @@ def test_each_skin_stands_on_the_band_of_its_population(departing_and_page: tupl
 
 
 @pytest.mark.soak
-def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike(table: SigmaTable) -> None:
+def test_departure_told_beside_declared_alike(table: SigmaTable) -> None:
+    """A departure is told beside what the others would have if declared alike."""
     thin = made("thin", seed=40, thickness=2.0, effects={"thickness_error": {"factor": 0.8}})
     fleet = reported(sisters(3) | {"thin": [thin]}, table)
     assert departures(fleet) == {"thin": "thickness"}
@@ -122,8 +128,11 @@ def test_a_departure_is_told_beside_what_the_others_would_have_if_declared_alike
 
 
 @pytest.mark.soak
-def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(table: SigmaTable) -> None:
-    """E is 9 where 16 is declared of all, which FRFs of three skins do not tell: none departs."""
+def test_block_measured_apart_skin_tells_modulus(table: SigmaTable) -> None:
+    """A block measured apart for one skin tells the modulus of its sisters.
+
+    E is 9 where 16 is declared of all, which FRFs of three skins do not tell: none departs.
+    """
     skins = {f"s{number}": [made(f"c{number}", seed=10 + number, modulus=9.0)] for number in range(3)}
     skins["s0"].append(of_block(9.0))
     fleet = reported(skins, table)
@@ -137,8 +146,11 @@ def test_a_block_measured_apart_for_one_skin_tells_the_modulus_of_its_sisters(ta
 
 
 @pytest.mark.soak
-def test_a_block_that_contradicts_its_skin_and_campaigns_without_a_date_are_told(table: SigmaTable) -> None:
-    """Which campaign of a skin counts as the latest is by the order in which they were given, then."""
+def test_block_contradicts_skin_campaigns(table: SigmaTable) -> None:
+    """A block that contradicts its skin and campaigns without a date are told.
+
+    Which campaign of a skin counts as the latest is by the order in which they were given, then.
+    """
     skins = sisters(3)
     skins["skin-0"].append(of_block(48.0))
     undated = made("undated", seed=30)
@@ -154,8 +166,11 @@ def test_a_block_that_contradicts_its_skin_and_campaigns_without_a_date_are_told
     ) in fleet["statement"]
 
 
-def test_where_skins_differ_as_those_of_one_make_none_departs_and_strengths_are_a_population(table: SigmaTable) -> None:
-    """All have a tip that resonates."""
+def test_skins_differ_make_none_departs(table: SigmaTable) -> None:
+    """Where skins differ as those of one make none departs and strengths are a population.
+
+    All have a tip that resonates.
+    """
     differing = [(13.6, 15.5), (14.2, 16.6), (14.5, 15.8)]
     skins = {
         f"skin-{n}": [made(f"c{n}", seed=20 + n, d33=d33, modulus=modulus, effects=HEAVY_TIP)]
@@ -173,10 +188,13 @@ def test_where_skins_differ_as_those_of_one_make_none_departs_and_strengths_are_
 
 
 @pytest.mark.soak
-def test_a_skin_of_few_recordings_borrows_strength_from_its_sisters(table: SigmaTable) -> None:
-    """Of two its own recordings tell no d33 to quote; of four alone the interval is wider than of two among sisters,
+def test_skin_few_recordings_borrows_strength(table: SigmaTable) -> None:
+    """A skin of few recordings borrows strength from its sisters.
+
+    Of two its own recordings tell no d33 to quote; of four alone the interval is wider than of two among sisters,
     which holds the true d33 in all draws but one. In what one of them departs is open, so that the verdict is
-    ambiguous, and the headline no surer."""
+    ambiguous, and the headline no surer.
+    """
     others = {**sisters(3), "weak": [made("weak", seed=41, d33=12.5)]}
     inside, widths = [], []
     for seed in first(1, range(6)):

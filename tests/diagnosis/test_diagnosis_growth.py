@@ -43,15 +43,21 @@ def taken(sensors: int, table: SigmaTable) -> tuple[float, int]:
     return time.process_time() - began, peak
 
 
-def test_screening_laws_grows_with_recordings_alone(table: SigmaTable) -> None:
-    """Four times the sensors, of as many recordings each, take at most some six times as much, not sixteen."""
+def test_screening_laws_grows_recordings_alone(table: SigmaTable) -> None:
+    """Screening laws grows with recordings alone.
+
+    Four times the sensors, of as many recordings each, take at most some six times as much, not sixteen.
+    """
     (few_s, few_bytes), (many_s, many_bytes) = (taken(sensors, table) for sensors in (FEW, MANY))
     assert many_bytes < 6 * few_bytes
     assert many_s < 8 * few_s
 
 
-def test_sensors_of_one_recording_and_of_several_are_weighed_alike(table: SigmaTable) -> None:
-    """By the density of the residual and the features together, worked out with whole matrices."""
+def test_sensors_recording_several_weighed_alike(table: SigmaTable) -> None:
+    """Sensors of one recording and of several are weighed alike.
+
+    By the density of the residual and the features together, worked out with whole matrices.
+    """
     own = residual(3, table)
     random = np.random.default_rng(2)
     change = random.normal(size=(1, 6, 1))

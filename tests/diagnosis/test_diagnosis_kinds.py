@@ -52,10 +52,13 @@ def exact() -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("kind", "design", "width"), first(1, [("compression", BLOCK, 1.45), ("indentation", SPHERE, 1.2)])
 )
-def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
+def test_curves_tell_wrong_modulus_frfs_alone(
     kind: str, design: Mapping[str, Any], width: float, of_frfs_alone: dict[str, Any], table: SigmaTable
 ) -> None:
-    """How wide a block has E depends on friction, which one shape does not tell."""
+    """Curves tell a wrong modulus that frfs alone cannot.
+
+    How wide a block has E depends on friction, which one shape does not tell.
+    """
     alone = of_frfs_alone
     assert alone["verdict"] == "ambiguous"
     assert "by_kind" not in alone
@@ -76,7 +79,8 @@ def test_curves_tell_a_wrong_modulus_that_frfs_alone_cannot(
 
 
 @pytest.mark.soak
-def test_curves_that_agree_rule_out_what_frfs_alone_leave_open(table: SigmaTable) -> None:
+def test_curves_agree_rule_out_frfs_alone_leave(table: SigmaTable) -> None:
+    """Curves that agree rule out what frfs alone leave open."""
     measured = lines(effects={"thickness_error": {"factor": 1.2}})
     open_before = {tuple(entry["mechanisms"]) for entry in report(measured, [], table, *DECLARED)["alternatives"]}
     open_after = {
@@ -89,7 +93,8 @@ def test_curves_that_agree_rule_out_what_frfs_alone_leave_open(table: SigmaTable
     assert ("thickness_error",) in open_after
 
 
-def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable) -> None:
+def test_acts_block_alone_named_beside_frfs(table: SigmaTable) -> None:
+    """What acts on the block alone is named beside the frfs."""
     blocks = {**BLOCK, "heights_mm": [4, 12], "diameters_mm": [20, 20]}
     rubbed = curves("compression", blocks, effects={"platen_friction": {"friction": 0.6}})
     document = report(lines(), rubbed, table, *DECLARED)
@@ -102,7 +107,8 @@ def test_what_acts_on_the_block_alone_is_named_beside_the_frfs(table: SigmaTable
 
 @pytest.mark.soak
 @pytest.mark.parametrize("friction", [0.3, 0.0, 0.8])
-def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: float, table: SigmaTable) -> None:
+def test_modulus_holds_whatever_friction_samples(friction: float, table: SigmaTable) -> None:
+    """A modulus holds whatever friction samples of one shape hide."""
     blocks = curves("compression", BLOCK, effects={"platen_friction": {"friction": friction}} if friction else {})
     document = report(lines(), blocks, table, *DECLARED)
     assert (document["verdict"], document["contradictions"]) == ("no_mismatch", [])
@@ -114,8 +120,11 @@ def test_a_modulus_holds_whatever_friction_samples_of_one_shape_hide(friction: f
 
 
 @pytest.mark.soak
-def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: SigmaTable) -> None:
-    """Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both."""
+def test_wrong_modulus_found_beside_curves_show(table: SigmaTable) -> None:
+    """A wrong modulus is found beside what the curves show as well.
+
+    Neither the law of a thin layer nor another modulus alone explains both kinds: the curves ask for both.
+    """
     layer: Effects = {"layered_contact": {}}
     deep = {**SPHERE, "largest_displacement_mm": 0.8}
     document = report(lines(9.0, layer), curves("indentation", deep, 9.0, layer), table, *LAYER)
@@ -125,7 +134,8 @@ def test_a_wrong_modulus_is_found_beside_what_the_curves_show_as_well(table: Sig
     assert told["low"] < 9.0 < told["high"]
 
 
-def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTable) -> None:
+def test_indentation_tells_adhesion_frfs_not_see(table: SigmaTable) -> None:
+    """An indentation tells the adhesion that frfs do not see."""
     sticky = {"adhesion": {"work_j_per_m2": 2.0}}
     measured = lines(effects=sticky)
     assert report(measured, [], table, *STICKY)["verdict"] == "no_mismatch"
@@ -138,10 +148,11 @@ def test_an_indentation_tells_the_adhesion_that_frfs_do_not_see(table: SigmaTabl
 @pytest.mark.parametrize(
     ("law", "coefficient", "depth_mm"), first(1, [("", 3.0, 5.0), ("linear", 7.0, 2.5), ("limited", 2.8, 2.5)])
 )
-def test_stiffening_of_a_block_is_the_skins_although_its_frfs_do_not_show_it(
-    law: str, coefficient: float, depth_mm: float, table: SigmaTable
-) -> None:
-    """Also where the modulus grows with the strain itself, far beyond a silicone's."""
+def test_stiffening_block_skins_although_frfs(law: str, coefficient: float, depth_mm: float, table: SigmaTable) -> None:
+    """Stiffening of a block is the skins although its frfs do not show it.
+
+    Also where the modulus grows with the strain itself, far beyond a silicone's.
+    """
     stiff: Effects = {"strain_stiffening": {"coefficient": coefficient, **({"law": law} if law else {})}}
     deep = {**BLOCK, "largest_displacement_mm": depth_mm}
     document = report(lines(effects=stiff), curves("compression", deep, effects=stiff), table, *DECLARED)
@@ -152,7 +163,8 @@ def test_stiffening_of_a_block_is_the_skins_although_its_frfs_do_not_show_it(
     assert told["high"] / told["low"] < 2.0
 
 
-def test_a_block_of_another_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
+def test_block_elastomer_contradicts(exact: dict[str, Any], table: SigmaTable) -> None:
+    """A block of another elastomer contradicts."""
     document = report(exact, curves("compression", BLOCK, 48.0), table, *DECLARED)
     (contradiction,) = document["contradictions"]
     assert contradiction["kinds"] == ["frf", "compression"]
@@ -162,10 +174,11 @@ def test_a_block_of_another_elastomer_contradicts(exact: dict[str, Any], table: 
 
 
 @pytest.mark.soak
-def test_kinds_that_contradict_each_tell_the_modulus_by_what_explains_them_alone(
-    exact: dict[str, Any], table: SigmaTable
-) -> None:
-    """Deep indentations of another skin: their E counts the base that they feel, which these FRFs do not show."""
+def test_kinds_contradict_tell_modulus_explains(exact: dict[str, Any], table: SigmaTable) -> None:
+    """Kinds that contradict each tell the modulus by what explains them alone.
+
+    Deep indentations of another skin: their E counts the base that they feel, which these FRFs do not show.
+    """
     deep = {**SPHERE, "largest_displacement_mm": 0.8}
     document = report(exact, curves("indentation", deep, 48.0, effects={"layered_contact": {}}), table, *LAYER)
     assert len(document["contradictions"]) == 1
@@ -174,8 +187,11 @@ def test_kinds_that_contradict_each_tell_the_modulus_by_what_explains_them_alone
     assert told["low"] < 48.0 < told["high"]
 
 
-def test_indentations_and_a_block_are_one_data_set_too(table: SigmaTable) -> None:
-    """And of a block alone the modulus that is stated is the true one, not the declared one."""
+def test_indentations_block_data_set(table: SigmaTable) -> None:
+    """Indentations and a block are one data set too.
+
+    And of a block alone the modulus that is stated is the true one, not the declared one.
+    """
     both = [*curves("indentation", SPHERE, 9.0), *curves("compression", BLOCK, 9.0)]
     document: dict[str, Any] = {"schema": "campaign/1", "name": "curves", "skin": lines()["skin"], "recordings": []}
     undeclared = deepcopy(document)
@@ -201,11 +217,14 @@ RELAXING: list[tuple[float, float, list[float], dict[str, Any], float]] = [
 
 
 @pytest.mark.parametrize(("fraction", "time_s", "dwells", "pressing", "gain"), first(1, RELAXING))
-def test_relaxation_is_told_by_the_kind_that_shows_it(
+def test_relaxation_told_kind_shows(
     fraction: float, time_s: float, dwells: list[float], pressing: dict[str, Any], gain: float, table: SigmaTable
 ) -> None:
-    """Curves of two seconds tell g/τ of a relaxation of a minute alone, FRFs of three dwells both; a hold tells g and
-    τ, FRFs of few dwells, with much scatter, neither."""
+    """Relaxation is told by the kind that shows it.
+
+    Curves of two seconds tell g/τ of a relaxation of a minute alone, FRFs of three dwells both; a hold tells g and
+    τ, FRFs of few dwells, with much scatter, neither.
+    """
     creep: Effects = {"contact_creep": {"fraction": fraction, "time_s": time_s}}
     design = {**LINES["design"], "dwells_s": dwells}
     described = {**LINES, "design": design, "noise": {**LINES["noise"], "gain": gain}, "seed": 4, "effects": creep}
@@ -219,8 +238,11 @@ def test_relaxation_is_told_by_the_kind_that_shows_it(
 
 
 @pytest.mark.soak
-def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wrongly(table: SigmaTable) -> None:
-    """E of such curves holds although the declared thickness is 15 % too large."""
+def test_indentations_feel_base_tell_thickness(table: SigmaTable) -> None:
+    """Indentations that feel the base tell the thickness that is declared wrongly.
+
+    E of such curves holds although the declared thickness is 15 % too large.
+    """
     both: Effects = {"layered_contact": {}, "thickness_error": {"factor": 0.87}}
     deep = {**SPHERE, "largest_displacement_mm": 0.8, "indenters_mm": [3]}
     pressed = curves("indentation", deep, effects={"layered_contact": {}}, thickness=0.87 * SKIN["thickness_mm"])
@@ -234,7 +256,8 @@ def test_indentations_that_feel_the_base_tell_the_thickness_that_is_declared_wro
 
 
 @pytest.mark.soak
-def test_a_wrong_modulus_and_a_wrong_thickness_are_both_told_beside_a_resonance(table: SigmaTable) -> None:
+def test_wrong_modulus_wrong_thickness_told(table: SigmaTable) -> None:
+    """A wrong modulus and a wrong thickness are both told beside a resonance."""
     wrong: Effects = {"thickness_error": {"factor": 1.16}, "contact_resonance": {"tip_mass_g": 6.0, "damping": 0.04}}
     described = {**LINES, "lines": {"low_hz": 10, "high_hz": 1000, "count": 30}, "noise": {"gain": 0.01, "line": 0.01}}
     described |= {"design": {**LINES["design"], "offsets_mm": [[0, 0], [1.2, 0]]}}

@@ -155,10 +155,11 @@ def drawn_by_a_browser(text: str, folder: Path, script: str) -> tuple[str, Any]:
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_a_browser_draws_every_figure_whole_and_buttons_lead_from_one_frf_to_the_next(
-    attacked: str, tmp_path: Path
-) -> None:
-    """Titles are seen whole in a narrow window, and no text of the campaign becomes an element."""
+def test_browser_draws_every_figure_whole(attacked: str, tmp_path: Path) -> None:
+    """A browser draws every figure whole and buttons lead from one frf to the next.
+
+    Titles are seen whole in a narrow window, and no text of the campaign becomes an element.
+    """
     look = "const right = (one) => one.getBoundingClientRect().right, wide = document.documentElement.clientWidth;"
     look += "const titles = [...document.querySelectorAll('.summary .gtitle')].map(right);"
     look += "const [back, on] = document.querySelectorAll('label + button, label + button + button');"
@@ -178,7 +179,8 @@ def test_a_browser_draws_every_figure_whole_and_buttons_lead_from_one_frf_to_the
 
 @pytest.mark.browser
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-def test_a_list_that_keys_reach_chooses_the_recording(tmp_path: Path) -> None:
+def test_list_keys_reach_chooses_recording(tmp_path: Path) -> None:
+    """A list that keys reach chooses the recording."""
     choosing = "const list = document.querySelector('label select'); list.selectedIndex = 1; "
     choosing += "list.dispatchEvent(new Event('change')); const drawn = document.getElementById('figure-curve');"
     choosing += "const bottom = (one) => one.getBoundingClientRect().bottom;"
@@ -197,7 +199,8 @@ def test_a_list_that_keys_reach_chooses_the_recording(tmp_path: Path) -> None:
     ],
     ids=["nothing", "too little"],
 )
-def test_a_report_without_mechanisms_has_its_page(made: Made, verdict: str, names: set[str], table: SigmaTable) -> None:
+def test_report_without_mechanisms_page(made: Made, verdict: str, names: set[str], table: SigmaTable) -> None:
+    """A report without mechanisms has its page."""
     report, text = written([to_dict(campaign(made, table))], without=EVERY)
     tags = Tags(text)
     assert (report["verdict"], set(figures_in(text))) == (verdict, names)
@@ -226,7 +229,8 @@ def test_figures_show_the_report_s_numbers(resonant: tuple[dict[str, Any], str],
     assert lowest == pytest.approx(report["location"]["region"]["frequency_hz"][0], rel=5e-3)
 
 
-def test_after_the_points_lie_within_the_noise_s_band(figures: dict[str, go.Figure]) -> None:
+def test_after_points_lie_within_noise_s_band(figures: dict[str, go.Figure]) -> None:
+    """After the points lie within the noise s band."""
     traces = figures["before_after"].data
     outside = []
     for band, name in zip([one for one in traces if one.fill == "toself"], ("before", "after"), strict=True):
@@ -249,9 +253,8 @@ def shown_frf(figure: go.Figure, recording: str) -> dict[str, Floats]:
     return {"frequency_hz": np.asarray(x[0]), **{name: np.asarray(y, dtype=float) for name, y in named}}
 
 
-def test_frfs_are_shown_as_recorded_beside_the_truth_and_on_the_noise_s_band(
-    figures: dict[str, go.Figure], table: SigmaTable
-) -> None:
+def test_frfs_shown_recorded_beside_truth_noise(figures: dict[str, go.Figure], table: SigmaTable) -> None:
+    """Frfs are shown as recorded beside the truth and on the noise s band."""
     figure, made = figures["frf"], campaign(RESONANT, table)
     model = compose(RESONANT.mechanisms, made, table)
     values = [*RESONANT.parameters, D33, 1.0, 1.0]
@@ -279,7 +282,8 @@ def test_frfs_are_shown_as_recorded_beside_the_truth_and_on_the_noise_s_band(
 
 
 @pytest.mark.soak
-def test_of_very_many_recordings_each_sensor_s_worst_are_shown_and_the_figure_stays_small(table: SigmaTable) -> None:
+def test_very_many_recordings_sensor_s_worst(table: SigmaTable) -> None:
+    """Of very many recordings each sensor s worst are shown and the figure stays small."""
     made = replace(RESONANT, mechanisms=(), parameters=(), sensors=20, lines=300, highest_hz=100.0)
     figure = figures_in(written([to_dict(campaign(made, table))], without=EVERY)[1])["frf"]
     sensors = [
@@ -302,8 +306,11 @@ def in_lab_units(recording: str, shows: str) -> tuple[Floats, Floats]:
     return np.asarray(trace.x) * trace.meta["mm"], np.asarray(trace.y) * trace.meta["n"]
 
 
-def test_curves_are_explained_by_adhesion_alone_and_their_page_says_the_modulus() -> None:
-    """A jump into contact between two samples asks for no companion."""
+def test_curves_explained_adhesion_alone_page() -> None:
+    """Curves are explained by adhesion alone and their page says the modulus.
+
+    A jump into contact between two samples asks for no companion.
+    """
     report, text = adhesive_page()
     assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["adhesion"])
     modulus = report["fit"]["after"]["youngs_modulus"]
@@ -316,7 +323,8 @@ def test_curves_are_explained_by_adhesion_alone_and_their_page_says_the_modulus(
     assert titles == ["force [N]", "residual<br>before [mN]", "residual<br>after [mN]"]
 
 
-def test_the_residual_of_a_curve_is_what_was_measured_less_what_is_predicted() -> None:
+def test_residual_curve_measured_less_predicted() -> None:
+    """The residual of a curve is what was measured less what is predicted."""
     for which in ("before", "after"):
         depth, predicted = in_lab_units("c01", which)
         place, left = in_lab_units("c01", f"residual {which}")
@@ -329,7 +337,8 @@ def test_the_residual_of_a_curve_is_what_was_measured_less_what_is_predicted() -
         assert (float(np.median(np.abs(left[:turn][pressed]))) > 2 * NOISE_N) == (which == "before")
 
 
-def test_only_the_true_law_leaves_its_residuals_on_the_noise_s_band() -> None:
+def test_true_law_leaves_residuals_noise_s_band() -> None:
+    """Only the true law leaves its residuals on the noise s band."""
     inside: dict[str, list[bool]] = {"before": [], "after": []}
     for recording in ("c01", "c02"):
         for which, told in inside.items():
@@ -345,7 +354,8 @@ def test_only_the_true_law_leaves_its_residuals_on_the_noise_s_band() -> None:
 
 
 @pytest.mark.parametrize("recording", ["c01", "c02"])
-def test_marks_stand_where_contact_begins_and_where_it_jumps_and_samples_there_are_kept(recording: str) -> None:
+def test_marks_stand_contact_begins_jumps(recording: str) -> None:
+    """Marks stand where contact begins and where it jumps and samples there are kept."""
     document, truth = adhesive_curves()
     (entry,) = [one for one in document["recordings"] if one["id"] == recording]
     said = re.search(r"as recorded: (\S+) mm", trace_of(recording, "contact point after").hovertemplate)

@@ -39,8 +39,11 @@ def planned(made: Campaign, folder: Path, *limits: str) -> dict[str, Any]:
     return dict(json.loads(result.stdout))
 
 
-def test_a_plan_keeps_within_the_limits_and_names_all_that_it_separates(narrow: Campaign, tmp_path: Path) -> None:
-    """A place that no sensor allows, 60 mm beside it, is not asked for."""
+def test_plan_keeps_within_limits_names(narrow: Campaign, tmp_path: Path) -> None:
+    """A plan keeps within the limits and names all that it separates.
+
+    A place that no sensor allows, 60 mm beside it, is not asked for.
+    """
     spheres = ["--indenter-radius-mm", "4", "--indenter-radius-mm", "8"]
     places = ["--offset-mm", "0", "--offset-mm", "60"]
     plan = planned(narrow, tmp_path, "--preload-n", "0.3", "2.5", "--recordings", "5", *spheres, *places)
@@ -59,7 +62,8 @@ def test_a_plan_keeps_within_the_limits_and_names_all_that_it_separates(narrow: 
 
 
 @pytest.mark.soak
-def test_limits_beyond_the_tables_are_said_to_be_that(narrow: Campaign, tmp_path: Path) -> None:
+def test_limits_beyond_tables_said(narrow: Campaign, tmp_path: Path) -> None:
+    """Limits beyond the tables are said to be that."""
     plan = planned(narrow, tmp_path, "--indenter-radius-mm", "2000", "--preload-n", "50", "60")
     assert plan["recordings"] == []
     assert "the tables hold none of their contacts" in plan["statement"]

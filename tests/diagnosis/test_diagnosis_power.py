@@ -42,9 +42,8 @@ def changed_percent(name: str, values: Sequence[float], table: SigmaTable) -> fl
     return float(100 * np.sqrt((np.abs(with_it - without) ** 2).sum() / (np.abs(without) ** 2).sum()))
 
 
-def test_three_times_what_is_visible_is_seen_and_a_third_of_it_is_not(
-    least: dict[str, float], table: SigmaTable
-) -> None:
+def test_three_times_visible_seen_third(least: dict[str, float], table: SigmaTable) -> None:
+    """Three times what is visible is seen and a third of it is not."""
     name = "preload_dependent_d33"
     coefficients = np.geomspace(0.01, 5.0, 60)
     changes: Floats = np.array([changed_percent(name, (value, 1.0), table) for value in coefficients])
@@ -56,7 +55,8 @@ def test_three_times_what_is_visible_is_seen_and_a_third_of_it_is_not(
             assert (report["verdict"] != "no_mismatch") is seen
 
 
-def test_more_recordings_and_less_scatter_show_more(least: dict[str, float], table: SigmaTable) -> None:
+def test_recordings_less_scatter_show(least: dict[str, float], table: SigmaTable) -> None:
+    """More recordings and less scatter show more."""
     many, rough = (
         visible(lean_report(campaign(made, table), table, *FEW))
         for made in (replace(QUIET, repeats=8), replace(QUIET, gain=0.05, line=0.02))
@@ -68,7 +68,8 @@ def test_more_recordings_and_less_scatter_show_more(least: dict[str, float], tab
     assert many["timing_delay"] == pytest.approx(least["timing_delay"] / 2, rel=0.2)  # four times as many recordings
 
 
-def test_a_quiet_report_says_what_would_have_shown(table: SigmaTable) -> None:
+def test_quiet_report_says_shown(table: SigmaTable) -> None:
+    """A quiet report says what would have shown."""
     report = whole_report(campaign(QUIET, table), table)
     known = sum("frf" in mechanism.kinds for mechanism in CATALOGUE.values())
     small = {name for name, percent in visible(report).items() if percent <= 5.0}

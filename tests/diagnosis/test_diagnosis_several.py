@@ -54,8 +54,11 @@ def appeared(table: SigmaTable) -> dict[str, Any]:
     return reported([made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8), made("may")], table, "contact_resonance")
 
 
-def test_what_appeared_between_two_campaigns_is_named_with_its_date(appeared: dict[str, Any]) -> None:
-    """Whatever the order in which they are given."""
+def test_appeared_two_campaigns_named_date(appeared: dict[str, Any]) -> None:
+    """What appeared between two campaigns is named with its date.
+
+    Whatever the order in which they are given.
+    """
     assert (appeared["campaign"], appeared["campaigns"]) == ("both", ["may", "september"])
     assert appeared["verdict"] == "explained"
     assert scopes(appeared) == {"contact_resonance": {"campaigns": ["september"], "since": "2017-09-12"}}
@@ -65,7 +68,8 @@ def test_what_appeared_between_two_campaigns_is_named_with_its_date(appeared: di
 
 
 @pytest.mark.soak
-def test_what_acts_in_all_is_known_better_than_from_one(appeared: dict[str, Any], table: SigmaTable) -> None:
+def test_acts_known_better(appeared: dict[str, Any], table: SigmaTable) -> None:
+    """What acts in all is known better than from one."""
     report = reported(dates(effects=HEAVY_TIP), table, "contact_resonance")
     assert scopes(report) == {"contact_resonance": {"campaigns": ["may", "september"]}}
     (mass, _) = report["mechanisms"][0]["parameters"]
@@ -74,8 +78,11 @@ def test_what_acts_in_all_is_known_better_than_from_one(appeared: dict[str, Any]
     assert mass["low"] < 4.0 < mass["high"]
 
 
-def test_without_all_dates_no_date_is_given_and_the_order_is_told(table: SigmaTable) -> None:
-    """Of one campaign no time is known, so that nothing can be said to be there since a date."""
+def test_without_dates_no_date_given_order_told(table: SigmaTable) -> None:
+    """Without all dates no date is given and the order is told.
+
+    Of one campaign no time is known, so that nothing can be said to be there since a date.
+    """
     before = made("may")
     undated = replace(before, recordings=tuple(replace(entry, recorded_at=None) for entry in frf_recordings(before)))
     report = reported([undated, made("september", SEPTEMBER, effects=HEAVY_TIP, seed=8)], table, "contact_resonance")
@@ -87,7 +94,8 @@ def test_without_all_dates_no_date_is_given_and_the_order_is_told(table: SigmaTa
     ) in report["statement"]
 
 
-def test_one_sensor_that_ages_is_no_physics_of_the_skin(table: SigmaTable) -> None:
+def test_sensor_ages_no_physics_skin(table: SigmaTable) -> None:
+    """One sensor that ages is no physics of the skin."""
     before, after = dates()
     report = reported([before, with_gain(after, s03=0.75)], table, "ageing")
     assert report["verdict"] == "explained"
@@ -99,8 +107,11 @@ def test_one_sensor_that_ages_is_no_physics_of_the_skin(table: SigmaTable) -> No
     assert values["may", "s03"]["low"] < 14.0 < values["may", "s03"]["high"]
 
 
-def test_two_sensors_that_have_each_others_d33_since_a_date_are_exchanged_and_none_aged(table: SigmaTable) -> None:
-    """Presses at the sensors' centres: places tell nothing, the levels alone do."""
+def test_two_sensors_d33_since_date_exchanged(table: SigmaTable) -> None:
+    """Two sensors that have each others d33 since a date are exchanged and none aged.
+
+    Presses at the sensors' centres: places tell nothing, the levels alone do.
+    """
     before, after = dates()
     before = with_gain(before, s02=1.3, s05=0.8)
     report = reported([before, with_gain(after, s05=1.3, s02=0.8)], table, "ageing")
@@ -125,8 +136,11 @@ def silent(campaign: Campaign, sensor: str, seed: int) -> Campaign:
 
 
 @pytest.mark.parametrize("seed", first(1, [4, 5, 6, 7]))
-def test_a_sensor_that_died_between_two_dates_comes_first_and_hides_no_other(seed: int, table: SigmaTable) -> None:
-    """It is left out of all that is said of both: its noise is no sensor with 13 times the others' charge."""
+def test_sensor_died_two_dates_comes_first_hides(seed: int, table: SigmaTable) -> None:
+    """A sensor that died between two dates comes first and hides no other.
+
+    It is left out of all that is said of both: its noise is no sensor with 13 times the others' charge.
+    """
     before, after = dates()
     report = reported([before, silent(with_gain(after, s03=0.85), "s06", seed)], table, "ageing")
     said = sentences(report["statement"])
@@ -139,8 +153,11 @@ def test_a_sensor_that_died_between_two_dates_comes_first_and_hides_no_other(see
     }
 
 
-def test_a_slow_fall_of_the_array_over_four_dates_is_a_change(table: SigmaTable) -> None:
-    """Each step of 3 % could be an amplifier's; all four together fall by 8.7 %, and no sensor beside the others."""
+def test_slow_fall_array_over_four_dates_change(table: SigmaTable) -> None:
+    """A slow fall of the array over four dates is a change.
+
+    Each step of 3 % could be an amplifier's; all four together fall by 8.7 %, and no sensor beside the others.
+    """
     times = ["2017-05-03", "2017-07-03", "2017-09-03", "2017-11-03"]
     made_on = [
         made(f"date {number}", f"{time}T09:00:00Z", seed=20 + number, d33=14.0 * 0.97**number)
@@ -157,7 +174,8 @@ def test_a_slow_fall_of_the_array_over_four_dates_is_a_change(table: SigmaTable)
     assert levels == pytest.approx([14.0 * 0.97**number for number in range(4)], rel=0.02)
 
 
-def test_where_nothing_changed_one_d33_serves_and_is_of_the_last_alone(table: SigmaTable) -> None:
+def test_nothing_changed_d33_serves_last_alone(table: SigmaTable) -> None:
+    """Where nothing changed one d33 serves and is of the last alone."""
     report = reported(dates(), table, "ageing", "contact_resonance")
     assert (report["verdict"], report["mechanisms"]) == ("no_mismatch", [])
     assert report["probability"] > 0.9
@@ -201,8 +219,10 @@ def test_what_cannot_be_put_together_is_refused(table: SigmaTable) -> None:
             diagnose_fleet(skins, "refused", table)
 
 
-def test_the_command_writes_one_report_of_several_files_and_its_page() -> None:
-    """Files of one name in two folders are one report all the same; a recording that was refused is a finding of it.
+def test_command_writes_report_several_files() -> None:
+    """The command writes one report of several files and its page.
+
+    Files of one name in two folders are one report all the same; a recording that was refused is a finding of it.
 
     The d33 of all sensors fell: ageing would do this, and so would an amplifier, so that what is told of ageing
     elsewhere is not claimed. Its page draws the d33 of each sensor over the campaigns.
@@ -236,9 +256,12 @@ def test_the_command_writes_one_report_of_several_files_and_its_page() -> None:
 
 
 @pytest.mark.soak
-def test_a_block_measured_apart_tells_the_modulus_of_all_dates(table: SigmaTable) -> None:
-    """E is 9 where 16 is declared: FRFs leave open whether it is the thickness; the block counts for both dates, also
-    where a campaign before them cannot be used, and once where it was joined to both."""
+def test_block_measured_apart_tells_modulus(table: SigmaTable) -> None:
+    """A block measured apart tells the modulus of all dates.
+
+    E is 9 where 16 is declared: FRFs leave open whether it is the thickness; the block counts for both dates, also
+    where a campaign before them cannot be used, and once where it was joined to both.
+    """
     short = replace(made("april", "2017-04-03T09:00:00Z"), recordings=made("april").recordings[:1])
     apart = reported([short, *dates(modulus=9.0), of_block(9.0)], table)
     assert apart["campaigns"] == ["april", "may", "september", "block"]
@@ -256,7 +279,8 @@ def test_a_block_measured_apart_tells_the_modulus_of_all_dates(table: SigmaTable
 
 
 @pytest.mark.soak
-def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_with(table: SigmaTable) -> None:
+def test_block_elastomer_contradicts_campaign(table: SigmaTable) -> None:
+    """A block of another elastomer contradicts the campaign that it counts with."""
     report = reported([*dates(), of_block(48.0)], table)
     (entry,) = report["contradictions"]
     assert entry["statement"].startswith("may: The FRFs and the block contradict each other")
@@ -265,8 +289,11 @@ def test_a_block_of_another_elastomer_contradicts_the_campaign_that_it_counts_wi
     assert said.startswith("In may: The FRFs and the block contradict each other")
 
 
-def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(table: SigmaTable) -> None:
-    """As if all were in one file."""
+def test_block_measured_apart_counts_beside(table: SigmaTable) -> None:
+    """A block measured apart counts beside one campaign of frfs.
+
+    As if all were in one file.
+    """
     report = reported([made("may", modulus=9.0), of_block(9.0)], table)
     assert report["campaigns"] == ["may", "block"]
     assert (report["verdict"], [entry["name"] for entry in report["mechanisms"]]) == ("explained", ["modulus_error"])
@@ -275,10 +302,11 @@ def test_a_block_measured_apart_counts_beside_one_campaign_of_frfs(table: SigmaT
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("stiffness", "scatter"), first(1, [(0.25, 0.16), (0.15, 0.0)]))
-def test_a_glue_line_that_begins_to_slip_is_listed_with_its_date(
-    stiffness: float, scatter: float, table: SigmaTable
-) -> None:
-    """On centred sensors it is one factor, as is ageing, which only falls; that sensors differ hides nothing."""
+def test_glue_line_begins_slip_listed_date(stiffness: float, scatter: float, table: SigmaTable) -> None:
+    """A glue line that begins to slip is listed with its date.
+
+    On centred sensors it is one factor, as is ageing, which only falls; that sensors differ hides nothing.
+    """
     slips = {"interface_slip": {"glue_stiffness": stiffness}}
     before, after = made("may"), made("september", SEPTEMBER, effects=slips, seed=8)
     sensors = [entry.id for entry in before.skin.sensors]

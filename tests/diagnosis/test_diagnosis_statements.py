@@ -40,8 +40,11 @@ def with_slips(table: SigmaTable) -> Iterator[dict[str, Any]]:
             yield lean_report(wrong.campaign, table, *beside(*description["effects"], "sensor_spread"))
 
 
-def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None:
-    """In few sentences all the same, as `lean_report` holds every report to."""
+def test_slip_decides_comes_before_verdict(table: SigmaTable) -> None:
+    """A slip that decides comes before the verdict.
+
+    In few sentences all the same, as `lean_report` holds every report to.
+    """
     begun = [report for report in with_slips(table) if report["verdict"] != "insufficient_data"]
     decided = [report for report in begun if "apart from that, " in sentences(report["statement"])[0]]
     assert len(decided) >= 2
@@ -52,8 +55,11 @@ def test_a_slip_that_decides_comes_before_the_verdict(table: SigmaTable) -> None
 
 
 @pytest.mark.soak
-def test_statements_of_all_kinds_of_campaigns_are_short(table: SigmaTable) -> None:
-    """Each of these reports is held to it where it is made."""
+def test_statements_kinds_campaigns_short(table: SigmaTable) -> None:
+    """Statements of all kinds of campaigns are short.
+
+    Each of these reports is held to it where it is made.
+    """
     for number in (2, 0, 1, 3):
         for hidden in ("none", "single", "pair", "unknown"):
             whole_report(parse(rig_campaign(record(drawn(SEED, number, hidden)))), table)
@@ -86,7 +92,8 @@ def test_what_keeps_an_axis_undecidable_is_named(table: SigmaTable) -> None:
     assert "whether it depends on" in report["location"]["statement"]
 
 
-def test_each_mechanism_of_a_set_has_its_own_part_of_the_misfit(table: SigmaTable) -> None:
+def test_mechanism_set_part_misfit(table: SigmaTable) -> None:
+    """Each mechanism of a set has its own part of the misfit."""
     made = Made(("ageing", "amplifier_high_pass"), (0.3, 300.0, 0.0, 0.3))
     report = lean_report(campaign(made, table), table, *beside(*made.mechanisms, "timing_delay", "thickness_error"))
     parts = {entry["name"]: entry["explains_percent"] for entry in report["mechanisms"]}
@@ -101,7 +108,8 @@ def ageing(table: SigmaTable) -> dict[str, Any]:
     return lean_report(made, table, *beside("ageing", "preload_dependent_d33", "sensor_spread", "thickness_error"))
 
 
-def test_a_probability_is_never_certain_and_the_same_everywhere(ageing: dict[str, Any]) -> None:
+def test_probability_never_certain_everywhere(ageing: dict[str, Any]) -> None:
+    """A probability is never certain and the same everywhere."""
     assert ageing["verdict"] == "explained"
     assert ageing["probability"] == 0.985
     assert ageing["alternatives"][0]["mechanisms"] == ["none_of_these"]
@@ -111,7 +119,8 @@ def test_a_probability_is_never_certain_and_the_same_everywhere(ageing: dict[str
     assert any(re.fullmatch(numbers, entry["why_not"]) for entry in ageing["alternatives"][1:])
 
 
-def test_sentences_are_plain_and_hold_no_statistics(ageing: dict[str, Any]) -> None:
+def test_sentences_plain_hold_no_statistics(ageing: dict[str, Any]) -> None:
+    """Sentences are plain and hold no statistics."""
     assert "recordings after many load cycles are lower" in ageing["statement"]
     texts = [ageing["statement"], ageing["location"]["statement"]]
     texts += [entry["why_not"] for entry in ageing["alternatives"]]

@@ -85,7 +85,8 @@ def warming_report(warming: Campaign, table: SigmaTable) -> dict[str, Any]:
 
 
 @pytest.mark.soak
-def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: dict[str, Any]) -> None:
+def test_column_lab_added_gain_follows(warming_report: dict[str, Any]) -> None:
+    """A column that the lab added is what the gain follows."""
     law = warming_report["unnamed"]
     assert warming_report["verdict"] == "unexplained"
     assert warming_report["mechanisms"] == []
@@ -103,9 +104,8 @@ def test_a_column_that_the_lab_added_is_what_the_gain_follows(warming_report: di
     assert "recordings held out are predicted to" in statement
 
 
-def test_the_plan_is_to_compare_the_ends_between_which_the_law_changes_the_charge_most(
-    warming: Campaign, warming_report: dict[str, Any]
-) -> None:
+def test_plan_compare_ends_law_changes_charge(warming: Campaign, warming_report: dict[str, Any]) -> None:
+    """The plan is to compare the ends between which the law changes the charge most."""
     planned = warming_report["next_experiment"]
     cold, warm = planned["recordings"]
     noted_c = [float(entry.conditions["temperature_c"]) for entry in frf_of(warming) if entry.conditions]
@@ -122,8 +122,11 @@ def test_the_plan_is_to_compare_the_ends_between_which_the_law_changes_the_charg
     assert 22 <= int(told[1]) <= 32
 
 
-def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, table: SigmaTable) -> None:
-    """Where load cycles and times follow the order as well, each has another cause, and none holds four fifths."""
+def test_cause_told_order_alone_followed(quiet: Campaign, table: SigmaTable) -> None:
+    """A cause is told where the order alone can be followed.
+
+    Where load cycles and times follow the order as well, each has another cause, and none holds four fifths.
+    """
     step = changed(quiet, lambda _, number, __: 1.6 if number >= 30 else 1.0)
     entries = [replace(entry, load_cycles=None, recorded_at=None) for entry in frf_recordings(step)]
     found = reported(replace(step, recordings=tuple(entries)), table)
@@ -135,10 +138,11 @@ def test_a_cause_is_told_where_the_order_alone_can_be_followed(quiet: Campaign, 
 
 
 @pytest.mark.soak
-def test_what_followed_the_order_is_confirmed_by_repeating_recordings_of_both_ends(
-    quiet: Campaign, table: SigmaTable
-) -> None:
-    """What may be behind it is said as docs/unlisted.md has it."""
+def test_followed_order_confirmed_repeating(quiet: Campaign, table: SigmaTable) -> None:
+    """What followed the order is confirmed by repeating recordings of both ends.
+
+    What may be behind it is said as docs/unlisted.md has it.
+    """
     found = reported(changed(quiet, lambda _, number, __: 1.15 if number >= 30 else 1.0), table)
     assert found["unnamed"]["axis"] in ("order", "recorded_at")
     row = f"| `{found['unnamed']['acts_on']}` | `{found['unnamed']['axis']}` | "
@@ -150,13 +154,14 @@ def test_what_followed_the_order_is_confirmed_by_repeating_recordings_of_both_en
     assert {"order", "recorded_at"}.isdisjoint(planned["recordings"][0])
 
 
-def test_the_same_recordings_give_the_same_report(
-    warming: Campaign, warming_report: dict[str, Any], table: SigmaTable
-) -> None:
+def test_recordings_give_report(warming: Campaign, warming_report: dict[str, Any], table: SigmaTable) -> None:
+    """The same recordings give the same report."""
     assert json.dumps(reported(warming, table)) == json.dumps(warming_report)
 
 
-def test_a_resonance_of_the_frame_is_a_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
+def test_resonance_frame_peak_over_frequency(quiet: Campaign, table: SigmaTable) -> None:
+    """A resonance of the frame is a peak over frequency."""
+
     def frame(_: FrfRecording, __: int, frequency: Floats) -> Complexes:
         u = frequency / 150.0
         return np.asarray(1 + 0.1 * u**2 / (1 - u**2 + 0.1j * u))
@@ -168,7 +173,8 @@ def test_a_resonance_of_the_frame_is_a_peak_over_frequency(quiet: Campaign, tabl
     assert values["damping"]["value"] == pytest.approx(0.05, rel=0.2)
 
 
-def test_a_loss_that_follows_the_amplitude_is_a_lag(table: SigmaTable) -> None:
+def test_loss_follows_amplitude_lag(table: SigmaTable) -> None:
+    """A loss that follows the amplitude is a lag."""
     made = campaign(Made(sensors=3, dynamic_forces_n=(0.03, 0.06, 0.12), lines=16), table)
     report = reported(changed(made, lambda entry, _, __: complex(np.exp(-2j * entry.dynamic_force_n))), table)
     acts_on, axis, form = law_of(report)
@@ -204,9 +210,8 @@ def test_a_law_is_adopted_within_its_range(
     assert not_adopted(of_order) is not None
 
 
-def test_what_the_lab_declared_is_recognised_by_name(
-    warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_lab_declared_recognised_name(warming: Campaign, table: SigmaTable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the lab declared is recognised by name."""
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", "examples/mechanisms")
     CATALOGUE.reload()
     try:
@@ -222,7 +227,8 @@ def test_what_the_lab_declared_is_recognised_by_name(
 
 
 @pytest.mark.soak
-def test_shares_are_those_among_laws_and_a_course_of_no_form_that_is_more_probable_is_said(table: SigmaTable) -> None:
+def test_shares_among_laws_course_no_form(table: SigmaTable) -> None:
+    """Shares are those among laws and a course of no form that is more probable is said."""
     made = campaign(Made(sensors=3, offsets_mm=(0.0, 0.8), lines=20, highest_hz=1000.0, repeats=2, gain=0.005), table)
     apart = np.abs(np.subtract.outer(*[np.arange(len(made.recordings))] * 2)) * np.sqrt(3) / 10
     matern = (1 + apart) * np.exp(-apart) + 1e-9 * np.eye(len(apart))
@@ -236,7 +242,8 @@ def test_shares_are_those_among_laws_and_a_course_of_no_form_that_is_more_probab
     assert "more probable still is a course of no listed form" in found["statement"]
 
 
-def test_a_high_pass_of_another_order_is_said_to_be_one(quiet: Campaign, table: SigmaTable) -> None:
+def test_high_pass_order_said(quiet: Campaign, table: SigmaTable) -> None:
+    """A high pass of another order is said to be one."""
     report = reported(changed(quiet, lambda _, __, hz: np.asarray((1 / (1 - 2j / hz)) ** 0.4, complex)), table)
     law = report["unnamed"]
     assert law_of(report) == ("frequency_response", "frequency_hz", "threshold")
@@ -262,7 +269,8 @@ def left_out(
 
 
 @pytest.mark.soak
-def test_a_thickness_that_is_off_everywhere_is_found_without_its_mechanism(table: SigmaTable) -> None:
+def test_thickness_off_everywhere_found(table: SigmaTable) -> None:
+    """A thickness that is off everywhere is found without its mechanism."""
     found = left_out("thickness_error", (1.2,), table)
     law = found["unnamed"]
     assert law_of(found) == ("thickness", "preload_n", "linear")
@@ -272,7 +280,8 @@ def test_a_thickness_that_is_off_everywhere_is_found_without_its_mechanism(table
 
 
 @pytest.mark.soak
-def test_a_place_that_is_off_everywhere_can_be_adopted(table: SigmaTable) -> None:
+def test_place_off_everywhere_adopted(table: SigmaTable) -> None:
+    """A place that is off everywhere can be adopted."""
     found = left_out("misalignment", (0.5, -0.3), table, without=[name for name in FEW if name != "misalignment"])
     assert law_of(found) == ("position", "x_mm", "linear")
     along_x, along_y = found["unnamed"]["parameters"]
@@ -285,7 +294,8 @@ def test_a_place_that_is_off_everywhere_can_be_adopted(table: SigmaTable) -> Non
 
 
 @pytest.mark.soak
-def test_a_gain_of_each_sensor_is_found_without_its_mechanism(table: SigmaTable) -> None:
+def test_gain_sensor_found_without_mechanism(table: SigmaTable) -> None:
+    """A gain of each sensor is found without its mechanism."""
     made = replace(PLACES, sensors=9, sensor_radius_mm=0.5, offsets_mm=(0.0,), preloads_n=(0.2, 1.0, 5.0))
     found = left_out("sensor_spread", (0.25,), table, made)
     assert law_of(found)[:2] == ("gain", "sensor")
@@ -295,8 +305,11 @@ def test_a_gain_of_each_sensor_is_found_without_its_mechanism(table: SigmaTable)
 
 
 @pytest.mark.soak
-def test_other_mechanisms_are_found_without_their_names(table: SigmaTable) -> None:
-    """A delay of half a turn is so large that others together follow it better than the tangent of any law."""
+def test_mechanisms_found_without_names(table: SigmaTable) -> None:
+    """Other mechanisms are found without their names.
+
+    A delay of half a turn is so large that others together follow it better than the tangent of any law.
+    """
     assert law_of(left_out("timing_delay", (350.0,), table)) == ("frequency_response", "frequency_hz", "linear")
     found = left_out("ageing", (0.5, 300.0, 0.0), table, Made(sensors=3, repeats=2))
     assert found["unnamed"]["acts_on"] == "gain"
@@ -304,9 +317,10 @@ def test_other_mechanisms_are_found_without_their_names(table: SigmaTable) -> No
 
 
 @pytest.mark.soak
-def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_another_exponent(
+def test_contact_grows_power_force_hertz_s(
     table: SigmaTable,
 ) -> None:
+    """A contact that grows with another power of the force is hertz s with another exponent."""
     drawn = draw(np.random.default_rng([4242, 67]), "hertz")
     assert "F^0.067 instead of F^(1/3)" in drawn.truth["law"]["expression"]
     report = reported(parse(as_json(drawn)), table)
@@ -317,8 +331,11 @@ def test_a_contact_that_grows_with_another_power_of_the_force_is_hertz_s_with_an
     assert "in place of 1/3" in report["statement"]
 
 
-def test_a_constant_phase_beside_weak_sensors_is_told_apart_from_them(table: SigmaTable) -> None:
-    """Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle."""
+def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
+    """A constant phase beside weak sensors is told apart from them.
+
+    Two sensors of six that lost a fifth and two fifths, and all FRFs turned by the same angle.
+    """
     made = campaign(Made(sensors=6, gain=0.01, line=0.005, highest_hz=800.0), table)
     kept = {"s2": 0.8, "s4": 0.6}
     phase = np.exp(-1j * np.radians(1.2))
@@ -343,17 +360,21 @@ RIG: list[tuple[dict[str, Any], tuple[str, str, str], dict[str, float]]] = [
 
 
 @pytest.mark.parametrize(("effects", "law", "values"), first(1, RIG))
-def test_what_the_rig_hides_in_the_order_of_recordings_is_found(
+def test_rig_hides_order_recordings_found(
     effects: dict[str, Any], law: tuple[str, str, str], values: dict[str, float], table: SigmaTable
 ) -> None:
-    """A place that runs round is a periodic place; what remembers the preload before follows that."""
+    """What the rig hides in the order of recordings is found.
+
+    A place that runs round is a periodic place; what remembers the preload before follows that.
+    """
     report = rig_report(table, effects, *FEW)
     assert all(wanted in ("", found) for found, wanted in zip(law_of(report), law, strict=True))
     told = {entry["name"]: entry["value"] for entry in report["unnamed"]["parameters"]}
     assert {name: told[name] for name in values} == pytest.approx(values, rel=0.02)
 
 
-def test_the_scatter_of_an_ordinary_rig_is_nothing_missing_and_a_larger_one_is(table: SigmaTable) -> None:
+def test_scatter_ordinary_rig_nothing_missing(table: SigmaTable) -> None:
+    """The scatter of an ordinary rig is nothing missing and a larger one is."""
     if SOAK:
         assert rig_report(table, {}, *FEW, gain=0.02, position_mm=0.28)["verdict"] == "no_mismatch"
         assert rig_report(table, {}, *FEW, gain=0.05)["verdict"] == "no_mismatch"

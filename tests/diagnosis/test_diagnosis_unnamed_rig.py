@@ -33,7 +33,8 @@ def report_on(name: str, table: SigmaTable) -> dict[str, Any]:
 
 @pytest.mark.soak
 @needs_campaigns
-def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out(table: SigmaTable) -> None:
+def test_laws_independent_rig_found_predict_held(table: SigmaTable) -> None:
+    """Most laws of an independent rig are found and predict what was held out."""
     truths = [entry for entry in json.loads((SHARED / TRUTH).read_text()).items() if entry[1]["identifiable"]]
     right, shares = 0, []
     for name, truth in (tried := first(5, truths)):
@@ -55,8 +56,11 @@ def test_most_laws_of_an_independent_rig_are_found_and_predict_what_was_held_out
 
 @needs_campaigns
 @pytest.mark.soak
-def test_a_delay_that_disperses_is_a_delay_with_another_exponent(table: SigmaTable) -> None:
-    """A phase that grows with the square of frequency."""
+def test_delay_disperses_delay_exponent(table: SigmaTable) -> None:
+    """A delay that disperses is a delay with another exponent.
+
+    A phase that grows with the square of frequency.
+    """
     report = report_on("c6h8e3rgx", table)
     assert "this is a delay with another exponent: its phase grows with frequency to the power" in report["statement"]
     exponent = next(entry for entry in report["unnamed"]["parameters"] if entry["name"] == "exponent")
@@ -64,8 +68,11 @@ def test_a_delay_that_disperses_is_a_delay_with_another_exponent(table: SigmaTab
 
 
 @pytest.mark.soak
-def test_a_law_that_leads_a_fit_to_absurd_responses_is_no_better_for_it(table: SigmaTable) -> None:
-    """A high pass whose corner rises with the preload, of which this diagnosis once failed."""
+def test_law_leads_fit_absurd_responses(table: SigmaTable) -> None:
+    """A law that leads a fit to absurd responses is no better for it.
+
+    A high pass whose corner rises with the preload, of which this diagnosis once failed.
+    """
     content, _ = from_dict(recorded(record(drawn(61496, 231, None))))
     report = whole_report(content, table)
     assert report["verdict"] == "unexplained"

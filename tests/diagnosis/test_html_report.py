@@ -57,7 +57,8 @@ def test_every_text_of_a_campaign_is_escaped() -> None:
     assert "Content-Security-Policy" in shown
 
 
-def test_a_report_without_an_answer_says_what_is_lacking() -> None:
+def test_report_without_answer_says_lacking() -> None:
+    """A report without an answer says what is lacking."""
     shown = body_of(EMPTY, {})
     assert re.findall("<h2>(.*?)</h2>", shown) == [WHERE, "What to measure next"]
     assert texts(shown) == (
@@ -67,7 +68,8 @@ def test_a_report_without_an_answer_says_what_is_lacking() -> None:
     assert texts(provenance(EMPTY)) == "Made with underskin 1 tables sigma ab"
 
 
-def test_figures_stand_where_they_belong_and_are_not_escaped() -> None:
+def test_figures_stand_belong_not_escaped() -> None:
+    """Figures stand where they belong and are not escaped."""
     names = ("frf", "where", "explanations", "parameters")
     shown = body_of(EMPTY, {name: f'<div id="{name}"></div>' for name in names})
     places = [shown.index(f'<div id="{name}"></div>') for name in names]
@@ -75,7 +77,8 @@ def test_figures_stand_where_they_belong_and_are_not_escaped() -> None:
     assert places[2] < shown.index(f"<h2>{WHERE}</h2>") < shown.index("<h2>What the model lacks") < places[3]
 
 
-def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:
+def test_plan_table_fields_recordings() -> None:
+    """A plan is a table of the fields that its recordings have."""
     planned = {
         "recordings": [{"sensor": "=s1", "preload_n": 2.0, "position_mm": [1.0, 2.5]}],
         "statement": "One recording.",
@@ -91,7 +94,8 @@ def test_a_plan_is_a_table_of_the_fields_that_its_recordings_have() -> None:
     assert unquote(unescape(address[0])) == "sensor,preload_n,position_mm\r\n'=s1,2.0,1.0 2.5\r\n"
 
 
-def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_range() -> None:
+def test_law_nobody_listed_shown_numbers_rivals() -> None:
+    """A law that nobody listed is shown with its numbers its rivals and its range."""
     parameter = {"name": "change", "unit": "-", "value": -0.08, "low": -0.1, "high": -0.06}
     law = {
         "acts_on": "gain",
@@ -113,7 +117,8 @@ def test_a_law_that_nobody_listed_is_shown_with_its_numbers_its_rivals_and_its_r
     assert "the time of day 8 to 17.5 h; operator: jd, mb; the preload 0.5 to 2 N, over its own range." in shown
 
 
-def test_small_forces_are_in_a_unit_in_which_they_read_well_with_minus_signs() -> None:
+def test_small_forces_unit_read_well_minus_signs() -> None:
+    """Small forces are in a unit in which they read well with minus signs."""
     parameter = {"name": "pull", "unit": "N", "value": -1.5e-06, "low": -1.8e-06, "high": -1.2e-06}
     law = {
         "acts_on": "force",
@@ -132,7 +137,8 @@ def test_small_forces_are_in_a_unit_in_which_they_read_well_with_minus_signs() -
     assert "pull −1.5 −1.8 to −1.2 µN" in shown
 
 
-def test_what_is_to_be_quoted_has_the_digits_of_the_statement() -> None:
+def test_quoted_digits_statement() -> None:
+    """What is to be quoted has the digits of the statement."""
     d33 = {"value": 13.1234, "low": 12.8912, "high": 13.4321, "unit": "pC/N"}
     errors = {"heldout_rmse_percent": 2.0, "rmse_percent": 2.0}
     fit = {"before": errors, "after": errors, "noise_floor_percent": 2.0, "groups": []}
@@ -142,7 +148,8 @@ def test_what_is_to_be_quoted_has_the_digits_of_the_statement() -> None:
 
 
 @pytest.mark.parametrize(("worst", "told"), [(31.3, True), (18.0, False)])
-def test_a_group_that_the_others_do_not_foretell_is_told_beside_the_error(worst: float, told: bool) -> None:
+def test_group_not_foretell_told_beside_error(worst: float, told: bool) -> None:
+    """A group that the others do not foretell is told beside the error."""
     groups = [
         {
             "group": name,
@@ -163,8 +170,11 @@ def test_a_group_that_the_others_do_not_foretell_is_told_beside_the_error(worst:
     ("verdict", "probability", "decided"),
     [("explained", 0.97, True), ("no_mismatch", 0.6, False), ("ambiguous", 0.5, False)],
 )
-def test_an_answer_that_is_not_sure_is_not_called_decided(verdict: str, probability: float, decided: bool) -> None:
-    """Of a campaign whose rivals no recording of its rig would tell apart."""
+def test_answer_not_sure_not_called_decided(verdict: str, probability: float, decided: bool) -> None:
+    """An answer that is not sure is not called decided.
+
+    Of a campaign whose rivals no recording of its rig would tell apart.
+    """
     shown = texts(body_of({**EMPTY, "verdict": verdict, "probability": probability}, {}))
     assert ("these recordings decide" in shown) == decided
     assert ("These recordings do not decide" in shown) == (not decided)

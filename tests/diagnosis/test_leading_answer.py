@@ -36,7 +36,8 @@ def test_the_most_probable_kind_leads(shares: tuple[float, ...], leader: str) ->
     assert len(ranked) == len(shares)
 
 
-def test_what_leads_together_is_said_with_its_sum() -> None:
+def test_leads_together_said_sum() -> None:
+    """What leads together is said with its sum."""
     statement = answer_statement(leading_first(answers(0.34, 0.05, 0.21, 0.2, 0.2)), "ambiguous")
     assert statement.startswith("Known mechanisms explain this (61 % together), best ageing (21 %), but these rivals")
     assert "something without a name (34 %)" in statement

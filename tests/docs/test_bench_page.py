@@ -4,5 +4,6 @@ from bench.__main__ import PARTS
 from bench.page import AGAINST, EXPLANATIONS, SECTIONS
 
 
-def test_every_part_has_a_title_and_an_explanation() -> None:
+def test_every_part_title_explanation() -> None:
+    """Every part has a title and an explanation."""
     assert {*PARTS, AGAINST} == set(SECTIONS) == set(EXPLANATIONS)

@@ -22,7 +22,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.usefixtures("folder")
-def test_figures_of_parts_are_added_up_and_the_worst_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_parts_added_up_worst_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures of parts are added up and the worst counts."""
     assert soak.measure() == []
     for part, kills, slowest in ((0, 20, 120.0), (1, 20, 90.0), (1, 20, 110.0)):  # part 1 was run twice
         monkeypatch.setenv("PYTEST_CURRENT_TEST", f"tests/test_x.py::test_y[{part}] (call)")
@@ -46,7 +47,8 @@ def test_nothing_is_kept_at_reduced_counts(folder: Path, monkeypatch: pytest.Mon
     assert not folder.exists()
 
 
-def test_parts_of_a_soak_are_of_the_commits_that_finished_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parts_soak_commits_finished(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of a soak are of the commits that finished them."""
     monkeypatch.setattr(page, "RESULTS", tmp_path / "results.json")
     monkeypatch.setattr(page, "PAGE", tmp_path / "validation.md")
     kills, slowest = Figure("kills", 250, "", 250), Figure("slowest", 120.0, "ms", 300, "lower")
@@ -59,7 +61,8 @@ def test_parts_of_a_soak_are_of_the_commits_that_finished_them(tmp_path: Path, m
 
 
 @pytest.mark.slow
-def test_a_soak_that_is_run_again_skips_what_has_passed() -> None:
+def test_soak_run_again_skips_passed() -> None:
+    """A soak that is run again skips what has passed."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rs", "tests/test_digits.py"]
     for _ in range(2):
         environment = os.environ | {"UNDERSKIN_SOAK": "1"}

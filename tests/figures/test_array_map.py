@@ -34,7 +34,8 @@ def test_sensors_that_are_alike_are_grey() -> None:
     assert "no sensor's differs" in told_apart(np.full(64, 13.1), np.full(64, 0.12))
 
 
-def test_who_differs_is_coloured_on_a_scale_that_reaches_as_far_as_chance() -> None:
+def test_differs_coloured_scale_reaches_far() -> None:
+    """Who differs is coloured on a scale that reaches as far as chance."""
     values = 13.1 + 0.12 * np.random.default_rng(2).normal(size=64)
     values[17] = 14.2
     figure = drawn(values)
@@ -48,7 +49,8 @@ def test_who_differs_is_coloured_on_a_scale_that_reaches_as_far_as_chance() -> N
     assert "1 of 64 differ" in told_apart(values, np.full(64, 0.12))
 
 
-def test_one_far_beyond_many_that_differ_does_not_pale_them() -> None:
+def test_far_beyond_many_differ_not_pale() -> None:
+    """One far beyond many that differ does not pale them."""
     values = np.concatenate([-0.4 - 0.5 * np.random.default_rng(5).uniform(size=63), [-5.4]])
     quantity = Quantity("difference", "pC/N", "zero")
     (differs,) = [trace for trace in drawn(values, quantity=quantity).data if trace.name == "difference"]
@@ -57,7 +59,8 @@ def test_one_far_beyond_many_that_differ_does_not_pale_them() -> None:
     assert told.endswith(". 1 beyond the scale has the colour of its end.")
 
 
-def test_a_sensor_far_off_does_not_colour_the_others() -> None:
+def test_sensor_far_off_not_colour() -> None:
+    """A sensor far off does not colour the others."""
     values = np.array([14.0, 14.05, 13.95, 2.0])
     assert differ_from_others(values, np.full(4, 0.1)).tolist() == [False, False, False, True]
     assert differ_from_others(np.array([14.0, 12.0]), np.full(2, 0.1)).all()
@@ -75,7 +78,8 @@ def test_discs_never_overlap_and_carry_their_ids(pitch: float) -> None:
     assert [text for trace in figure.data for text in trace.text] == SENSORS
 
 
-def test_who_stands_out_and_who_is_chosen_have_rings_and_every_value_its_interval() -> None:
+def test_stands_out_chosen_rings_every_value() -> None:
+    """Who stands out and who is chosen have rings and every value its interval."""
     reasons = ["", "", "weak: 21 % of the array's d33"]
     figure = array_map(SENSORS[:3], X[:3], Y[:3], [14.0, 14.1, 3.0], [0.1] * 3, reasons, chosen="s01")
     widths = [shape.line.width for shape in figure.layout.shapes]
@@ -92,7 +96,8 @@ def test_who_stands_out_and_who_is_chosen_have_rings_and_every_value_its_interva
     )  # the legend shows the ring, whatever the disc's colour
 
 
-def test_a_signed_charge_has_zero_in_the_middle_of_its_colours() -> None:
+def test_signed_charge_zero_middle_colours() -> None:
+    """A signed charge has zero in the middle of its colours."""
     figure = loaded_array(SENSORS[:3], X[:3], Y[:3], [5.0, -2.0, 0.001], [0.01] * 3, [])
     (charge,) = [trace for trace in figure.data if trace.name == "charge"]
     assert (charge.marker.cmin, charge.marker.cmax) == (-5.0, 5.0)
@@ -103,7 +108,8 @@ def test_a_signed_charge_has_zero_in_the_middle_of_its_colours() -> None:
     assert green
 
 
-def test_charges_of_one_sign_are_coloured_from_0_and_are_grey_within_their_error_alone() -> None:
+def test_charges_sign_coloured_0_grey() -> None:
+    """Charges of one sign are coloured from 0 and are grey within their error alone."""
     figure = loaded_array(SENSORS[:4], X[:4], Y[:4], [5.0, 0.0006, 0.0002, -0.001], [0.006, *[0.0003] * 3], [])
     (charge,) = [trace for trace in figure.data if trace.name == "charge"]
     (grey,) = [trace for trace in figure.data if trace.name == "0 within its ±"]
@@ -115,7 +121,8 @@ def test_charges_of_one_sign_are_coloured_from_0_and_are_grey_within_their_error
     assert (drawn_in.cmin, drawn_in.cmax) == (-5.0, 0.0)
 
 
-def test_an_uncertainty_is_coloured_from_0_and_an_unknown_value_is_white() -> None:
+def test_uncertainty_coloured_0_unknown_value() -> None:
+    """An uncertainty is coloured from 0 and an unknown value is white."""
     values = np.full(64, 0.2)
     values[5] = np.nan
     figure = drawn(values, quantity=Quantity("uncertainty of d33", "pC/N", "nothing"))
@@ -124,7 +131,8 @@ def test_an_uncertainty_is_coloured_from_0_and_an_unknown_value_is_white() -> No
     assert fills(figure)[5] == "#ffffff"
 
 
-def test_the_chosen_sensor_has_a_ring_on_the_ground_that_touches_no_other() -> None:
+def test_chosen_sensor_ring_ground_touches() -> None:
+    """The chosen sensor has a ring on the ground that touches no other."""
     values = np.full(64, 13.1)
     figure = array_map(SENSORS, X, Y, values, 0.01 * values, [""] * 64, chosen="s09")
     *discs, ring = figure.layout.shapes
@@ -135,7 +143,9 @@ def test_the_chosen_sensor_has_a_ring_on_the_ground_that_touches_no_other() -> N
     assert own.x1 < ring.x1 < beside.x0
 
 
-def test_discs_have_the_sensors_size_where_it_can_be_seen() -> None:
+def test_discs_sensors_size_seen() -> None:
+    """Discs have the sensors size where it can be seen."""
+
     def widths(radius: float | None, pitch: float) -> set[float]:
         x, y = (pitch / 4.0 * part for part in (X, Y))
         figure = array_map(SENSORS, x, y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=radius)
@@ -150,7 +160,8 @@ def test_discs_have_the_sensors_size_where_it_can_be_seen() -> None:
     assert "not declared" in disc_size(X, Y, None)
 
 
-def test_ids_stand_below_discs_that_have_no_room_for_them() -> None:
+def test_ids_stand_below_discs_no_room() -> None:
+    """Ids stand below discs that have no room for them."""
     figure = array_map(SENSORS, 2 * X, 2 * Y, np.full(64, 13.0), np.full(64, 0.1), [""] * 64, sensor_radius_mm=1.5)
     (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
     assert list(ids.text) == SENSORS
@@ -166,7 +177,8 @@ def test_a_map_holds_all_loads() -> None:
     assert figure.layout.xaxis.range[1] > X.max()
 
 
-def test_a_sensor_that_was_not_measured_with_the_others_is_hollow_and_compared_with_none() -> None:
+def test_sensor_not_measured_hollow_compared() -> None:
+    """A sensor that was not measured with the others is hollow and compared with none."""
     values = np.array([14.0, 14.05, 13.95, 2.0])
     told = ["", "", "", "last measured on 03 May 2026"]
     figure = array_map(SENSORS[:4], X[:4], Y[:4], values, np.full(4, 0.1), [""] * 4, absent=told)
@@ -178,7 +190,8 @@ def test_a_sensor_that_was_not_measured_with_the_others_is_hollow_and_compared_w
     assert "not in this campaign" in {trace.name for trace in figure.data if trace.showlegend is not False}
 
 
-def test_an_id_below_a_disc_is_below_the_ring_around_it() -> None:
+def test_id_below_disc_below_ring_around() -> None:
+    """An id below a disc is below the ring around it."""
     figure = array_map(SENSORS[:4], 8 * X[:4], Y[:4], [14.0] * 4, [0.1] * 4, [""] * 4, D33, "s01", 1.5)
     (ids,) = [trace for trace in figure.data if trace.hoverinfo == "skip"]
     *discs, ring = figure.layout.shapes

@@ -19,7 +19,8 @@ D33 = np.array([14.0, 15.0, 3.0])
 REASONS = ("", "", "weak: 21 % of the array's d33")
 
 
-def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
+def test_frf_against_preload_points_line() -> None:
+    """Frf against preload has points and a line for each indenter."""
     radius, preload = np.array([4.0, 4.0, 10.0, 10.0, 4.0]), np.array([1.0, 0.5, 0.5, 1.0, 1.0])
     frf = np.array([6.0, 6.2, 7.0, 6.9, 6.1])
     figure = frf_versus_preload(("a", "b", "c", "d", "e"), radius, preload, frf, 0.1 * frf, frf + 0.05)
@@ -34,7 +35,8 @@ def test_frf_against_preload_has_points_and_a_line_for_each_indenter() -> None:
     np.testing.assert_allclose(points["R 4 mm, measured"].error_y.array, 1.96 * 0.1 * points["R 4 mm, measured"].y)
 
 
-def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
+def test_response_sensor_interval_arrays() -> None:
+    """The response of each sensor has its interval and the arrays."""
     figure = response_per_sensor(SENSORS, D33, D33 - 1, D33 + 2, (13.5, 14.5), REASONS)
     assert [name for trace in figure.data for name in trace.x] == list(SENSORS)
     np.testing.assert_allclose(figure.data[0].error_y.array, 2)
@@ -47,12 +49,14 @@ def test_the_response_of_each_sensor_has_its_interval_and_the_arrays() -> None:
     assert figure.to_json()
 
 
-def test_a_column_of_another_length_is_refused_by_name() -> None:
+def test_column_length_refused_name() -> None:
+    """A column of another length is refused by name."""
     with pytest.raises(InvalidInput, match="high_pc_per_n"):
         response_per_sensor(SENSORS, D33, D33, D33[:2], (1.0, 2.0), REASONS)
 
 
-def test_a_raw_trace_of_many_samples_keeps_its_extremes() -> None:
+def test_raw_trace_many_samples_keeps_extremes() -> None:
+    """A raw trace of many samples keeps its extremes."""
     values = np.sin(np.arange(100_000) / 50)
     values[[4_321, 77_777]] = 9.0, -8.0
     figure = raw_traces([Channel("Load cell", "V", values), Channel("<b>", "", np.arange(5.0))], 1000.0)
@@ -73,7 +77,8 @@ def test_a_unit_that_a_name_has_stands_once() -> None:
     assert titles == ["Time<br>[s]", "Time<br>[s]", "[s]<br>[s]", "t<br>[s]"]
 
 
-def test_ticks_have_no_prefixes_and_a_small_force_its_own_unit() -> None:
+def test_ticks_no_prefixes_small_force_unit() -> None:
+    """Ticks have no prefixes and a small force its own unit."""
     figure = force_curves([ForceCurve("c", np.array([0.0, 2e-3]), np.array([0.0, 3e-5]))])
     assert figure.layout.yaxis.title.text == "force [µN]"
     assert figure.layout.xaxis.title.text == "displacement [µm]"
@@ -81,13 +86,15 @@ def test_ticks_have_no_prefixes_and_a_small_force_its_own_unit() -> None:
     assert figure.layout.template.layout.yaxis.exponentformat == "none"
 
 
-def test_a_history_of_one_date_has_days_under_its_axis() -> None:
+def test_history_date_days_under_axis() -> None:
+    """A history of one date has days under its axis."""
     points = SensorPoints("s", ["2026-11-27T09:00:00+00:00"], [14.0], [0.1], "no trend")
     axis = d33_history([points]).layout.xaxis
     assert (axis.dtick, axis.tickformat) == (86_400_000, "%d %b %Y")
 
 
-def test_the_value_under_the_pointer_has_its_unit() -> None:
+def test_value_under_pointer_unit() -> None:
+    """The value under the pointer has its unit."""
     frequency = np.array([1.0, 10.0])
     entry = FrfLines("a", frequency, np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.array([1.0, 0.99]))
     magnitude, phase, coherence = (trace.hovertemplate for trace in frf_recordings([entry], None).data)
@@ -96,7 +103,9 @@ def test_the_value_under_the_pointer_has_its_unit() -> None:
     assert "}<extra>" in coherence
 
 
-def test_the_axis_of_a_single_campaign_spans_days() -> None:
+def test_axis_single_campaign_spans_days() -> None:
+    """The axis of a single campaign spans days."""
+
     def history(*times: str) -> go.Figure:
         return d33_history([SensorPoints("s01", times, [14.0] * len(times), [0.1] * len(times), "")])
 
@@ -106,7 +115,9 @@ def test_the_axis_of_a_single_campaign_spans_days() -> None:
     assert history().layout.xaxis.range is None
 
 
-def test_intervals_of_a_long_history_are_faint_and_keep_their_length() -> None:
+def test_intervals_long_history_faint_keep() -> None:
+    """Intervals of a long history are faint and keep their length."""
+
     def line(days: int) -> go.Scatter:
         times = [f"2026-{1 + day // 28:02d}-{1 + day % 28:02d}T09:00:00Z" for day in range(days)]
         (trace,) = d33_history([SensorPoints("s01", times, [14.0] * days, [0.1] * days, "")]).data
@@ -118,7 +129,8 @@ def test_intervals_of_a_long_history_are_faint_and_keep_their_length() -> None:
     assert (many.error_y.color, many.error_y.width, many.marker.size) == ("rgba(0,114,178,0.25)", 0, 4)
 
 
-def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_stand_apart() -> None:
+def test_many_sensors_over_time_median_spread() -> None:
+    """Many sensors over time are their median their spread and those that stand apart."""
     random, times = np.random.default_rng(3), ("2026-05-03T09:00:00Z", "2026-07-03T09:00:00Z")
     d33 = 14.0 + 0.4 * random.normal(size=(60, 2))
     d33[17, 1], d33[[21, 20, 22, 23], 0] = 9.0, [20.0, 20.1, 20.2, 20.3]
@@ -151,7 +163,8 @@ def test_many_sensors_over_time_are_their_median_their_spread_and_those_that_sta
     assert few.layout.showlegend is True
 
 
-def test_measured_lines_are_solid_and_differ_however_many_they_are() -> None:
+def test_measured_lines_solid_differ_however() -> None:
+    """Measured lines are solid and differ however many they are."""
     count, lines = 12, np.array([1.0, 10.0])
     history = d33_history([SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(count)])
     recordings = frf_recordings([FrfLines(f"r{n}", lines, lines, 0 * lines, lines) for n in range(count)], None)
@@ -162,8 +175,11 @@ def test_measured_lines_are_solid_and_differ_however_many_they_are() -> None:
         assert len({(trace.line.color, trace.mode, trace.marker.symbol) for trace in drawn}) == count
 
 
-def test_lines_of_recordings_look_as_those_of_their_condition_do() -> None:
-    """Colour by preload, marks by sphere, whether they are shown alone or as the median of many."""
+def test_lines_recordings_look_condition() -> None:
+    """Lines of recordings look as those of their condition do.
+
+    Colour by preload, marks by sphere, whether they are shown alone or as the median of many.
+    """
     conditions, lines = [(4.0, 0.5), (4.0, 3.0), (10.0, 0.5), (10.0, 3.0)], np.array([1.0, 10.0])
     alone = frf_recordings([FrfLines("r", lines, lines, 0 * lines, lines)] * 4, None, conditions)
     three = (lines, lines, lines)
@@ -188,14 +204,16 @@ def test_frfs_of_many_recordings_have_no_legend() -> None:
 
 
 @pytest.mark.parametrize(("coherence", "lowest"), [(0.99, "xaxis3"), (np.nan, "xaxis2")])
-def test_the_lowest_panel_that_is_drawn_has_the_frequency(coherence: float, lowest: str) -> None:
+def test_lowest_panel_drawn_frequency(coherence: float, lowest: str) -> None:
+    """The lowest panel that is drawn has the frequency."""
     entry = FrfLines("a", np.array([1.0, 10.0]), np.array([7.0, 7.1]), np.array([0.0, -1.0]), np.full(2, coherence))
     layout = frf_recordings([entry], None).layout
     assert layout[lowest].title.text == "frequency [Hz]"
     assert layout[lowest].showticklabels
 
 
-def test_ten_sensors_of_a_history_have_colours_that_differ() -> None:
+def test_ten_sensors_history_colours_differ() -> None:
+    """Ten sensors of a history have colours that differ."""
     sensors = [SensorPoints(f"s{n}", ["2024-05-01T09:00:00Z"], [14.0], [0.1], "") for n in range(10)]
     colours = [trace.line.color for trace in d33_history(sensors).data]
     channels = np.array([[int(one[at : at + 2], 16) for at in (1, 3, 5)] for one in colours])
@@ -206,9 +224,8 @@ def test_ten_sensors_of_a_history_have_colours_that_differ() -> None:
 @pytest.mark.parametrize(
     ("peak", "expected"), [(50.0, (None, None)), (90.0, ("log", "D2")), (5000.0, ("log", 1)), (7e11, ("log", 2))]
 )
-def test_a_logarithmic_axis_is_labelled_in_full_and_spans_a_decade(
-    peak: float, expected: tuple[str | None, object]
-) -> None:
+def test_logarithmic_axis_labelled_full_spans(peak: float, expected: tuple[str | None, object]) -> None:
+    """A logarithmic axis is labelled in full and spans a decade."""
     frequency = np.geomspace(5, 800, 30)
     magnitude = np.where(frequency > 200, peak, 7.0)
     line = FrfLines("r1", frequency, magnitude, np.zeros(30), np.full(30, np.nan))

@@ -52,14 +52,18 @@ def test_a_delay_of_either_channel_leaves_d33(chain: dict[str, Any], table: Sigm
     assert "ms late (a delay, a filter or a resonance), which is taken off" in inversion.zone.reason
 
 
-def test_a_turn_by_a_filter_is_not_stated_as_a_delay(table: SigmaTable) -> None:
-    """Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named."""
+def test_turn_filter_not_stated_delay(table: SigmaTable) -> None:
+    """A turn by a filter is not stated as a delay.
+
+    Phases behind a high-pass of two poles turn as by a delay: it is one of the causes that are named.
+    """
     reason = invert(shaken(charge=lambda f: high_pass(150.0)(f) ** 2), table).zone.reason
     assert "the phases turn as if the charge came" in reason
     assert "(a delay, a filter or a resonance)" in reason
 
 
-def test_an_inverted_sensor_is_told_whatever_the_delay(table: SigmaTable) -> None:
+def test_inverted_sensor_told_whatever_delay(table: SigmaTable) -> None:
+    """An inverted sensor is told whatever the delay."""
     turned = invert(shaken(charge=lambda f: -delayed(20e-3)(f)), table)
     assert array_d33(turned)[0] == pytest.approx(-D33, rel=0.02)
 
@@ -78,10 +82,11 @@ def test_noise_in_the_force_biases_no_estimator(share: float, estimator: str, ta
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.08, 0.01), (0.0, 0.2)])
-def test_where_nothing_tells_which_channel_is_noisy_the_interval_holds_d33(
-    in_force: float, in_charge: float, table: SigmaTable
-) -> None:
-    """Force and charge are white up to half the sample rate: γ² tells the noise of both together alone."""
+def test_nothing_tells_channel_noisy_interval(in_force: float, in_charge: float, table: SigmaTable) -> None:
+    """Where nothing tells which channel is noisy the interval holds d33.
+
+    Force and charge are white up to half the sample rate: γ² tells the noise of both together alone.
+    """
     campaign = shaken(force_noise=in_force, charge_noise=in_charge, high_hz=400.0)
     value, low, high = array_d33(invert(campaign, table))
     assert low < D33 < high
@@ -89,9 +94,12 @@ def test_where_nothing_tells_which_channel_is_noisy_the_interval_holds_d33(
 
 
 @pytest.mark.parametrize(("in_force", "in_charge"), [(0.0, 0.003), (0.0, 0.0045), (0.0, 0.01), (0.02, 0.0)])
-def test_a_little_noise_over_all_lines_leaves_an_frf(in_force: float, in_charge: float) -> None:
-    """Force and charge are white: no noise has a larger share of either's power than γ² lost, and what γ² does not tell
-    apart is in the uncertainty."""
+def test_little_noise_over_lines_leaves_frf(in_force: float, in_charge: float) -> None:
+    """A little noise over all lines leaves an frf.
+
+    Force and charge are white: no noise has a larger share of either's power than γ² lost, and what γ² does not tell
+    apart is in the uncertainty.
+    """
     random, samples, gain = np.random.default_rng(1), 2**16, 7.4e-12
     force, noise = 0.05 * random.standard_normal(samples), random.standard_normal((2, samples))
     charge = gain * (force + 0.05 * np.sqrt(in_charge) * noise[1])
@@ -111,8 +119,11 @@ def test_a_little_noise_over_all_lines_leaves_an_frf(in_force: float, in_charge:
         (low_pass(120.0, 2), "low-pass of about"),
     ],
 )
-def test_a_band_behind_a_filter_is_told_beside_d33(chain: Any, named: str, table: SigmaTable) -> None:
-    """The flattest part of a flank is no flat zone."""
+def test_band_behind_filter_told_beside_d33(chain: Any, named: str, table: SigmaTable) -> None:
+    """A band behind a filter is told beside d33.
+
+    The flattest part of a flank is no flat zone.
+    """
     inversion = invert(shaken(charge=chain), table)
     value, low, high = array_d33(inversion)
     told = [finding.sentence for finding in inversion.findings if finding.code == FindingCode.BEHIND_FILTER]

@@ -48,7 +48,8 @@ def altered(campaign: Campaign, sensor: str, change: str) -> Campaign:
 
 
 @pytest.mark.parametrize("change", ["weak", "strong", "dead", "inverted", "noisy", "bent"])
-def test_a_sensor_that_stands_out_is_named_with_the_reason(table: SigmaTable, change: str) -> None:
+def test_sensor_stands_out_named_reason(table: SigmaTable, change: str) -> None:
+    """A sensor that stands out is named with the reason."""
     rig = Rig(d33=np.full(9, 14.0), preloads_n=tuple(np.linspace(0.5, 3, 8).tolist()))
     campaign = simulate(table, rig, np.random.default_rng(5))
     plain = invert(campaign, table)
@@ -81,7 +82,8 @@ def test_whole_arrays_are_seldom_accused(table: SigmaTable) -> None:
         (-1.0, "is the sign of charge or force"),
     ],
 )
-def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, factor: float, asks: str) -> None:
+def test_slip_whole_array_shows_finding(table: SigmaTable, factor: float, asks: str) -> None:
+    """A slip that the whole array shows is a finding."""
     campaign = simulate(table, Rig(d33=np.full(3, 14.0)), np.random.default_rng(7))
     assert invert(campaign, table).findings == ()
     slipped = campaign
@@ -93,7 +95,8 @@ def test_a_slip_that_the_whole_array_shows_is_a_finding(table: SigmaTable, facto
 
 
 @pytest.mark.parametrize("x_mm", [19.0, 250.0, 1e9, 1e308])
-def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_mm: float) -> None:
+def test_recording_far_off_sensor_costs_itself(table: SigmaTable, x_mm: float) -> None:
+    """A recording far off its sensor costs only itself."""
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(11))
     found = invert(moved(campaign, 0, position_mm=(x_mm, 0.0)), table)
     rest = invert(replace(campaign, recordings=campaign.recordings[1:]), table)
@@ -106,7 +109,8 @@ def test_a_recording_far_off_its_sensor_costs_only_itself(table: SigmaTable, x_m
 
 @pytest.mark.parametrize("factor", [1000.0, 10.0, -1.0, 1e-3])
 @pytest.mark.parametrize("sensors", [1, 5])
-def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, factor: float, sensors: int) -> None:
+def test_recording_grossly_off_set_aside_named(table: SigmaTable, factor: float, sensors: int) -> None:
+    """A recording grossly off is set aside and named."""
     rig = Rig(d33=np.full(sensors, 14.0), preloads_n=(0.5, 2.0))
     campaign = simulate(table, rig, np.random.default_rng(13))
     found = invert(scaled(campaign, 0, factor), table)
@@ -117,7 +121,8 @@ def test_a_recording_grossly_off_is_set_aside_and_named(table: SigmaTable, facto
     assert found.flags == ()
 
 
-def test_a_sensor_of_few_recordings_is_flagged_as_a_whole(table: SigmaTable) -> None:
+def test_sensor_few_recordings_flagged_whole(table: SigmaTable) -> None:
+    """A sensor of few recordings is flagged as a whole."""
     rig = Rig(d33=np.array([14.0] * 8 + [3.0, 60.0]), preloads_n=(1.0,))
     found = invert(simulate(table, rig, np.random.default_rng(15)), table)
     assert codes(found) == {"s8": ["weak"], "s9": ["strong"]}
@@ -130,7 +135,8 @@ def test_a_sensor_of_exact_zeros_is_dead(table: SigmaTable) -> None:
     assert np.isfinite([found.sensors.value, found.sensors.low, found.sensors.high]).all()
 
 
-def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTable) -> None:
+def test_force_mean_contradicts_preload_finding(table: SigmaTable) -> None:
+    """A force whose mean contradicts the preload is a finding."""
     random = np.random.default_rng(18)
     campaign = simulate(table, Rig(d33=np.array([14.0]), preloads_n=(1.0,)), random)
 
@@ -150,8 +156,11 @@ def test_a_force_whose_mean_contradicts_the_preload_is_a_finding(table: SigmaTab
         assert [one.recording for one in found if one.code == FindingCode.FORCE_CONTRADICTS_PRELOAD] == accused
 
 
-def test_zeros_outside_an_analyzers_band_are_no_response(table: SigmaTable) -> None:
-    """They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others."""
+def test_zeros_outside_analyzers_band(table: SigmaTable) -> None:
+    """Zeros outside an analyzers band are no response.
+
+    They are no lines: no filter is seen in them and no mains pick-up, and d33 is that of the others.
+    """
     campaign = simulate(table, Rig(d33=np.array([14.0])), np.random.default_rng(22))
     lines = np.arange(1, 401.0)
     noise = 1 + 0.01 * np.random.default_rng(23).standard_normal((len(campaign.recordings), 400))
@@ -171,7 +180,8 @@ def test_zeros_outside_an_analyzers_band_are_no_response(table: SigmaTable) -> N
     assert found.findings == ()
 
 
-def test_exchanged_channels_of_force_and_charge_give_no_d33(table: SigmaTable) -> None:
+def test_exchanged_channels_force_charge_give(table: SigmaTable) -> None:
+    """Exchanged channels of force and charge give no d33."""
     random = np.random.default_rng(21)
     campaign = simulate(table, Rig(d33=np.array([14.0])), random)
     recording = campaign.recordings[0]

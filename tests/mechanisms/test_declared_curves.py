@@ -54,7 +54,8 @@ def depths_and_times(campaign: Campaign) -> tuple[Floats, Floats]:
     return depth, np.concatenate([time - time[0] for time in times if time is not None])
 
 
-def test_factors_act_on_the_force_and_additions_add_to_it(campaign: Campaign) -> None:
+def test_factors_act_force_additions_add(campaign: Campaign) -> None:
+    """Factors act on the force and additions add to it."""
     timed = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     later = tuple(replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in timed)
     campaign = replace(campaign, recordings=later)
@@ -75,7 +76,8 @@ def test_a_law_of_place_moves_the_travel(campaign: Campaign) -> None:
     assert not np.allclose(moved, forces(campaign))
 
 
-def test_times_are_needed_where_the_law_reads_them(campaign: Campaign) -> None:
+def test_times_needed_law_reads(campaign: Campaign) -> None:
+    """Times are needed where the law reads them."""
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     untimed = replace(campaign, recordings=tuple(replace(entry, time_s=None) for entry in own))
     creeping = mechanism("modulus", "time_s", "1 - bend * time_s")
@@ -83,13 +85,17 @@ def test_times_are_needed_where_the_law_reads_them(campaign: Campaign) -> None:
     assert creeping.kinds == ("indentation",)
 
 
-def test_a_law_far_from_its_usual_parameters_gives_a_force_all_the_same(campaign: Campaign) -> None:
+def test_law_far_usual_parameters_gives_force(campaign: Campaign) -> None:
+    """A law far from its usual parameters gives a force all the same."""
     steep = mechanism("gain", "force_n", "1 + bend * (exp(500 * force_n) - 1)")
     assert np.isfinite(forces(campaign, steep)).all()
 
 
-def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campaign) -> None:
-    """Also where its first half is held out."""
+def test_bound_law_counts_time_recording_began(campaign: Campaign) -> None:
+    """A bound law counts time from where the recording began.
+
+    Also where its first half is held out.
+    """
     own = [entry for entry in campaign.recordings if isinstance(entry, IndentationRecording)]
     timed = [replace(entry, time_s=7.0 + np.arange(float(len(entry.force_n)))) for entry in own]
     whole = replace(campaign, recordings=tuple(timed))
@@ -122,7 +128,8 @@ def test_a_bound_law_counts_time_from_where_the_recording_began(campaign: Campai
         ("mean: 0, sd", "mean: 3, sd", 8, "must lie within -1 to 1"),
     ],
 )
-def test_what_cannot_act_on_curves_is_refused_with_its_line(old: str, new: str, line: int, said: str) -> None:
+def test_cannot_act_curves_refused_line(old: str, new: str, line: int, said: str) -> None:
+    """What cannot act on curves is refused with its line."""
     error = refusal(BENT.replace(old, new))
     assert error.place == f"line {line}"
     assert said in error.reason

@@ -16,7 +16,8 @@ def _averages(offsets: np.ndarray, disc: float, values: np.ndarray, basis: Cubic
     return np.asarray(total @ basis.to_coefficients @ values)
 
 
-def test_the_mean_of_a_square_is_that_of_the_centre_and_half_the_discs() -> None:
+def test_mean_square_centre_half_discs() -> None:
+    """The mean of a square is that of the centre and half the discs."""
     basis, offsets = CubicBasis(np.linspace(0.0, 4.0, 33)), np.array([0.0, 0.3, 1.7])
     assert _averages(offsets, 0.8, np.ones(33), basis) == pytest.approx(np.ones(3), rel=1e-12)
     assert _averages(offsets, 0.8, basis.nodes**2, basis) == pytest.approx(offsets**2 + 0.8**2 / 2, rel=1e-12)

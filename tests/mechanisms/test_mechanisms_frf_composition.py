@@ -19,7 +19,8 @@ INSIDE: dict[str, dict[str, float]] = {
 VALUES = {name: value for values in INSIDE.values() for name, value in values.items()}
 
 
-def test_the_moving_edge_has_all_that_shapes_contact_and_stress_inside_its_derivative() -> None:
+def test_moving_edge_shapes_contact_stress() -> None:
+    """The moving edge has all that shapes contact and stress inside its derivative."""
     preload, step = 1.0, 1e-3
     charge = [
         force * level(list(INSIDE), frf_recording(preload_n=force, position_mm=(0.5, 0.0)), SKIN, **VALUES)
@@ -50,7 +51,8 @@ def test_the_first_harmonic_has_them_inside_too() -> None:
     assert found.real == pytest.approx(expected, rel=1e-4)
 
 
-def test_what_makes_charge_of_stress_acts_sensor_by_sensor_then_on_the_recording_then_on_its_lines() -> None:
+def test_makes_charge_stress_acts_sensor_sensor() -> None:
+    """What makes charge of stress acts sensor by sensor then on the recording then on its lines."""
     place, preload = (1.5, 1.0), 2.0
 
     def own_charge(sensor: str) -> float:

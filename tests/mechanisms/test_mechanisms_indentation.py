@@ -37,7 +37,8 @@ from underskin.recordings.campaign import Conditions, IndentationConditions, Ind
     ("fraction", "tau", "work"),
     [(0.5, 3.0, 0.0), (0.8, 1.0, 0.0), (0.3, 30.0, 0.0), (0.0, 1.0, 0.3), (0.5, 3.0, 0.3), (0.5, 3.0, 2.0)],
 )
-def test_a_loop_with_a_hold_is_that_of_independent_elements(fraction: float, tau: float, work: float) -> None:
+def test_loop_hold_independent_elements(fraction: float, tau: float, work: float) -> None:
+    """A loop with a hold is that of independent elements."""
     values = {"relaxed_fraction": fraction, "relaxation_time": tau}
     names = ["contact_creep"]
     if work:
@@ -48,7 +49,8 @@ def test_a_loop_with_a_hold_is_that_of_independent_elements(fraction: float, tau
     assert (found == 0).tolist() == (exact == 0).tolist()
 
 
-def test_the_way_back_solves_ting_s_integral_equation() -> None:
+def test_way_back_solves_ting_s_integral() -> None:
+    """The way back solves ting s integral equation."""
     depth = np.concatenate([np.linspace(0, 0.4, 201), np.linspace(0.4, 0.0, 201)[1:]])
     found = force_at(["contact_creep"], depth, **CREEP)
     top, speed = 200 * TIME, 0.4e-3 / (200 * TIME)
@@ -65,7 +67,8 @@ def test_the_way_back_solves_ting_s_integral_equation() -> None:
         assert found[sample] == pytest.approx(exact, rel=2e-4)
 
 
-def test_a_loop_that_relaxes_loses_work_and_one_that_does_not_loses_none() -> None:
+def test_loop_relaxes_loses_work_not_loses_none() -> None:
+    """A loop that relaxes loses work and one that does not loses none."""
     depth = np.concatenate([np.linspace(0, 0.4, 60), np.linspace(0.4, -0.05, 70)[1:]])
     lost = [
         float(np.trapezoid(force_at(["contact_creep"], depth, relaxed_fraction=g, relaxation_time=3.0), depth))
@@ -75,7 +78,8 @@ def test_a_loop_that_relaxes_loses_work_and_one_that_does_not_loses_none() -> No
     assert lost[0] + 1e-2 < lost[1] < lost[2]
 
 
-def test_the_sphere_parts_before_the_depth_at_which_it_met() -> None:
+def test_sphere_parts_before_depth_met() -> None:
+    """The sphere parts before the depth at which it met."""
     force = force_at(["contact_creep"], LOOP, **CREEP)
     assert (force >= 0).all()
     parted = LOOP[74:][force[74:] == 0]
@@ -84,14 +88,16 @@ def test_the_sphere_parts_before_the_depth_at_which_it_met() -> None:
     assert force[:74] == pytest.approx(again)  # what comes later changes nothing
 
 
-def test_noise_of_the_displacement_changes_the_force_no_more_than_the_elastic_one() -> None:
+def test_noise_displacement_changes_force() -> None:
+    """Noise of the displacement changes the force no more than the elastic one."""
     noise = 2e-4 * np.random.default_rng(1).normal(size=len(LOOP))
     elastic = np.abs(force_at([], LOOP + noise) - force_at([], LOOP)).max()
     relaxing = np.abs(force_at(["contact_creep"], LOOP + noise, **CREEP) - force_at(["contact_creep"], LOOP, **CREEP))
     assert 0 < relaxing.max() < 1.5 * elastic
 
 
-def test_pressing_again_is_refused_by_name_and_a_held_or_a_noisy_loop_is_not() -> None:
+def test_pressing_again_refused_name_held_noisy() -> None:
+    """Pressing again is refused by name and a held or a noisy loop is not."""
     for again in (np.concatenate([LOOP, LOOP]), np.concatenate([LOOP[:90], LOOP[70:90][::-1]])):
         with pytest.raises(Unsupported, match="'i' presses again after it was drawn back"):
             compose(["contact_creep"], recorded(again), table())
@@ -122,9 +128,8 @@ WORK = {"work_of_adhesion": 0.5}
         (["contact_creep", "adhesion"], CREEP | WORK, "instrument_compliance", {"stage_stiffness": np.inf}),
     ],
 )
-def test_a_mechanism_at_its_limit_leaves_the_others(
-    kept: list[str], of_kept: dict[str, float], gone: str, limit: dict[str, float]
-) -> None:
+def test_mechanism_limit_leaves(kept: list[str], of_kept: dict[str, float], gone: str, limit: dict[str, float]) -> None:
+    """A mechanism at its limit leaves the others."""
     expected = force_at(kept, LOOP, **of_kept)
     assert force_at([*kept, gone], LOOP, **of_kept, **limit) == pytest.approx(expected, abs=2e-5 * expected.max())
 
@@ -132,7 +137,8 @@ def test_a_mechanism_at_its_limit_leaves_the_others(
 # Adhesion on a stage that gives.
 
 
-def test_under_a_stage_the_contact_is_the_stable_root_and_lasts_until_the_travel_s_least_value() -> None:
+def test_under_stage_contact_stable_root_lasts() -> None:
+    """Under a stage the contact is the stable root and lasts until the travel s least value."""
     a = np.linspace(1e-5, 2e-3, 400_001)
     depth, force = jkr(a, 0.5)
     up = np.linspace(0.3, -0.4, 1401)
@@ -151,7 +157,8 @@ def test_under_a_stage_the_contact_is_the_stable_root_and_lasts_until_the_travel
 
 
 @pytest.mark.parametrize(("stiffness", "share"), [(1e5, 5 / 9), (1e-3, 1.0)])
-def test_a_stiff_stage_loses_it_at_jkr_s_depth_a_soft_one_at_jkr_s_force(stiffness: float, share: float) -> None:
+def test_stiff_stage_loses_jkr_s_depth_soft_jkr(stiffness: float, share: float) -> None:
+    """A stiff stage loses it at jkr s depth a soft one at jkr s force."""
     deepest = 1.5 * np.pi * 0.5 * R  # N
     far = 3e3 * deepest / (stiffness * 1e3) + 0.1  # mm, beyond where it comes off
     up = np.append(0.0, np.linspace(-0.0080, -0.0087, 4001)) if stiffness > 1 else np.linspace(0.0, -1.2 * far, 4001)
@@ -161,7 +168,8 @@ def test_a_stiff_stage_loses_it_at_jkr_s_depth_a_soft_one_at_jkr_s_force(stiffne
     assert -last == pytest.approx(share * deepest, rel=1e-2)
 
 
-def test_on_the_layer_a_stage_gives_by_the_exact_contact_s_force() -> None:
+def test_layer_stage_gives_exact_contact_s_force() -> None:
+    """On the layer a stage gives by the exact contact s force."""
     setup = SphereOnLayer(R, E_MPA * 1e6, H_MM * 1e-3, Layer(), work_of_adhesion=0.5)
     for ratio in (1.01, 1.5, 3.0):
         exact = setup.at_radius(ratio * setup.pull_off().contact_radius)
@@ -188,7 +196,8 @@ def test_after_pull_off_it_must_touch_again(names: list[str]) -> None:
 
 
 @pytest.mark.parametrize("work", [0.0, 0.5])
-def test_the_stage_gives_by_the_force_of_the_whole_history(work: float) -> None:
+def test_stage_gives_force_whole_history(work: float) -> None:
+    """The stage gives by the force of the whole history."""
     names, values = ["contact_creep", "instrument_compliance"], CREEP | STAGE
     if work:
         names, values = [*names, "adhesion"], values | {"work_of_adhesion": work}
@@ -222,7 +231,8 @@ TWO = [
     ("names", "begins_in_contact"),
     [*((names, False) for names in TWO), *((names, True) for names in (TWO if SOAK else TWO[2:5]))],
 )
-def test_derivatives_match_differences_on_the_way_in_and_back(names: list[str], begins_in_contact: bool) -> None:
+def test_derivatives_match_differences_way_back(names: list[str], begins_in_contact: bool) -> None:
+    """Derivatives match differences on the way in and back."""
     path = LOOP[8:] + 0.003 if begins_in_contact else LOOP
     model = compose(names, recorded(path), table())
     fit = fit_of(model)
@@ -244,7 +254,8 @@ def test_derivatives_match_differences_on_the_way_in_and_back(names: list[str], 
 
 
 @pytest.mark.slow
-def test_every_share_and_time_of_relaxation_gives_finite_forces_and_slopes() -> None:
+def test_every_share_time_relaxation_gives() -> None:
+    """Every share and time of relaxation gives finite forces and slopes."""
     for path in (LOOP, LOOP + 0.003, LOOP[8:], LOOP[8:74]):
         model = compose(["contact_creep", "layered_contact", "adhesion"], recorded(path), table())
         for fraction in (0.0, 0.027, 0.5, 0.9):
@@ -268,8 +279,11 @@ def test_two_recordings_do_not_feel_each_other() -> None:
     assert found[len(LOOP) :] == pytest.approx(alone)
 
 
-def test_a_stage_is_expected_as_stiff_as_the_sphere_s_size_says() -> None:
-    """A stage of 150 N/mm and one of 150 N/m are as usual beside their spheres of 5 mm and 5 µm."""
+def test_stage_expected_stiff_sphere_s_size_says() -> None:
+    """A stage is expected as stiff as the sphere s size says.
+
+    A stage of 150 N/mm and one of 150 N/m are as usual beside their spheres of 5 mm and 5 µm.
+    """
     usual = []
     for radius in (5.0, 5e-3):
         curve = IndentationConditions("c", radius, np.linspace(0.0, 0.01, 5))

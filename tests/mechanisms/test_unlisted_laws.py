@@ -71,7 +71,8 @@ def coordinates(law: UnlistedLaw, amplitude: float) -> list[float]:
     return [*(amplitude * sd for sd in sds), *law.grid[0][: len(law.parameters_bound) - count]]
 
 
-def test_the_grammar_holds_several_hundred_laws_whose_shares_are_a_prior(grammar: Grammar) -> None:
+def test_grammar_holds_several_hundred_laws(grammar: Grammar) -> None:
+    """The grammar holds several hundred laws whose shares are a prior."""
     assert len(grammar.laws) > 500
     assert len({law.name for law in grammar.laws}) == len(grammar.laws)
     assert 0.3 < np.exp(grammar.log_shares).sum() <= 1.0
@@ -117,10 +118,11 @@ def along(campaign: Campaign, name: str) -> Axis:
 
 
 @pytest.mark.parametrize(("acts_on", "size"), [("modulus", 0.8), ("thickness", 0.2), ("contact_radius", -0.3)])
-def test_a_law_is_the_base_model_of_a_skin_that_changes(
-    acts_on: str, size: float, campaign: Campaign, table: SigmaTable
-) -> None:
-    """Each recording against a base model of its own, with that modulus, thickness, or sphere and modulus."""
+def test_law_base_model_skin_changes(acts_on: str, size: float, campaign: Campaign, table: SigmaTable) -> None:
+    """A law is the base model of a skin that changes.
+
+    Each recording against a base model of its own, with that modulus, thickness, or sphere and modulus.
+    """
     axis = along(campaign, "order")
     _, model = one_law(acts_on, axis, campaign, table)
     found = predicted(model, [size])
@@ -139,7 +141,8 @@ def test_a_law_is_the_base_model_of_a_skin_that_changes(
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), (acts_on, number)
 
 
-def test_a_force_that_is_lost_is_a_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
+def test_force_lost_smaller_preload(campaign: Campaign, table: SigmaTable, grammar: Grammar) -> None:
+    """A force that is lost is a smaller preload."""
     lost = next(law for law in grammar.laws if combination(law) == ("force", "preload_n", "threshold"))
     model = FrfModel([lost], campaign, table, tuple(CATALOGUE.values()))
     found = predicted(model, [0.2])
@@ -149,7 +152,8 @@ def test_a_force_that_is_lost_is_a_smaller_preload(campaign: Campaign, table: Si
         assert found[model.recording == number] == pytest.approx(expected, rel=2e-3), number
 
 
-def test_a_place_that_wanders_is_a_press_elsewhere(campaign: Campaign, table: SigmaTable) -> None:
+def test_place_wanders_press_elsewhere(campaign: Campaign, table: SigmaTable) -> None:
+    """A place that wanders is a press elsewhere."""
     axis = along(campaign, "order")
     _, model = one_law("position", axis, campaign, table)
     found = predicted(model, [0.8, -0.5])
@@ -162,7 +166,8 @@ def test_a_place_that_wanders_is_a_press_elsewhere(campaign: Campaign, table: Si
         assert found[model.recording == number] == pytest.approx(expected, rel=3e-3), number
 
 
-def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign: Campaign, table: SigmaTable) -> None:
+def test_part_campaign_order_range_whole(campaign: Campaign, table: SigmaTable) -> None:
+    """A part of a campaign has the order and the range of the whole."""
     law, model = one_law("gain", along(campaign, "previous_preload_n"), campaign, table)
     part = replace(campaign, recordings=campaign.recordings[3:9])
     of_part = FrfModel([law], part, table, tuple(CATALOGUE.values()))
@@ -171,7 +176,8 @@ def test_a_part_of_a_campaign_has_the_order_and_the_range_of_the_whole(campaign:
 
 
 @pytest.mark.slow
-def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> None:
+def test_kept_law_over_recordings_law(grammar: Grammar) -> None:
+    """What is kept of a law over recordings is that law."""
     for law in grammar.laws[:: 1 if SOAK else 4]:
         if not isinstance(law, RecordingLaw) or law.axis.words or law.description.form == "free":
             continue
@@ -191,7 +197,8 @@ def test_what_is_kept_of_a_law_over_recordings_is_that_law(grammar: Grammar) -> 
             assert change == pytest.approx(expected, abs=2e-3 * float(np.abs(exact).max())), law.name
 
 
-def test_the_order_is_that_of_times_of_cycles_or_of_the_list(campaign: Campaign) -> None:
+def test_order_times_cycles_list(campaign: Campaign) -> None:
+    """The order is that of times of cycles or of the list."""
     entries = frf_of(campaign)
     turned = [replace(entry, load_cycles=7) for entry in entries[::-1]]
     assert recording_order(turned).tolist() == list(range(len(turned)))[::-1]
@@ -208,7 +215,8 @@ def test_the_time_of_day_is_local(campaign: Campaign, monkeypatch: pytest.Monkey
     assert along(campaign, "time_of_day").values[first] == 18.0
 
 
-def test_columns_that_a_lab_adds_are_axes_where_most_recordings_have_them(campaign: Campaign) -> None:
+def test_columns_lab_adds_axes_recordings(campaign: Campaign) -> None:
+    """Columns that a lab adds are axes where most recordings have them."""
     temperature = along(campaign, "temperature_c")
     assert temperature.high - temperature.low == pytest.approx(0.7 * (len(campaign.recordings) - 1))
     assert along(campaign, "operator").words == ("a", "b")
@@ -219,7 +227,8 @@ def test_columns_that_a_lab_adds_are_axes_where_most_recordings_have_them(campai
     assert "seldom" not in [axis.name for axis in axes_of(Conditions("few", campaign.skin, few))]
 
 
-def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, table: SigmaTable) -> None:
+def test_many_columns_share_half_axes(campaign: Campaign, table: SigmaTable) -> None:
+    """Many columns share what one and a half axes have."""
     random = np.random.default_rng(3)
     entries = tuple(
         replace(entry, conditions={f"column_{place}": float(x) for place, x in enumerate(random.normal(size=20))})
@@ -234,7 +243,8 @@ def test_many_columns_share_what_one_and_a_half_axes_have(campaign: Campaign, ta
     assert added < 2 * one
 
 
-def test_every_law_has_an_expression_without_powers_of_ten(grammar: Grammar) -> None:
+def test_every_law_expression_without_powers_ten(grammar: Grammar) -> None:
+    """Every law has an expression without powers of ten."""
     for law in grammar.laws:
         own = zip(law.parameters_bound, coordinates(law, 0.3), strict=True)
         text = expression(law, {entry.name: entry.from_fit(at) for entry, at in own})

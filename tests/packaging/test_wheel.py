@@ -79,21 +79,24 @@ def printed(environment: Environment, folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def test_the_wheel_holds_the_library_and_the_tables_alone(wheel: Path) -> None:
+def test_wheel_holds_library_tables_alone(wheel: Path) -> None:
+    """The wheel holds the library and the tables alone."""
     with zipfile.ZipFile(wheel) as file:
         names = file.namelist()
     assert {name.split("/")[0] for name in names} == {"underskin", f"underskin-{PROJECT['version']}.dist-info"}
     assert {f"underskin/tables/{table.name}" for table in (ROOT / "tables").glob("*.h5")} < set(names)
 
 
-def test_the_environment_has_what_the_wheel_requires_and_no_more(fresh: Environment) -> None:
+def test_environment_wheel_requires(fresh: Environment) -> None:
+    """The environment has what the wheel requires and no more."""
     assert fresh.pip("check") == "No broken requirements found.\n"
     installed = {entry["name"].lower().replace("_", "-") for entry in json.loads(fresh.pip("list", "--format", "json"))}
     assert installed == required(PROJECT["dependencies"]) | {"underskin"}
     assert fresh.python("import fastapi").returncode == 1
 
 
-def test_every_module_is_imported_without_the_packages_of_the_server(fresh: Environment) -> None:
+def test_every_module_imported_without_packages(fresh: Environment) -> None:
+    """Every module is imported without the packages of the server."""
     done = fresh.python(IMPORT_ALL)
     assert (done.returncode, done.stdout) == (0, "True\n"), done.stderr
     assert list(fresh.site_packages.glob(f"underskin/**/{COMPILED_THERE}.*.nbc"))
@@ -116,7 +119,8 @@ def test_a_diagnosis(fresh: Environment, tmp_path: Path) -> None:
     assert (tmp_path / "reports" / "2017-06.html").stat().st_size > 100_000
 
 
-def test_the_help_says_where_the_other_commands_run(fresh: Environment, tmp_path: Path) -> None:
+def test_help_says_commands_run(fresh: Environment, tmp_path: Path) -> None:
+    """The help says where the other commands run."""
     image = (ROOT / "Dockerfile").read_text(encoding="utf-8")
     shown = printed(fresh, tmp_path, "--help").splitlines()
     for name, target in PROJECT["entry-points"]["underskin.commands"].items():
@@ -136,9 +140,10 @@ def test_the_help_says_where_the_other_commands_run(fresh: Environment, tmp_path
         ],
     ),
 )
-def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
+def test_command_wheel_not_hold_says_install(
     fresh: Environment, tmp_path: Path, command: str, where: str, extra: str
 ) -> None:
+    """A command that the wheel does not hold says what to install."""
     refusal = run(fresh, tmp_path, command)
     assert (refusal.returncode, refusal.stdout) == (2, "")
     install = f"; in a checkout, pip install -e '.[{extra}]' installs what it needs" if extra else ""
@@ -148,7 +153,8 @@ def test_a_command_that_the_wheel_does_not_hold_says_what_to_install(
 
 
 @pytest.mark.soak
-def test_a_checkout_without_the_extra_says_what_to_install(tmp_path: Path) -> None:
+def test_checkout_without_extra_says_install(tmp_path: Path) -> None:
+    """A checkout without the extra says what to install."""
     environment = new_environment(tmp_path / "venv", [*PROJECT["dependencies"], "hatchling", "editables"])
     environment.install("--editable", str(ROOT))
     refusal = run(environment, tmp_path, "serve")

@@ -47,12 +47,14 @@ def test_points_or_commas_are_the_decimal_mark(text: str) -> None:
         ("preload_n;frf_pc_per_n\n0,5;7.5\n", r"frf_pc_per_n\[0\] = '7.5': must be a number \(line 2\)"),
     ],
 )
-def test_a_number_that_may_have_its_thousands_apart_is_refused(text: str, says: str) -> None:
+def test_number_thousands_apart_refused(text: str, says: str) -> None:
+    """A number that may have its thousands apart is refused."""
     with pytest.raises(InvalidInput, match=says):
         numbers(text)
 
 
-def test_a_text_in_a_workbook_that_may_have_its_thousands_apart_is_refused() -> None:
+def test_text_workbook_thousands_apart_refused() -> None:
+    """A text in a workbook that may have its thousands apart is refused."""
     book, content = openpyxl.Workbook(), io.BytesIO()
     assert book.active is not None
     for row in (FIELDS, (0.5, "7,5"), (1, "1,000")):
@@ -72,7 +74,8 @@ def test_a_text_in_a_workbook_that_may_have_its_thousands_apart_is_refused() -> 
         ("frf_magnitude_pc_per_n,frf_phase", "60"),
     ],
 )
-def test_magnitude_and_phase_are_taken_as_the_real_part(headings: str, phase: str) -> None:
+def test_magnitude_phase_taken_real_part(headings: str, phase: str) -> None:
+    """Magnitude and phase are taken as the real part."""
     found = from_csv(f"preload_n,{headings}\n1,7,{phase}\n".encode(), FIELDS)
     assert found.fields["frf_pc_per_n"].numbers("frf_pc_per_n") == pytest.approx([3.5])
     assert found.unknown == {}
@@ -94,19 +97,22 @@ def test_magnitude_and_phase_are_taken_as_the_real_part(headings: str, phase: st
         ("frf_magnitude_pc_per_n,frf_phase_deg,FRF phase [°]\n7,1,7\n", "its header has 'frf_phase_rad' twice"),
     ],
 )
-def test_magnitude_and_phase_that_are_not_clear_are_refused(text: str, says: str) -> None:
+def test_magnitude_phase_not_clear_refused(text: str, says: str) -> None:
+    """Magnitude and phase that are not clear are refused."""
     with pytest.raises(CsvError, match=says):
         from_csv(text.encode(), FIELDS)
 
 
-def test_a_cell_of_a_phase_that_is_no_number_is_told_by_its_heading() -> None:
+def test_cell_phase_no_number_told_heading() -> None:
+    """A cell of a phase that is no number is told by its heading."""
     text = b"preload_n,frf_magnitude_pc_per_n,frf_phase_deg\n1,7,x\n"
     with pytest.raises(InvalidInput, match=r"frf_phase_deg\[0\] = 'x': must be a number \(line 2\)"):
         from_csv(text, FIELDS).fields["frf_pc_per_n"].numbers("frf_pc_per_n")
 
 
 @pytest.mark.parametrize("note", ["measured by mb", "in the cold room, air conditioning off", "a,b,c,d", "mb,,"])
-def test_words_below_a_blank_line_under_the_table_are_a_note(note: str) -> None:
+def test_words_below_blank_line_under_table_note(note: str) -> None:
+    """Words below a blank line under the table are a note."""
     text = "preload_n,frf_pc_per_n\n0.5,1200\n1,7.5\n"
     assert numbers(f"{text}\n{note}\n") == [[0.5, 1.0], [1200.0, 7.5]]
     (told,) = from_csv(f"{text}\n{note}\n".encode(), FIELDS).notes

@@ -3,7 +3,8 @@
 from proof.imported import of_a_diagnosis
 
 
-def test_a_diagnosis_depends_on_what_it_imports_and_on_every_law_alone() -> None:
+def test_diagnosis_depends_imports_every_law() -> None:
+    """A diagnosis depends on what it imports and on every law alone."""
     texts = {
         "underskin.__init__": "from underskin.cli.app import main",
         "underskin.diagnosis.diagnose": "def begin():\n    from underskin.physics import hertz",

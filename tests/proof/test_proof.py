@@ -56,7 +56,8 @@ def report(verdict: str, *names: str, probability: float = 0.9) -> dict[str, Any
         (report("explained", "a"), [], False),
     ],
 )
-def test_an_answer_is_right_if_it_is_exactly_the_truth(given: dict[str, Any], effects: list[str], right: bool) -> None:
+def test_answer_right_exactly_truth(given: dict[str, Any], effects: list[str], right: bool) -> None:
+    """An answer is right if it is exactly the truth."""
     truth = {"effects": effects, "identifiable": True, "chi2_gain_of_truth": 49.0}
     found = judge("c", given, truth)
     assert found.right is right
@@ -64,7 +65,8 @@ def test_an_answer_is_right_if_it_is_exactly_the_truth(given: dict[str, Any], ef
     assert found.held_out == (2.0, 1.0)
 
 
-def test_a_pair_is_visible_only_if_each_of_its_members_is() -> None:
+def test_pair_visible_members() -> None:
+    """A pair is visible only if each of its members is."""
     truth = {
         "effects": ["a", "b"],
         "identifiable": True,
@@ -75,7 +77,8 @@ def test_a_pair_is_visible_only_if_each_of_its_members_is() -> None:
     assert (found.kind, found.visible, found.one_visible) == ("pair", False, True)
 
 
-def test_a_twin_is_left_open_only_under_ambiguous() -> None:
+def test_twin_left_open_under_ambiguous() -> None:
+    """A twin is left open only under ambiguous."""
     truth = {"effects": ["twin"], "identifiable": True, "chi2_gain_of_truth": 90.0}
     for verdict in ("ambiguous", "explained"):
         found = judge("c", report(verdict, "a"), truth)
@@ -83,7 +86,8 @@ def test_a_twin_is_left_open_only_under_ambiguous() -> None:
         assert found.left_open is (verdict == "ambiguous")
 
 
-def test_a_tool_that_is_always_right_can_be_drawn(tmp_path: Path) -> None:
+def test_tool_always_right_drawn(tmp_path: Path) -> None:
+    """A tool that is always right can be drawn."""
     alike = Judged("c", ("a",), ("a",), False, "explained", 0.7, True, True, 9.0, None)
     judged = [replace(alike, probability=0.7 + 0.01 * number) for number in range(30)]
     assert figures.calibration_and_size(judged, tmp_path / "all.svg").stat().st_size > 1000
@@ -118,8 +122,11 @@ def test_drawn_cases_tell_nothing_of_the_truth() -> None:
     assert document["skin"]["d33_pc_per_n"] is None
 
 
-def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
-    """The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name."""
+def test_every_effect_drawn_supposed() -> None:
+    """Every effect that is drawn can be supposed where it is.
+
+    The ideal diagnoser's laws reach the parameters that the rig draws, and no others of the same name.
+    """
     for number in range(60 if SOAK else 40):
         description = drawn(3, number)
         effects = parse_experiment(description).effects
@@ -129,7 +136,8 @@ def test_every_effect_that_is_drawn_can_be_supposed_where_it_is() -> None:
     assert not set(CATALOGUED) & set(UNKNOWN)
 
 
-def test_a_supposition_gives_back_the_effects_of_its_place() -> None:
+def test_supposition_gives_back_effects_place() -> None:
+    """A supposition gives back the effects of its place."""
     description = drawn(3, 1, "single")
     for name in ("misalignment", "thickness_error", "preload_dependent_d33"):
         for supposed in suppositions((name,), of_frf(description)):
@@ -139,7 +147,8 @@ def test_a_supposition_gives_back_the_effects_of_its_place() -> None:
 
 
 @pytest.mark.slow
-def test_the_ideal_diagnoser_names_what_plainly_shows() -> None:
+def test_ideal_diagnoser_names_plainly_shows() -> None:
+    """The ideal diagnoser names what plainly shows."""
     quiet = next(n for n in range(50) if _light(drawn(9, n, "none")))
     assert diagnosed(DrawnCase(9, quiet, "none"))["answer"] == []
 
@@ -150,9 +159,8 @@ def _light(description: dict[str, Any]) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_digests")
-def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_small_run_writes_page_goes_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A small run writes the page and goes on from what it kept."""
     monkeypatch.setattr(own_rig, "SEED", 18)  # its first campaigns are small
     command = typer.Typer()
     command.command()(prove)
@@ -170,8 +178,11 @@ def test_a_small_run_writes_the_page_and_goes_on_from_what_it_kept(
     assert (tmp_path / "docs/proof.md").read_text(encoding="utf-8") == page
 
 
-def test_identifiable_is_what_stands_out_from_every_rival() -> None:
-    """Of two that are visible the twin is nobody's to name; what is wrong beside it counts."""
+def test_identifiable_stands_out_every_rival() -> None:
+    """Identifiable is what stands out from every rival.
+
+    Of two that are visible the twin is nobody's to name; what is wrong beside it counts.
+    """
     plain = Judged("plain", ("a",), ("a",), False, "explained", 0.9, True, True, 9.0, None)
     judged = [plain, replace(plain, name="twin", answer=("b",)), replace(plain, name="quiet", truth=(), answer=())]
     gains = {"plain": 31.0, "twin": -0.4, "quiet": None}
@@ -186,7 +197,8 @@ def test_identifiable_is_what_stands_out_from_every_rival() -> None:
 
 
 @pytest.mark.soak
-def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
+def test_ideal_diagnoser_finds_twin_no_better() -> None:
+    """The ideal diagnoser finds a twin no better than the truth."""
     found = diagnosed(DrawnCase(7001, 12, "single"))
     assert set(drawn(7001, 12, "single")["effects"]) == {"amplitude_nonlinearity"}
     assert abs(found["chi2_over_rivals"]) < 3.0
@@ -194,7 +206,8 @@ def test_the_ideal_diagnoser_finds_a_twin_no_better_than_the_truth() -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("quick_digests")
-def test_a_diagnosis_that_fails_is_a_wrong_answer(tmp_path: Path) -> None:
+def test_diagnosis_fails_wrong_answer(tmp_path: Path) -> None:
+    """A diagnosis that fails is a wrong answer."""
     [made] = reports(Work(tmp_path), [MadeCase("broken", {"schema": "campaign/1"})], lambda _, __: None)
     found = judge("broken", made, {"effects": [], "identifiable": True, "chi2_gain_of_truth": 0.0})
     assert not found.right
@@ -210,7 +223,8 @@ def test_an_unknown_part_is_named() -> None:
         assert name in result.output
 
 
-def test_what_the_figures_need_is_named_where_it_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_figures_need_named_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the figures need is named where it is not installed."""
     monkeypatch.setattr("proof.commands.find_spec", lambda _: None)
     command = typer.Typer()
     command.command()(prove)
@@ -231,15 +245,19 @@ def test_what_was_judged_survives_being_kept(tmp_path: Path) -> None:
     assert FileCase(path).name == "x"
 
 
-def test_the_paper_s_campaigns_say_what_the_paper_says() -> None:
+def test_paper_s_campaigns_say_paper_says() -> None:
+    """The paper s campaigns say what the paper says."""
     array = parse(paper_array.worlds()["array"])
     preloads = [entry.preload_n for entry in array.recordings if isinstance(entry, FrfRecording)]
     assert (preloads.count(3.0), preloads.count(1.0)) == (paper_array.AT_HIGHER, paper_array.AT_LOWER)
 
 
 @pytest.mark.slow
-def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned() -> None:
-    """Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart."""
+def test_paper_s_question_left_open_settle() -> None:
+    """The paper s question is left open and what would settle it is planned.
+
+    Preload and age go together on the array: both are named, neither is guessed, and the plan takes them apart.
+    """
     made = paper_array.worlds()
     array = diagnose(parse(made["array"]), load_table())
     rivals = {"preload_dependent_d33", "ageing"}
@@ -255,8 +273,11 @@ def test_the_paper_s_question_is_left_open_and_what_would_settle_it_is_planned()
 
 
 @pytest.mark.soak
-def test_what_would_settle_the_paper_s_question_does() -> None:
-    """Both preloads on late sensors: what did it is named."""
+def test_settle_paper_s_question() -> None:
+    """What would settle the paper s question does.
+
+    Both preloads on late sensors: what did it is named.
+    """
     made = paper_array.worlds()
     aged = diagnose(parse(made["array, then both preloads: age did it"]), load_table())
     assert {entry["name"] for entry in aged["mechanisms"]} == {"ageing"}

@@ -25,7 +25,8 @@ def page(part: str, entries: list[dict[str, Any]], truths: list[Any], stated: li
     return " ".join(document({part: result}).split())
 
 
-def test_shares_errors_and_intervals_of_curves_stand_on_the_page() -> None:
+def test_shares_errors_intervals_curves_stand() -> None:
+    """Shares errors and intervals of curves stand on the page."""
     entries = [
         judged("a", ("adhesion",), ("adhesion",)),
         judged("b", ("adhesion",), ("adhesion",)),
@@ -52,7 +53,8 @@ def test_shares_errors_and_intervals_of_curves_stand_on_the_page() -> None:
     assert "| d | adhesion | contact_creep | explained |" in said
 
 
-def test_false_alarms_on_quiet_curves_are_counted_and_listed() -> None:
+def test_false_alarms_quiet_curves_counted() -> None:
+    """False alarms on quiet curves are counted and listed."""
     entries = [judged("q0", (), ()), judged("q1", (), ("adhesion",)), judged("q2", (), ())]
     said = page("quiet_curves", entries, [{}] * 3, [{}] * 3)
     assert "3 of 200 campaigns of raw curves with nothing missing" in said

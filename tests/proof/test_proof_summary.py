@@ -40,7 +40,8 @@ def test_each_line_is_of_its_part() -> None:
     assert summary({}) == ""
 
 
-def test_curves_beside_frfs_are_counted_over_blocks_and_indentations() -> None:
+def test_curves_beside_frfs_counted_over_blocks() -> None:
+    """Curves beside frfs are counted over blocks and indentations."""
     told = {"right": {"alone": False, "together": True}, "apart": ["modulus_error"], "identifiable": True}
     told |= {"named": {"alone": [], "together": ["modulus_error"]}}
     every = [told | {"what": what} for what in ("compression", "indentation", "dates")]
@@ -48,7 +49,8 @@ def test_curves_beside_frfs_are_counted_over_blocks_and_indentations() -> None:
     assert [one.partition(":")[0] for one in _SHARE.findall(text)] == ["2 of 2", "0 of 2", "2 of 2", "0 of 2"]
 
 
-def test_the_page_says_in_short_what_its_sections_say() -> None:
+def test_page_says_short_sections_say() -> None:
+    """The page says in short what its sections say."""
     page = (ROOT / "docs" / "proof.md").read_text(encoding="utf-8")
     _, _, rest = page.partition("## In short")
     short, _, below = rest.partition("\n## ")

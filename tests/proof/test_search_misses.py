@@ -47,7 +47,8 @@ AT_BOUNDS = DrawnCase(930001, 161, "pair", WIDE)  # a slow loss at its bound, wh
     ),
     ids=lambda case: case.name,
 )
-def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: DrawnCase) -> None:
+def test_hidden_sets_found_weighed_well_true(case: DrawnCase) -> None:
+    """Hidden sets are found and weighed as well as from true values."""
     entry = compared(case)
     assert not is_miss(entry)
     own = entry["lost_own"]  # None where a better set was found before it
@@ -55,7 +56,8 @@ def test_hidden_sets_are_found_and_weighed_as_well_as_from_true_values(case: Dra
 
 
 @pytest.mark.slow
-def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> None:
+def test_set_fitted_without_scatter_parent_needs() -> None:
+    """A set is also fitted without the scatter that its parent needs."""
     entry = compared(MISLED)
     assert entry["found"] == entry["truth"] == ["sensor_spread", "thickness_error"]
     assert not is_miss(entry)
@@ -63,14 +65,17 @@ def test_a_set_is_also_fitted_without_the_scatter_that_its_parent_needs() -> Non
 
 
 @pytest.mark.soak
-def test_a_fit_that_was_stopped_as_hopeless_is_taken_up_where_scatter_shows_that_it_is_not() -> None:
+def test_fit_stopped_hopeless_taken_up_scatter() -> None:
+    """A fit that was stopped as hopeless is taken up where scatter shows that it is not."""
     entry = compared(STOPPED)
     assert entry["found"] == entry["truth"] == ["sensor_relaxation"]
     assert abs(entry["lost_own"]) < 0.5
 
 
 @pytest.mark.slow
-def test_a_search_that_leaves_the_hidden_set_out_misses_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_leaves_hidden_set_out_misses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that leaves the hidden set out misses it."""
+
     def shorter(problem: FittingProblem, known: Sequence[Explanation]) -> Search:
         found = search(problem, known)
         return replace(found, explanations=tuple(entry for entry in found.explanations if len(entry.names) < 2))
@@ -81,7 +86,8 @@ def test_a_search_that_leaves_the_hidden_set_out_misses_it(monkeypatch: pytest.M
     assert entry["lost_own"] is None
 
 
-def test_true_values_are_in_the_terms_of_the_catalogue() -> None:
+def test_true_values_terms_catalogue() -> None:
+    """True values are in the terms of the catalogue."""
     assert true_values("timing_delay", {"delay_us": 12.0}) == {"delay": 12.0}
     assert true_values("misalignment", {"x_mm": 0.3, "y_mm": -0.4})["offset"] == pytest.approx(0.5)
     assert true_values("ageing", {"law": "log", "rate": 0.2, "cycles": 500.0})["saturation"] == 0.0

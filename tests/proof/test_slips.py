@@ -24,7 +24,8 @@ def recorded(effect: str, **values: Any) -> RecordedLines:
 
 
 @pytest.mark.slow
-def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
+def test_slips_few_campaigns_committed_named() -> None:
+    """Slips in a few campaigns are committed and named."""
     judged = [of_one(900810, number) for number in first(1, (23, 7, 8))]
     assert not any(entry["false"] for entry in judged)
     committed = [(slip, one) for entry in judged for slip, one in entry["slips"].items()]
@@ -35,7 +36,8 @@ def test_slips_in_a_few_campaigns_are_committed_and_named() -> None:
     assert all(plain)
 
 
-def test_a_conjugated_delay_is_one_of_the_other_sign() -> None:
+def test_conjugated_delay_sign() -> None:
+    """A conjugated delay is one of the other sign."""
     made = recorded("timing_delay", delay_us=80.0)
     assert (4 * made.exact.imag**2 / made.line_variance).sum() > 100
     assert left_of_conjugated(made) < 1.0
@@ -46,11 +48,13 @@ def test_a_conjugated_delay_is_one_of_the_other_sign() -> None:
     [("amplifier_high_pass", {"corner_hz": 1.5}), ("sensor_relaxation", {"law": "ladder", "exponent": 0.05})],
 )
 @pytest.mark.slow
-def test_a_conjugated_high_pass_or_relaxation_is_nothing_else(effect: str, values: dict[str, Any]) -> None:
+def test_conjugated_high_pass_relaxation_nothing(effect: str, values: dict[str, Any]) -> None:
+    """A conjugated high pass or relaxation is nothing else."""
     assert left_of_conjugated(recorded(effect, **values)) > 20.0
 
 
-def test_a_third_that_is_conjugated_shows_by_two_signs_and_one_course_does_not() -> None:
+def test_third_conjugated_shows_two_signs_course() -> None:
+    """A third that is conjugated shows by two signs and one course does not."""
     made = recorded("timing_delay", delay_us=80.0)
     turned = np.arange(len(made.exact)) % 3 == 0
     assert over_one_sign(made, turned, 1 / 3) > 20.0
@@ -64,7 +68,8 @@ def _entry(name: str, hidden: list[str], false: list[str], *committed: tuple[str
     return {"name": name, "hidden": hidden, "false": false, "slips": each}
 
 
-def test_the_page_counts_the_visible_and_the_identifiable() -> None:
+def test_page_counts_visible_identifiable() -> None:
+    """The page counts the visible and the identifiable."""
     judged = [
         _entry("a", [], [], ("force rms", 50.0, 40.0, True), ("all conjugated", 90.0, 0.0, False)),
         _entry("b", ["ageing"], ["warm_up.campaign"], ("force rms", 50.0, 30.0, False)),
@@ -81,8 +86,11 @@ def test_the_page_counts_the_visible_and_the_identifiable() -> None:
     assert "| a | nothing |" not in page
 
 
-def test_an_exchange_of_cables_leaves_no_more_than_a_step_of_either_sensor_leaves() -> None:
-    """Against least squares, with a level of each sensor and a step of one of the two."""
+def test_exchange_cables_leaves_no_step_either() -> None:
+    """An exchange of cables leaves no more than a step of either sensor leaves.
+
+    Against least squares, with a level of each sensor and a step of one of the two.
+    """
     description = drawn(8, 3, "none")
     description["skin"]["array"] |= {"columns": 2, "rows": 2}
     description["design"].pop("offsets_mm", None)

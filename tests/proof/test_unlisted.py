@@ -42,7 +42,8 @@ def law(acts_on: str, axis: str, form: str, after: float = 2.2) -> dict[str, Any
     return {"acts_on": acts_on, "axis": axis, "form": form, "heldout_rmse_percent": {"before": 9.0, "after": after}}
 
 
-def test_an_equivalent_that_the_rig_cannot_tell_apart_is_right() -> None:
+def test_equivalent_rig_cannot_tell_apart_right() -> None:
+    """An equivalent that the rig cannot tell apart is right."""
     assert entry(law("modulus", "order", "linear"))["shaped"]
     assert entry(law("force", "recorded_at", "linear"))["shaped"]
     assert entry(law("force", "order", "power"))["placed"]
@@ -52,7 +53,8 @@ def test_an_equivalent_that_the_rig_cannot_tell_apart_is_right() -> None:
     assert not entry(None)["placed"]
 
 
-def test_the_probability_that_anything_is_missing_is_all_but_that_of_nothing() -> None:
+def test_probability_anything_missing_nothing() -> None:
+    """The probability that anything is missing is all but that of nothing."""
     assert entry(None)["missing"] == pytest.approx(0.96)
     assert entry(None, verdict="no_mismatch")["missing"] == pytest.approx(0.1)
 
@@ -65,7 +67,8 @@ def test_a_diagnosis_that_failed_counts_as_wrong() -> None:
     assert "stated in\n1 of 1" in alarms({"seed": 1, "judged": [judged("0001", {"law": None}, failed)]})
 
 
-def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
+def test_shares_counts_intervals_misses_listed() -> None:
+    """Shares have their counts and intervals and misses are listed."""
     entries = [
         entry(law("modulus", "order", "linear")),
         entry(law("gain", "order", "step", after=8.0)),
@@ -86,7 +89,8 @@ def test_shares_have_their_counts_and_intervals_and_misses_are_listed() -> None:
     assert "with more than 80 % in 1." in alarms(quiet)
 
 
-def test_a_law_stands_for_a_mechanism_on_its_axis_where_it_enters_or_predicts_as_well() -> None:
+def test_law_stands_mechanism_axis_enters() -> None:
+    """A law stands for a mechanism on its axis where it enters or predicts as well."""
     fit = {"noise_floor_percent": 2.0, "before": {"heldout_rmse_percent": 9.0}, "after": {"heldout_rmse_percent": 2.2}}
     named = {"verdict": "explained", "fit": fit}
 
@@ -107,7 +111,8 @@ def test_a_law_stands_for_a_mechanism_on_its_axis_where_it_enters_or_predicts_as
 
 
 @pytest.mark.soak
-def test_campaigns_of_the_rig_are_read_and_diagnosed(tmp_path: Path) -> None:
+def test_campaigns_rig_read_diagnosed(tmp_path: Path) -> None:
+    """Campaigns of the rig are read and diagnosed."""
     names = ["0001", "0002"]
     result = judge_unlisted(Work(tmp_path, count=len(names)), lambda *_: None)
     assert [one["name"] for one in result["judged"]] == names

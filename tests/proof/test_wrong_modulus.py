@@ -36,7 +36,8 @@ def report(
     }
 
 
-def test_an_error_that_is_named_is_measured_by_its_interval_and_its_value() -> None:
+def test_error_named_measured_interval_value() -> None:
+    """An error that is named is measured by its interval and its value."""
     found = compared(report((2.2, 2.4, 2.6)), TRUTH)
     assert found["named"]
     assert found["held"]
@@ -45,7 +46,8 @@ def test_an_error_that_is_named_is_measured_by_its_interval_and_its_value() -> N
     assert not compared(report((2.6, 2.7, 2.8)), TRUTH)["held"]
 
 
-def test_what_cannot_be_told_apart_counts_as_grouped_where_it_is_sure() -> None:
+def test_cannot_told_apart_counts_grouped_sure() -> None:
+    """What cannot be told apart counts as grouped where it is sure."""
     twins = ("modulus_error", "moving_contact_edge")
     assert compared(report(None, twins), TRUTH)["grouped"]
     assert not compared(report(None, twins, 0.7), TRUTH)["grouped"]
@@ -53,7 +55,8 @@ def test_what_cannot_be_told_apart_counts_as_grouped_where_it_is_sure() -> None:
     assert not compared(report(None, twins), TRUTH)["named"]
 
 
-def test_contacts_beyond_the_tables_and_those_left_out_are_counted() -> None:
+def test_contacts_beyond_tables_left_out_counted() -> None:
+    """Contacts beyond the tables and those left out are counted."""
     none_kept = compared(report(None), TRUTH)
     assert (none_kept["beyond"], none_kept["left_out"], none_kept["recordings"]) == (2, 2, 3)
     some = report(None)
@@ -61,7 +64,8 @@ def test_contacts_beyond_the_tables_and_those_left_out_are_counted() -> None:
     assert compared(some, TRUTH)["left_out"] == 1
 
 
-def test_a_design_determines_the_modulus_by_its_information_or_by_curves() -> None:
+def test_design_determines_modulus_information() -> None:
+    """A design determines the modulus by its information or by curves."""
     assert not compared(report(None), TRUTH)["determined"]
     assert compared(report(None), {**TRUTH, "what": "compression"})["determined"]
     sure = [{**TRUTH["documents"][0], "sd_ln_modulus_frf": 0.04}]

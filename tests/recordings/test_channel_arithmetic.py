@@ -106,7 +106,8 @@ ALL = tuple(Channel(f"in {label}", label, SAMPLES) for label in UNITS)
 
 
 @given(FORMULAS)
-def test_values_and_units_are_those_of_a_textbook(case: tuple[str, Measured]) -> None:
+def test_values_units_textbook(case: tuple[str, Measured]) -> None:
+    """Values and units are those of a textbook."""
     formula, expected = case
     whole = f"{formula} * ('in mm' / 'in mm')"  # a channel, also where all terms are constants
     assume(not expected.cancels)
@@ -124,7 +125,8 @@ def test_values_and_units_are_those_of_a_textbook(case: tuple[str, Measured]) ->
 
 
 @given(st.sampled_from(["pm", "nm", "um", "mm", "cm", "m", "inch"]), st.sampled_from(["nm", "um", "mm"]))
-def test_a_difference_is_the_same_in_whatever_units_its_terms_came(first: str, second: str) -> None:
+def test_difference_whatever_units_terms_came(first: str, second: str) -> None:
+    """A difference is the same in whatever units its terms came."""
     piezo, deflection = 1e-6 * np.array([0.0, 1, 2, 3]), 1e-7 * np.array([0.0, 0, 2, 5])
     factors = [one.to_si for one in (unit(first), unit(second)) if one is not None]
     channel = derived(
@@ -165,21 +167,24 @@ def test_any_text_is_a_formula_or_is_refused(text: str) -> None:
         ("a[b][c]", "a[b][c]"),
     ],
 )
-def test_what_is_no_arithmetic_is_refused_by_its_term(formula: str, term: str) -> None:
+def test_no_arithmetic_refused_term(formula: str, term: str) -> None:
+    """What is no arithmetic is refused by its term."""
     with pytest.raises(InvalidInput) as refused:
         parse("derived.x", formula)
     assert refused.value.allowed.startswith(f"{term}: ")
 
 
 @pytest.mark.parametrize("formula", ["Cell #2 - b", "(a) # b", "a#b", "'Cell #1' - Cell #2"])
-def test_a_sign_that_begins_a_comment_in_python_cuts_nothing_off(formula: str) -> None:
+def test_sign_begins_comment_python_cuts_nothing(formula: str) -> None:
+    """A sign that begins a comment in python cuts nothing off."""
     with pytest.raises(InvalidInput, match="a name with # in quotes"):
         parse("derived.d", formula)
     assert parse("derived.d", "'Cell #1' - \"Cell #2\"").names == ("Cell #1", "Cell #2")
 
 
 @pytest.mark.parametrize("formula", ["", "a -", "0.05 N/m * a", "(" * 150 + "a", "-" * 201, "a\\", "import os"])
-def test_what_cannot_be_parsed_is_refused_with_an_example(formula: str) -> None:
+def test_cannot_parsed_refused_example(formula: str) -> None:
+    """What cannot be parsed is refused with an example."""
     with pytest.raises(InvalidInput, match="must"):
         parse("derived.x", formula)
 
@@ -207,7 +212,8 @@ def test_a_term_that_does_not_fit_is_named(formula: str, said: str) -> None:
     assert said in refused.value.reason
 
 
-def test_a_unit_in_brackets_stands_for_one_that_the_file_lacks() -> None:
+def test_unit_brackets_stands_file_lacks() -> None:
+    """A unit in brackets stands for one that the file lacks."""
     channel = derived("2.5 [N/V] * Raw [mV]", Channel("Raw", "", SAMPLES))
     assert channel.unit == "N"
     np.testing.assert_allclose(channel.values, 2.5e-3 * SAMPLES)
@@ -216,6 +222,7 @@ def test_a_unit_in_brackets_stands_for_one_that_the_file_lacks() -> None:
 
 
 @pytest.mark.parametrize("stated", [{"k (N/m)": "0,05"}, {"k (N/m)": 0.05}])
-def test_a_property_of_the_file_is_a_number_with_a_unit(stated: dict[str, str | float]) -> None:
+def test_property_file_number_unit(stated: dict[str, str | float]) -> None:
+    """A property of the file is a number with a unit."""
     channel = derived("'k (N/m)' * Deflection", Channel("Deflection", "nm", SAMPLES), properties=stated)
     np.testing.assert_allclose(in_si(channel), 0.05e-9 * SAMPLES)

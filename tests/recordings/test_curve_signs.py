@@ -55,14 +55,14 @@ def adhesive(start_mm: float, end_mm: float, force: int, travel: int) -> Indenta
 
 @pytest.mark.parametrize(("force", "travel"), SIGNS)
 @pytest.mark.parametrize(("start_mm", "end_mm"), [(-0.05, -0.05), (0.0, 0.0), (0.0, -0.6), (-0.05, -0.6)])
-def test_what_pulls_a_sphere_on_its_way_out_tells_no_sign(
-    start_mm: float, end_mm: float, force: int, travel: int
-) -> None:
+def test_pulls_sphere_way_out_tells_no_sign(start_mm: float, end_mm: float, force: int, travel: int) -> None:
+    """What pulls a sphere on its way out tells no sign."""
     expected = tuple(name for name, sign in zip(NAMES, (force, travel), strict=True) if sign < 0)
     assert curve_preparation.counted_negative(adhesive(start_mm, end_mm, force, travel)) == expected
 
 
-def test_a_sphere_that_is_still_pulled_where_it_is_deepest_is_not_turned() -> None:
+def test_sphere_still_pulled_deepest_not_turned() -> None:
+    """A sphere that is still pulled where it is deepest is not turned."""
     curve = adhesive(-0.05, -0.6, 1, 1)
     rows = np.flatnonzero((np.arange(160) < 80) & (curve.displacement_mm < 0.06))
     pressed_lightly = samples_of(curve, rows)

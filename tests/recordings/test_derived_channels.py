@@ -23,7 +23,8 @@ def curve_of(reading: Reading) -> IndentationRecording:
     return recording
 
 
-def test_depth_and_force_are_derived_from_height_and_deflection() -> None:
+def test_depth_force_derived_height_deflection() -> None:
+    """Depth and force are derived from height and deflection."""
     reading = read(text_of_raw_curve())
     curve = curve_of(reading)
     np.testing.assert_allclose(curve.force_n, FORCE_N, atol=1e-11)
@@ -91,7 +92,8 @@ def test_a_sign_is_told_from_how_the_curve_goes() -> None:
 
 
 @pytest.mark.parametrize(("force", "travel"), [(1, 1), (-1, 1), (1, -1), (-1, -1)])
-def test_the_signs_of_a_block_are_told_from_its_largest_force(force: int, travel: int) -> None:
+def test_signs_block_told_largest_force(force: int, travel: int) -> None:
+    """The signs of a block are told from its largest force."""
     strain = np.concatenate([np.linspace(0, 0.2, 50), np.linspace(0.2, 0, 50)])
     rows = "".join(f"{travel * one:.6f};{force * 40 * one:.6f}\n" for one in strain)
     rig = rig_description.from_dict(
@@ -138,7 +140,8 @@ def test_the_signs_of_a_block_are_told_from_its_largest_force(force: int, travel
         ),
     ],
 )
-def test_what_a_rig_description_cannot_mean_is_refused(changes: dict[str, Any], field: str, said: str) -> None:
+def test_rig_description_cannot_mean_refused(changes: dict[str, Any], field: str, said: str) -> None:
+    """What a rig description cannot mean is refused."""
     with pytest.raises(InvalidInput) as refused:
         rig_description.from_dict(rig_of_raw_curve(**changes))
     assert refused.value.field == field
@@ -164,12 +167,14 @@ def test_what_a_file_contradicts_is_refused(changes: dict[str, Any], place: str,
     assert said in refused.value.reason
 
 
-def test_a_formula_may_leave_out_the_unit_of_a_heading() -> None:
+def test_formula_leave_out_unit_heading() -> None:
+    """A formula may leave out the unit of a heading."""
     derived = {"depth": "-Height - Deflection", "load": "k * Deflection"}
     reading = read(text_of_raw_curve(), derived={"k": "3 [N/m]", **derived})
     np.testing.assert_allclose(curve_of(reading).force_n, FORCE_N, atol=1e-11)
 
 
-def test_a_message_says_the_unit_of_a_heading_once() -> None:
+def test_message_says_unit_heading_once() -> None:
+    """A message says the unit of a heading once."""
     contents = Contents((Block("", (Channel("Load [N]", "N", np.zeros(1)), Channel("Stroke", "mm", np.zeros(1)))),))
     assert contents.described() == "Load [N], Stroke [mm]"

@@ -38,7 +38,8 @@ def test_the_papers_reading(toe: float, sign: int) -> None:
     assert found.leaves_at_strain == pytest.approx(2 / 16, rel=0.1)
 
 
-def test_a_straight_curve_stays_straight_and_its_uncertainty_is_the_scatter_seen() -> None:
+def test_straight_curve_stays_straight() -> None:
+    """A straight curve stays straight and its uncertainty is the scatter seen."""
     random = np.random.default_rng(1)
     displacement = np.linspace(0, 1e-3, 300)
     force = 16e6 * displacement / HEIGHT * np.pi / 4 * DIAMETER**2
@@ -63,7 +64,8 @@ def hertz(depth: Floats, modulus: float = 16e6, contact: float = 0.1e-3, offset:
 
 
 @pytest.mark.slow
-def test_indentation_finds_contact_and_modulus_and_its_interval_covers() -> None:
+def test_indentation_finds_contact_modulus() -> None:
+    """Indentation finds contact and modulus and its interval covers."""
     random = np.random.default_rng(2)
     depth = np.linspace(0, 0.4e-3, 200)
     hits = 0
@@ -76,7 +78,8 @@ def test_indentation_finds_contact_and_modulus_and_its_interval_covers() -> None
     assert exact.contact_point == pytest.approx(0.1e-3, abs=1e-7)
 
 
-def test_a_recording_that_starts_in_contact_has_its_contact_point_before_it() -> None:
+def test_recording_starts_contact_contact_point() -> None:
+    """A recording that starts in contact has its contact point before it."""
     depth = np.linspace(0.15e-3, 0.5e-3, 200)
     found = indentation_modulus(depth, hertz(depth, offset=0.0), RADIUS, 0.5)
     assert found.contact_point == pytest.approx(0.1e-3, abs=1e-6)
@@ -84,7 +87,8 @@ def test_a_recording_that_starts_in_contact_has_its_contact_point_before_it() ->
 
 
 @pytest.mark.parametrize(("height_mm", "diameter_mm"), [(10.0, 10.0), (12.5, 29.0), (30.0, 50.0)])
-def test_the_papers_reading_on_the_stated_geometry(height_mm: float, diameter_mm: float) -> None:
+def test_papers_reading_stated_geometry(height_mm: float, diameter_mm: float) -> None:
+    """The papers reading on the stated geometry."""
     strain = np.linspace(0, 0.3, 600)
     pressed = CompressionRecording(
         id="c", sample_height_mm=height_mm, sample_diameter_mm=diameter_mm, displacement_mm=strain * height_mm,
@@ -96,7 +100,8 @@ def test_the_papers_reading_on_the_stated_geometry(height_mm: float, diameter_mm
     assert "leaves the line at 2.09 MPa" in found.statement
 
 
-def test_an_indentation_in_lab_units_gives_the_same() -> None:
+def test_indentation_lab_units_gives() -> None:
+    """An indentation in lab units gives the same."""
     depth = np.linspace(0, 0.4e-3, 200)
     indented = IndentationRecording(id="i", indenter_radius_mm=4.0, displacement_mm=depth * 1e3, force_n=hertz(depth))
     found = of_indentation(indented, 0.5)
@@ -104,12 +109,14 @@ def test_an_indentation_in_lab_units_gives_the_same() -> None:
     assert "contact from 0.1 mm" in found.statement
 
 
-def test_a_recording_that_does_not_load_is_refused() -> None:
+def test_recording_not_load_refused() -> None:
+    """A recording that does not load is refused."""
     with pytest.raises(InvalidInput, match="force_n"):
         indentation_modulus(np.linspace(0, 1, 50), -hertz(np.linspace(0.4e-3, 0, 50)) * 0, RADIUS, 0.5)
 
 
-def test_a_modulus_that_one_sample_in_contact_leaves_open_is_refused() -> None:
+def test_modulus_sample_contact_leaves_open() -> None:
+    """A modulus that one sample in contact leaves open is refused."""
     depth = np.linspace(0, 0.4e-3, 20)
     force = np.where(np.arange(20) == 19, 1.0, 0.0)
     with pytest.raises(InvalidInput, match="displacement_mm"):

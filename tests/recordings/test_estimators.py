@@ -43,12 +43,14 @@ def factor(in_force: float, in_charge: float, estimator: Estimator) -> Floats:
     return np.abs(frf.values[low] / known_frf(frf.frequency[low]))
 
 
-def test_noise_in_the_force_makes_h1_too_small_by_its_share_of_the_power_and_h2_not() -> None:
+def test_noise_force_makes_h1_too_small_share() -> None:
+    """Noise in the force makes h1 too small by its share of the power and h2 not."""
     assert np.mean(factor(NOISE, 0, "H1")) == pytest.approx(1 / (1 + NOISE**2), abs=0.005)
     assert np.mean(factor(NOISE, 0, "H2")) == pytest.approx(1, abs=0.005)
 
 
-def test_noise_in_the_charge_makes_h2_too_large_and_h1_not() -> None:
+def test_noise_charge_makes_h2_too_large_h1() -> None:
+    """Noise in the charge makes h2 too large and h1 not."""
     assert np.mean(factor(0, NOISE, "H1")) == pytest.approx(1, abs=0.005)
     frequency = (RATE * np.fft.rfftfreq(1000)[1:]).astype(np.float64)
     power = np.abs(known_frf(frequency)) ** 2
@@ -56,7 +58,8 @@ def test_noise_in_the_charge_makes_h2_too_large_and_h1_not() -> None:
     assert np.mean(factor(0, NOISE, "H2")) == pytest.approx(np.mean(1 + share), abs=0.005)
 
 
-def test_with_noise_in_both_hv_lies_between_at_every_line() -> None:
+def test_noise_hv_lies_every_line() -> None:
+    """With noise in both hv lies between at every line."""
     h1, h2, hv = (factor(NOISE, NOISE, name) for name in ("H1", "H2", "Hv"))
     assert np.all(h1 < hv)
     assert np.all(hv < h2)
@@ -64,8 +67,11 @@ def test_with_noise_in_both_hv_lies_between_at_every_line() -> None:
     assert np.mean(h2) > 1.01
 
 
-def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
-    """A system without dynamics: every line has the ratio of noise to signal that Hv assumes."""
+def test_noise_equal_relative_power_hv_alone() -> None:
+    """With noise of equal relative power hv alone is right.
+
+    A system without dynamics: every line has the ratio of noise to signal that Hv assumes.
+    """
     random = np.random.default_rng(900_002)
     force = random.standard_normal(SAMPLES)
     noise = [NOISE * np.std(force) * random.standard_normal(SAMPLES) for _ in range(2)]
@@ -79,10 +85,13 @@ def test_with_noise_of_equal_relative_power_hv_alone_is_right() -> None:
 
 
 @pytest.mark.slow
-def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
-    """White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
+def test_hv_stepped_sine_takes_noise_ratio_tones() -> None:
+    """Hv of a stepped sine takes its noise ratio from all tones.
+
+    White noise in both channels with the ratio of the signals' powers over both tones. At 125 Hz the charge has a
     quarter of its magnitude at 10 Hz, so that a ratio of that tone's own powers would give the geometric mean of H1 and
-    H2, which is too large there."""
+    H2, which is too large there.
+    """
     force = dwelling([10.0, 125.0], cycles=600)
     charge, true = answer_to(force), np.abs(known_frf(np.array([10.0, 125.0])))
     random, noise, repeats = np.random.default_rng(910_001), 0.007, 40 if SOAK else 16
@@ -105,8 +114,11 @@ def test_hv_of_a_stepped_sine_takes_its_noise_ratio_from_all_tones() -> None:
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS)
-def test_the_stated_uncertainty_is_the_scatter_of_repeats(estimator: Estimator) -> None:
-    """Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n."""
+def test_stated_uncertainty_scatter_repeats(estimator: Estimator) -> None:
+    """The stated uncertainty is the scatter of repeats.
+
+    Of lines below 300 Hz, over records with noise in both channels; by a formula of first order in (1 − γ²)/n.
+    """
     found, stated = [], []
     for seed in range(930_001, 930_013 if SOAK else 930_009):
         frf = broadband(*noisy(NOISE, NOISE, seed), RATE, block_samples=1000, estimator=estimator)
@@ -118,7 +130,8 @@ def test_the_stated_uncertainty_is_the_scatter_of_repeats(estimator: Estimator) 
     assert np.sqrt(np.mean(scatter)) == pytest.approx(1, abs=0.08)
 
 
-def test_without_noise_all_three_agree_and_keep_the_sign_of_the_phase() -> None:
+def test_without_noise_three_agree_keep_sign() -> None:
+    """Without noise all three agree and keep the sign of the phase."""
     values = [broadband(*noisy(0, 0), RATE, block_samples=1000, estimator=name).values for name in ESTIMATORS]
     for other in values[1:]:
         np.testing.assert_allclose(other, values[0], rtol=2e-2)
@@ -150,14 +163,16 @@ def estimated(recording: FrfRecording) -> Floats:
     return np.abs(lines_of(recording).values)
 
 
-def test_a_recording_says_its_estimator_and_h1_is_what_it_has_without_one() -> None:
+def test_recording_says_estimator_h1() -> None:
+    """A recording says its estimator and h1 is what it has without one."""
     h1, h2, hv = (estimated(recording_of({**RECORDING, "estimator": name})) for name in ESTIMATORS)
     np.testing.assert_array_equal(estimated(recording_of(RECORDING)), h1)
     assert np.all(h1 < hv)
     assert np.all(hv < h2)
 
 
-def test_the_estimator_stays_with_the_recording_in_json_hdf5_and_the_template() -> None:
+def test_estimator_stays_recording_json_hdf5() -> None:
+    """The estimator stays with the recording in json hdf5 and the template."""
     campaign, _ = from_dict(document({**RECORDING, "estimator": "Hv"}))
     assert to_dict(campaign)["recordings"][0]["estimator"] == "Hv"
     buffer = io.BytesIO()
@@ -183,7 +198,8 @@ def test_the_estimator_stays_with_the_recording_in_json_hdf5_and_the_template() 
         ({**LINES, "estimator": "Hv"}, "must be absent where there is no time series"),
     ],
 )
-def test_what_is_no_estimator_or_has_nothing_to_estimate_is_refused(entry: dict[str, Any], says: str) -> None:
+def test_no_estimator_nothing_estimate_refused(entry: dict[str, Any], says: str) -> None:
+    """What is no estimator or has nothing to estimate is refused."""
     _, (problem,) = from_dict(document(entry))
     assert (problem.field, problem.allowed) == ("estimator", says)
 
@@ -198,7 +214,8 @@ def of_rig(**changes: Any) -> FrfRecording:
     return read
 
 
-def test_the_rig_description_says_the_estimator_of_its_recordings() -> None:
+def test_rig_description_says_estimator() -> None:
+    """The rig description says the estimator of its recordings."""
     assert of_rig().estimator is None
     h1, h2, hv = (estimated(of_rig(estimator=name)) for name in ESTIMATORS)
     np.testing.assert_allclose(estimated(of_rig()), h1)
@@ -223,12 +240,14 @@ def test_the_rig_description_says_the_estimator_of_its_recordings() -> None:
         ),
     ],
 )
-def test_a_rig_description_is_refused_where_its_estimator_cannot_be_used(changes: dict[str, Any], field: str) -> None:
+def test_rig_description_refused_estimator(changes: dict[str, Any], field: str) -> None:
+    """A rig description is refused where its estimator cannot be used."""
     with pytest.raises(InvalidInput, match=f"^{field} = "):
         rig(**changes)
 
 
-def test_whoever_reads_a_file_may_say_another_estimator_and_is_told_of_what_it_is_not_for() -> None:
+def test_whoever_reads_file_say_estimator_told() -> None:
+    """Whoever reads a file may say another estimator and is told of what it is not for."""
     both = document({**RECORDING, "estimator": "H2"}, {**LINES, "id": "r2"})
     campaign, _ = from_dict(both)
     buffer = io.BytesIO()

@@ -75,8 +75,11 @@ def test_a_flat_campaign_is_flat_throughout() -> None:
 
 
 @pytest.mark.parametrize(("excited_hz", "told"), [((20.0, 1e4), "below"), ((0.0, 9.0), "above")])
-def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
-    """Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere."""
+def test_not_excited_no_flat_zone_however_wide(excited_hz: tuple[float, float], told: str) -> None:
+    """What was not excited is no flat zone however wide.
+
+    Uncorrelated noise over noise is as flat as a response where it is averaged long, and lies elsewhere.
+    """
     frequency = np.geomspace(0.2, 300.0, 400)
     follows = (frequency >= excited_hz[0]) & (frequency <= excited_hz[1])
     frfs, conditions = recorded(frequency, "")
@@ -96,8 +99,11 @@ def test_what_was_not_excited_is_no_flat_zone_however_wide(excited_hz: tuple[flo
     assert "whole recorded range" not in zone.reason
 
 
-def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
-    """One line in twenty is excited; between them the charge is noise, which nothing makes follow the force."""
+def test_force_few_sines_leaves_out_lines() -> None:
+    """A force of a few sines leaves out the lines between them.
+
+    One line in twenty is excited; between them the charge is noise, which nothing makes follow the force.
+    """
     frequency = np.arange(1.0, 301.0)
     sines = frequency % 20 == 0
     frfs, conditions = recorded(frequency, "")
@@ -117,8 +123,11 @@ def test_a_force_of_a_few_sines_leaves_out_the_lines_between_them() -> None:
     assert mean == pytest.approx([one.values.real[sines].mean() for one in frfs], rel=0.01)
 
 
-def test_a_sine_at_the_mains_beside_idle_lines_is_no_pick_up_and_low_sines_are_in_the_zone() -> None:
-    """A multisine whose lowest lines share their bins with idle ones."""
+def test_sine_mains_beside_idle_lines_no_pick() -> None:
+    """A sine at the mains beside idle lines is no pick up and low sines are in the zone.
+
+    A multisine whose lowest lines share their bins with idle ones.
+    """
     frequency = np.arange(1.0, 500.0)
     sines = np.isin(frequency, [5, 8, 12, 20, 31, 48, 75, 110])
     generator = np.random.default_rng(7)
@@ -137,15 +146,19 @@ def test_a_sine_at_the_mains_beside_idle_lines_is_no_pick_up_and_low_sines_are_i
     assert first.frequency_hz.tolist() == frequency[sines].tolist()
 
 
-def test_where_the_charge_follows_the_force_nowhere_all_lines_count() -> None:
-    """As of a dead sensor."""
+def test_charge_follows_force_nowhere_lines() -> None:
+    """Where the charge follows the force nowhere all lines count.
+
+    As of a dead sensor.
+    """
     frfs, conditions = recorded(LOG_GRID, "")
     dead = [Frf(LOG_GRID, one.values, np.full(len(LOG_GRID), 0.05)) for one in frfs]
     dead = [one.frf for one in usable_lines(dead)]
     assert flat_zone(stacked(dead), conditions).high_hz == LOG_GRID[-1]
 
 
-def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
+def test_lowest_resonances_ends_zone_named() -> None:
+    """The lowest of the resonances ends the zone and is named."""
     zone = zone_of("resonance")
     assert 40 < zone.high_hz < 110  # 1/(1 − (f/400)²) has risen by 1 % to 8 %
     assert zone.low_hz == LOG_GRID[0]
@@ -153,7 +166,8 @@ def test_the_lowest_of_the_resonances_ends_the_zone_and_is_named() -> None:
     assert "moving with the contact" in zone.reason
 
 
-def test_a_high_pass_begins_it_and_a_relaxation_does_not_end_it() -> None:
+def test_high_pass_begins_relaxation_not_end() -> None:
+    """A high pass begins it and a relaxation does not end it."""
     zone = zone_of("high-pass")
     assert 4 < zone.low_hz < 20  # corner at 2 Hz: Re = 0.8 at 4 Hz, 0.99 at 20 Hz
     assert "high-pass" in zone.reason
@@ -162,7 +176,8 @@ def test_a_high_pass_begins_it_and_a_relaxation_does_not_end_it() -> None:
     assert "fall alike, by 6." in relaxing.reason
 
 
-def test_mains_lines_are_left_out_and_do_not_end_it() -> None:
+def test_mains_lines_left_out_not_end() -> None:
+    """Mains lines are left out and do not end it."""
     frfs, conditions = recorded(LINEAR_GRID[:200], "mains")
     zone = flat_zone(stacked(frfs), conditions)
     assert (zone.low_hz, zone.high_hz) == (1, 200)
@@ -175,7 +190,8 @@ def test_mains_lines_are_left_out_and_do_not_end_it() -> None:
     assert np.median(mean) == pytest.approx(np.median(level), rel=0.03)
 
 
-def test_dead_sensors_and_single_recordings_do_not_spoil_it() -> None:
+def test_dead_sensors_single_recordings() -> None:
+    """Dead sensors and single recordings do not spoil it."""
     frfs, conditions = recorded(LOG_GRID, "resonance", copies=1)
     random = np.random.default_rng(5)
     for _ in range(4):
@@ -195,7 +211,8 @@ def test_the_users_band_overrides() -> None:
 
 
 @pytest.mark.parametrize("with_coherence", [True, False])
-def test_the_uncertainty_of_an_average_is_its_scatter_and_coherence_lowers_it(with_coherence: bool) -> None:
+def test_uncertainty_average_scatter_coherence(with_coherence: bool) -> None:
+    """The uncertainty of an average is its scatter and coherence lowers it."""
     random = np.random.default_rng(6)
     noise = np.where(np.arange(100) < 50, 0.002, 0.03)
     gamma2 = 1 / (1 + 2 * 16 * noise**2) if with_coherence else None
@@ -230,7 +247,8 @@ def test_concealed_campaigns(name: str, low: tuple[float, float], high: tuple[fl
     assert high[0] <= zone.high_hz <= high[1]
 
 
-def test_recordings_whose_lines_do_not_overlap_have_a_zone_and_no_warning() -> None:
+def test_recordings_lines_not_overlap_zone() -> None:
+    """Recordings whose lines do not overlap have a zone and no warning."""
     low, low_conditions = recorded(np.linspace(2, 20, 15), "")
     high, high_conditions = recorded(np.linspace(200, 400, 15), "")
     conditions = [*low_conditions, *((radius, 5 * preload) for radius, preload in high_conditions)]
@@ -238,7 +256,8 @@ def test_recordings_whose_lines_do_not_overlap_have_a_zone_and_no_warning() -> N
     assert 2 <= zone.low_hz < zone.high_hz <= 400
 
 
-def test_what_a_resonance_above_the_zone_puts_into_the_average_is_told() -> None:
+def test_resonance_above_zone_puts_average_told() -> None:
+    """What a resonance above the zone puts into the average is told."""
     frfs, conditions = recorded(np.arange(1.0, 401.0), "resonance", line=0.001)
     stacks = stacked(frfs)
     zone = flat_zone(stacks, conditions)

@@ -57,7 +57,8 @@ def test_all_kinds_of_numbers_are_taken_at_once() -> None:
 
 
 @pytest.mark.parametrize("cells", [['"a,b"', '"c"'], ["x", '"y"'], ["", "z"]])
-def test_texts_beside_numbers_are_without_their_quotes(cells: list[str]) -> None:
+def test_texts_beside_numbers_without_quotes(cells: list[str]) -> None:
+    """Texts beside numbers are without their quotes."""
     lines = [f"{cell},1,2" for cell in cells]
     rows = PlainRows(lines, RowStyle(",", ".", (1, 2), 3))
     assert rows.texts(0, 0, 2) == [text.cells(line, ",")[0] for line in lines]
@@ -70,21 +71,26 @@ def seconds(lines: list[str]) -> float:
 
 
 @pytest.mark.slow
-def test_lines_between_the_rows_hardly_cost_more_than_rows() -> None:
-    """Blank lines, which part groups, cost eight times as much while blocks were halved to find them."""
+def test_lines_rows_hardly_cost_rows() -> None:
+    """Lines between the rows hardly cost more than rows.
+
+    Blank lines, which part groups, cost eight times as much while blocks were halved to find them.
+    """
     rows = [f"{number * 1e-4:.4f},{number % 97 / 7:.6f}" for number in range(200_000)]
     parted = [line for number, row in enumerate(rows) for line in ((row, "") if number % 500 == 499 else (row,))]
     assert seconds(parted) < 3 * seconds(rows)
 
 
-def test_cells_that_end_lines_without_holding_anything_change_nothing() -> None:
+def test_cells_end_lines_without_holding() -> None:
+    """Cells that end lines without holding anything change nothing."""
     rows = [f"{number},{number / 8}" for number in range(100)]
     lines = ["Time [s],Force [N]", *rows[:50], *(f"{row},,," for row in rows[50:])]
     (block,) = contents("\n".join(lines).encode(), "a.csv").blocks
     assert block.channels[1].values.tolist() == [number / 8 for number in range(100)]
 
 
-def test_an_index_and_trailing_separators_of_a_long_template_are_passed_over() -> None:
+def test_index_trailing_separators_long_template() -> None:
+    """An index and trailing separators of a long template are passed over."""
     columns = "indenter_radius_mm,preload_n,dynamic_force_n,frequency_hz,frf_re_pc_per_n,frf_im_pc_per_n"
     lines = [*ABOVE.splitlines(), f"Unnamed: 0,id,sensor,{columns}"]
     for number in range(300):

@@ -59,7 +59,8 @@ def refusal(text: str) -> FileError:
         ("name,palm 3", 'name,"palm" 3', "line 2", "in quotes must end on its line"),
     ],
 )  # fmt: skip
-def test_what_would_be_lost_is_refused_by_line_and_column(old: str, new: str, place: str, reason: str) -> None:
+def test_lost_refused_line_column(old: str, new: str, place: str, reason: str) -> None:
+    """What would be lost is refused by line and column."""
     found = refusal(changed(old, new))
     assert found.place.startswith(place)
     assert reason in found.reason
@@ -70,13 +71,15 @@ def test_a_sensor_that_comes_twice_is_refused() -> None:
         read(changed("sensor,s01,0,0\n", "sensor,s01,0,0\nsensor,s01,8,0\n"))
 
 
-def test_cells_in_quotes_hold_separators_and_quotes() -> None:
+def test_cells_quotes_hold_separators_quotes() -> None:
+    """Cells in quotes hold separators and quotes."""
     quoted = changed("name,palm 3", 'name,"palm 3, ""May"""')
     assert read(quoted).campaign.name == 'palm 3, "May"'
     assert read(quoted.replace("preload_n", '"preload_n"')).campaign.recordings[0].id == "r1"
 
 
-def test_empty_cells_at_the_end_of_lines_are_no_cells() -> None:
+def test_empty_cells_end_lines_no_cells() -> None:
+    """Empty cells at the end of lines are no cells."""
     padded = "".join(f"{line},,,\n" if line else ",,,,,,\n" for line in TEMPLATE.splitlines())
     assert read(padded).campaign.skin == read(TEMPLATE).campaign.skin
 
@@ -92,12 +95,14 @@ def test_empty_cells_at_the_end_of_lines_are_no_cells() -> None:
         ),
     ],
 )
-def test_decimal_commas_beside_other_separators_and_in_quotes(text: str) -> None:
+def test_decimal_commas_beside_separators_quotes(text: str) -> None:
+    """Decimal commas beside other separators and in quotes."""
     skin = read(text).campaign.skin
     assert (skin.thickness_mm, skin.poisson_ratio, skin.sensor_radius_mm) == (2.5, 0.5, 1.5)
 
 
-def test_three_decimals_after_a_decimal_comma_are_no_thousands() -> None:
+def test_three_decimals_after_decimal_comma() -> None:
+    """Three decimals after a decimal comma are no thousands."""
     semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
     assert read(changed(";16\n", ";16,000\n", semicolons)).campaign.skin.youngs_modulus_mpa == 16
     tabs = PLAIN.replace(",", "\t")
@@ -106,7 +111,8 @@ def test_three_decimals_after_a_decimal_comma_are_no_thousands() -> None:
     assert read(changed("\t16\n", "\t16,000\n", commas)).campaign.skin.youngs_modulus_mpa == 16
 
 
-def test_a_decimal_point_among_decimal_commas_is_refused_with_what_is_written() -> None:
+def test_decimal_point_among_decimal_commas() -> None:
+    """A decimal point among decimal commas is refused with what is written."""
     semicolons = PLAIN.replace(",", ";").replace(".", ",").replace("skin,", "skin.")
     found = read(semicolons + "r2;s01;4;1.5;0,09;10;7,1;-0,5\n")
     assert [recording.id for recording in found.campaign.recordings] == ["r1"]
@@ -115,7 +121,8 @@ def test_a_decimal_point_among_decimal_commas_is_refused_with_what_is_written() 
     assert "line 12, column 4; decimals of this file are written with a comma" in problem.allowed
 
 
-def test_a_recording_that_begins_twice_is_refused() -> None:
+def test_recording_begins_twice_refused() -> None:
+    """A recording that begins twice is refused."""
     other = "r2,s01,4,2.0,0.09,10,7.1,-0.5\n"
     apart = refusal(PLAIN + other + "r1,,,,,40,7.1,-0.5\n")
     assert apart.place == "line 13, column 1"
@@ -132,7 +139,8 @@ def test_an_id_in_every_row_is_one_recording() -> None:
 
 
 @pytest.mark.parametrize("heading", ["preload_n", "position_x_mm"])
-def test_a_value_that_changes_within_a_recording_is_refused(heading: str) -> None:
+def test_value_changes_within_recording_refused(heading: str) -> None:
+    """A value that changes within a recording is refused."""
     headings = HEADINGS.replace("preload_n", "preload_n,position_x_mm,position_y_mm")
     table = ABOVE + headings + "r1,s01,4,1.0,0,0,0.09,10,7.1,-0.5\n{},20,7.2,-0.6\n"
     cells = {"preload_n": ",,,2,,,", "position_x_mm": ",,,,1,,"}
@@ -150,7 +158,8 @@ def channels(text: str) -> Contents:
     return found
 
 
-def test_headings_of_instruments_in_quotes_hold_separators() -> None:
+def test_headings_instruments_quotes_hold() -> None:
+    """Headings of instruments in quotes hold separators."""
     found = channels('Operator,"Smith, J."\n"Force, static [N]","Charge [pC]","Time [s]"\n"1","2","3"\n"3","4","5"\n')
     assert [(one.name, one.unit) for one in found.blocks[0].channels] == [
         ("Force, static [N]", "N"),
@@ -169,13 +178,15 @@ def test_headings_of_instruments_in_quotes_hold_separators() -> None:
         ('"1,5","2,5"\n"3,5","4,5"\n', ""),
     ],
 )
-def test_quoted_numbers_of_instruments_are_never_split(text: str, place: str) -> None:
+def test_quoted_numbers_instruments_never_split(text: str, place: str) -> None:
+    """Quoted numbers of instruments are never split."""
     with pytest.raises(FileError) as refused:
         read_contents(text.encode(), "run.csv")
     assert refused.value.place == place
 
 
-def test_a_property_that_a_header_gives_twice_is_not_used() -> None:
+def test_property_header_gives_twice_not_used() -> None:
+    """A property that a header gives twice is not used."""
     text = "preload;1\npreload;2\n\nforce;amplifier\nmN;V\n" + "\n".join(f"{n};{n}" for n in range(1, 6))
     assert channels(text).warnings == ("'preload' is given as '1' and as '2': neither is used",)
     described = rig(recording={**COMMON, "sample_rate_hz": 10, "preload_n": {"property": "preload"}})
@@ -192,10 +203,12 @@ def test_a_property_that_a_header_gives_twice_is_not_used() -> None:
         ('y,0,1\n0,"1,2\n1,3,4\n', "in quotes must end on its line.*line 2 of map.csv"),
     ],
 )
-def test_a_pressure_map_is_never_split_within_quotes(text: str, allowed: str) -> None:
+def test_pressure_map_never_split_within_quotes(text: str, allowed: str) -> None:
+    """A pressure map is never split within quotes."""
     with pytest.raises(InvalidInput, match=allowed):
         pressure_map(text.encode(), "map.csv")
 
 
-def test_a_pressure_map_may_have_decimal_commas_in_quotes() -> None:
+def test_pressure_map_decimal_commas_quotes() -> None:
+    """A pressure map may have decimal commas in quotes."""
     assert pressure_map(b'y,0,1\n0,"1,5",2\n1,3,4\n', "map.csv")["pressure_mpa"] == [[1.5, 2], [3, 4]]

@@ -50,7 +50,8 @@ def test_a_campaign_in_csv() -> None:
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
-def test_the_template_as_a_spreadsheet_of_another_country_saves_it(encoding: str) -> None:
+def test_template_spreadsheet_country_saves(encoding: str) -> None:
+    """The template as a spreadsheet of another country saves it."""
     filled = (EXAMPLES / "template.csv").read_text()
     foreign = re.sub(r"(?<=\d)\.(?=\d)", ",", filled.replace(",", ";")).replace("\n", "\r\n")
     foreign = foreign.replace("indenter_radius_mm;preload_n", "Indenter radius (µm);Preload [mN]")
@@ -71,7 +72,8 @@ def test_the_template_as_a_spreadsheet_of_another_country_saves_it(encoding: str
         (",0.99\n", ",0.99,7\n", "line 13", "10 cells under 9 headings"),
     ],
 )
-def test_a_template_filled_in_wrongly_is_refused_by_line(old: str, new: str, place: str, reason: str) -> None:
+def test_template_filled_wrongly_refused_line(old: str, new: str, place: str, reason: str) -> None:
+    """A template filled in wrongly is refused by line."""
     wrong = (EXAMPLES / "template.csv").read_text().replace(old, new, 1)
     with pytest.raises(FileError, match=reason) as refusal:
         read_file(wrong.encode(), "wrong.csv")
@@ -79,7 +81,8 @@ def test_a_template_filled_in_wrongly_is_refused_by_line(old: str, new: str, pla
     assert refusal.value.place.startswith(place)
 
 
-def test_a_cell_that_is_no_number_refuses_its_recording_alone() -> None:
+def test_cell_no_number_refuses_recording_alone() -> None:
+    """A cell that is no number refuses its recording alone."""
     wrong = (EXAMPLES / "template.csv").read_text().replace("\nr2,s02", "\nr2,s02").replace("7.3,", "seven,")
     reading = read_file(wrong.encode(), "wrong.csv")
     assert [kept.id for kept in reading.campaign.recordings] == ["r1"]
@@ -101,7 +104,8 @@ def test_an_instruments_table(separator: str, decimal: str) -> None:
         assert contents(text.encode(), "a.csv").properties == {"Operator": "somebody", "Sample": "palm 3"}
 
 
-def test_a_table_with_a_row_that_does_not_fit_is_refused_by_line() -> None:
+def test_table_row_not_fit_refused_line() -> None:
+    """A table with a row that does not fit is refused by line."""
     with pytest.raises(FileError, match=r"a\.csv: line 4: must be a row of 2 numbers.*'3;x'"):
         read_contents(b"a;b\n1;2\n2;3\n3;x\n4;5\n5;6", "a.csv")
     with pytest.raises(FileError, match=r"a\.csv: line 3: must be a row of 2 numbers.*'x;3'"):
@@ -116,7 +120,8 @@ def test_tdms() -> None:
 
 
 @pytest.mark.parametrize("lost", ["bytes", "length"])
-def test_an_interrupted_tdms_acquisition_is_read_up_to_the_last_whole_segment(lost: str) -> None:
+def test_interrupted_tdms_acquisition_read(lost: str) -> None:
+    """An interrupted tdms acquisition is read up to the last whole segment."""
     whole = tdms(4)
     last = whole.rindex(b"TDSm")
     cut = whole[:-5] if lost == "bytes" else whole[: last + 12] + b"\xff" * 8 + whole[last + 20 :]
@@ -227,21 +232,25 @@ def test_matlab_structures_and_matrices() -> None:
         (b"    -1\n    58\nx\n    -1\n", "dataset 1"),
     ],
 )
-def test_what_is_no_recording_is_refused_by_its_content(data: bytes, reason: str) -> None:
+def test_no_recording_refused_content(data: bytes, reason: str) -> None:
+    """What is no recording is refused by its content."""
     with pytest.raises(FileError, match=reason) as refusal:
         read_file(data, "run.csv")
     assert refusal.value.file == "run.csv"
 
 
-def test_a_files_name_says_nothing_about_its_format() -> None:
+def test_files_name_says_nothing_about_format() -> None:
+    """A files name says nothing about its format."""
     the_time_series(tdms(1), "run.csv", rig())
 
 
-def test_channels_without_a_rig_description_are_listed() -> None:
+def test_channels_without_rig_description_listed() -> None:
+    """Channels without a rig description are listed."""
     with pytest.raises(FileError, match=r"rig description must say.*force \[mN\], amplifier \[\?\]"):
         read_file(tdms(1), "run.tdms")
 
 
-def test_a_faulty_skin_in_a_file_is_refused_by_field() -> None:
+def test_faulty_skin_file_refused_field() -> None:
+    """A faulty skin in a file is refused by field."""
     with pytest.raises(InvalidInput, match=r"skin\.thickness_mm"):
         read_file(tdms(1), "run.tdms", rig(skin={**SKIN, "thickness_mm": -1}))

@@ -44,7 +44,8 @@ def ids(found: Reading) -> list[str]:
     return [recording.id for recording in found.campaign.recordings]
 
 
-def test_recordings_and_sensors_of_all_files_are_one_campaign() -> None:
+def test_recordings_sensors_files_campaign() -> None:
+    """Recordings and sensors of all files are one campaign."""
     files = [
         ("1.tdms", reading(press("a", "s1", 7.0))),
         ("2.tdms", reading(press("b", "s2", 7.1), press("c", "s1", 7.2))),
@@ -86,7 +87,8 @@ def test_an_id_of_the_skin_can_be_said_for_all() -> None:
     assert join("both", files, skin_id="palm").campaign.skin.id == "palm"
 
 
-def test_what_single_precision_does_to_a_number_is_no_difference() -> None:
+def test_single_precision_number_no_difference() -> None:
+    """What single precision does to a number is no difference."""
     files = [
         ("a.csv", reading(press("a"))),
         ("b.csv", reading(press("b"), youngs_modulus_mpa=float(np.float32(16.0000004)))),
@@ -94,7 +96,8 @@ def test_what_single_precision_does_to_a_number_is_no_difference() -> None:
     assert join("both", files).campaign.skin.youngs_modulus_mpa == 16.0
 
 
-def test_ids_that_several_files_use_are_led_by_the_files_name() -> None:
+def test_ids_several_files_use_led_files_name() -> None:
+    """Ids that several files use are led by the files name."""
     refused = RecordingProblem("r1", "preload_n", -1.0, "must be greater than 0")
     nameless = RecordingProblem("recordings[3]", "id", None, "required")
     tuesday = replace(reading(press("own", level=7.3)), problems=[refused, nameless])
@@ -146,7 +149,8 @@ def test_copies_of_a_recording_count_once() -> None:
     )
 
 
-def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> None:
+def test_recording_copy_numbers_sensor_contact() -> None:
+    """A recording is a copy by its numbers its sensor and its contact."""
     noisy = np.random.default_rng(2).normal(7, 0.1, 20)
     first = replace(
         press("a"), frequency_hz=np.arange(1.0, 21), frf_re_pc_per_n=noisy, frf_im_pc_per_n=0.01 * noisy,
@@ -162,7 +166,8 @@ def test_a_recording_is_a_copy_by_its_numbers_its_sensor_and_its_contact() -> No
         assert ids(join("both", [("a.csv", reading(first)), ("b.csv", reading(other))])) == kept, changes
 
 
-def test_few_numbers_may_agree_by_chance_at_another_time() -> None:
+def test_few_numbers_agree_chance_time() -> None:
+    """Few numbers may agree by chance at another time."""
     first, again, later = (
         reading(replace(press(name), recorded_at=f"2017-05-{day}T09:00:00Z"))
         for name, day in (("a", "03"), ("b", "03"), ("c", "04"))
@@ -170,12 +175,14 @@ def test_few_numbers_may_agree_by_chance_at_another_time() -> None:
     assert ids(join("all", [("a.csv", first), ("b.csv", again), ("c.csv", later)])) == ["a", "c"]
 
 
-def test_few_numbers_without_a_time_are_no_copies() -> None:
+def test_few_numbers_without_time_no_copies() -> None:
+    """Few numbers without a time are no copies."""
     found = join("all", [(f"{name}.csv", reading(press(name))) for name in "abc"])
     assert (ids(found), found.warnings) == (["a", "b", "c"], [])
 
 
-def test_a_press_a_file_as_an_instrument_writes_it() -> None:
+def test_press_file_instrument_writes() -> None:
+    """A press a file as an instrument writes it."""
     description = rig(
         recording={
             "sensor": "s01",

@@ -60,7 +60,8 @@ def test_every_number_of_a_long_template_arrives(end: str, *, every_id: bool) ->
     assert np.array_equal(values_of(recordings), VALUES[:2])
 
 
-def test_what_stands_between_the_rows_of_a_long_template_changes_nothing() -> None:
+def test_stands_rows_long_template_changes() -> None:
+    """What stands between the rows of a long template changes nothing."""
     lines = template(300)
     start = len((ABOVE + HEADINGS).splitlines())
     lines[start + 400] = lines[start + 400].replace(",,,,,", ' , ,"", , ,')
@@ -79,7 +80,8 @@ def test_what_stands_between_the_rows_of_a_long_template_changes_nothing() -> No
         ((",,,,,", ',"s02,,,,'), "a cell in quotes must end on its line"),
     ],
 )
-def test_what_is_wrong_in_a_long_template_is_named_by_its_line(change: tuple[str, str], reason: str) -> None:
+def test_wrong_long_template_named_line(change: tuple[str, str], reason: str) -> None:
+    """What is wrong in a long template is named by its line."""
     lines = template(300)
     lines[717] = re.sub(*change, lines[717], count=1)
     with pytest.raises(FileError, match=re.escape(reason)) as refused:
@@ -88,7 +90,8 @@ def test_what_is_wrong_in_a_long_template_is_named_by_its_line(change: tuple[str
 
 
 @pytest.mark.parametrize("per_recording", [2, 300])
-def test_a_number_that_is_none_is_refused_by_its_recording_or_its_line(per_recording: int) -> None:
+def test_number_none_refused_recording_line(per_recording: int) -> None:
+    """A number that is none is refused by its recording or its line."""
     lines = template(per_recording)
     start = len((ABOVE + HEADINGS).splitlines())
     lines[start] = lines[start].replace("1.5", "nan")
@@ -100,14 +103,16 @@ def test_a_number_that_is_none_is_refused_by_its_recording_or_its_line(per_recor
         read([*lines[: start + 1], other, *lines[start + 2 :]])
 
 
-def test_an_empty_cell_in_a_long_template_is_refused_with_its_recording() -> None:
+def test_empty_cell_long_template_refused() -> None:
+    """An empty cell in a long template is refused with its recording."""
     lines = template(300)
     lines[717] = lines[717].rpartition(",")[0] + ","
     problems = read_file("\n".join(lines).encode(), "a.csv").problems
     assert [(problem.recording, problem.field) for problem in problems] == [("r2", "frf_im_pc_per_n[108]")]
 
 
-def test_a_bad_cell_of_a_file_that_is_parsed_apart_is_named_by_its_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bad_cell_file_parsed_apart_named_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bad cell of a file that is parsed apart is named by its line."""
     monkeypatch.setattr(reading, "LARGEST_TEXT", 1000)
     lines = template(900)
     lines[717] = lines[717].rpartition(",")[0] + ",x"
@@ -132,7 +137,8 @@ def test_every_number_of_a_long_table_arrives(separator: str, decimal: str, enco
     assert np.array_equal([channel.values for channel in block.channels], VALUES)
 
 
-def test_parts_and_groups_of_a_long_table_are_those_of_a_short_one() -> None:
+def test_parts_groups_long_table_short() -> None:
+    """Parts and groups of a long table are those of a short one."""
     lines = table(",", ".")
     lines[600:600] = ["Operator: ab", lines[1]]
     lines.insert(300, "# next curve")
@@ -142,7 +148,8 @@ def test_parts_and_groups_of_a_long_table_are_those_of_a_short_one() -> None:
     assert (held.properties["1.Operator"], held.properties["2.Operator"]) == ("mb", "ab")
 
 
-def test_text_far_down_in_a_long_table_is_named_by_its_line() -> None:
+def test_text_far_down_long_table_named_line() -> None:
+    """Text far down in a long table is named by its line."""
     lines = table(",", ".")
     lines[750] = "0.1,broken,0.3"
     with pytest.raises(FileError, match=r"found '0\.1,broken,0\.3'") as refused:
@@ -150,7 +157,8 @@ def test_text_far_down_in_a_long_table_is_named_by_its_line() -> None:
     assert refused.value.place == "line 751"
 
 
-def test_a_column_of_text_in_a_long_table_is_left_out_and_told() -> None:
+def test_column_text_long_table_left_out_told() -> None:
+    """A column of text in a long table is left out and told."""
     lines = table(";", ",")
     noted = [
         lines[0],
@@ -167,7 +175,8 @@ def test_a_line_longer_than_a_block_is_whole() -> None:
     assert list(BlockText(io.BytesIO(f"a\r\n{line}\rb\n".encode()), "a").lines()) == ["a", line, "b", ""]
 
 
-def test_a_text_without_a_table_says_which_line_holds_most_numbers() -> None:
+def test_text_without_table_says_line_holds() -> None:
+    """A text without a table says which line holds most numbers."""
     with pytest.raises(csv_file.NoTable, match=r"line 2 holds most, 1: 'force,0.5'; names go into the CSV template"):
         csv_file.read(io.BytesIO(b"name,value\nforce,0.5\ncharge,pC\n"), "a.csv")
 

@@ -82,7 +82,8 @@ def test_times_stand_under_a_heading_with_blanks() -> None:
     assert only(read(text)).recorded_at == "2025-12-24T09:30:00+00:00"
 
 
-def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed() -> None:
+def test_numbers_without_field_refused_misspelt() -> None:
+    """Numbers without a field are refused and a misspelt heading is guessed."""
     unknown = refusal(ABOVE + HEADINGS.replace("\n", ",humidity\n") + ROWS.replace("-0.5\n", "-0.5,40\n"))
     assert (unknown.place, "conditions.NAME" in unknown.reason) == ("line 9, column 9", True)
     assert "did you mean preload_n?" in refusal(changed("preload_n", "prelaod_n")).reason
@@ -100,15 +101,15 @@ def test_numbers_without_a_field_are_refused_and_a_misspelt_heading_is_guessed()
         ("frequency_hz", "f [Hz]", "frequency_hz"),
     ],
 )
-def test_a_heading_of_its_own_is_guessed_by_its_unit_from_what_the_table_lacks(
-    field: str, heading: str, meant: str
-) -> None:
+def test_heading_guessed_unit_table_lacks(field: str, heading: str, meant: str) -> None:
+    """A heading of its own is guessed by its unit from what the table lacks."""
     assert f"{heading!r} is no field, or its unit is not of the field; is it {meant}," in (
         refusal(changed(HEADINGS, HEADINGS.replace(field, heading))).reason
     )
 
 
-def test_a_table_of_frfs_without_its_skin_is_told_what_is_missing() -> None:
+def test_table_frfs_without_skin_told_missing() -> None:
+    """A table of frfs without its skin is told what is missing."""
     rows = "".join(f"r1,s01,4,1.0,0.09,{hz},7.1,-0.5\n" for hz in range(10, 40, 5))
     assert "the first of them schema,campaign/1" in refusal(HEADINGS + rows).reason
     block = "Stroke [mm];Load [N]\n0;0\n0,1;5\n0,2;10\n"
@@ -129,7 +130,8 @@ def test_a_table_of_frfs_without_its_skin_is_told_what_is_missing() -> None:
         "peak_to_peak force [N]",
     ],
 )
-def test_a_force_that_is_no_amplitude_is_not_taken_for_one(heading: str) -> None:
+def test_force_no_amplitude_not_taken(heading: str) -> None:
+    """A force that is no amplitude is not taken for one."""
     reason = refusal(changed("dynamic_force_n", heading)).reason
     assert "dynamic_force_n is the amplitude: half of peak-to-peak, √2 times rms" in reason
     assert "did you mean" not in reason
@@ -155,7 +157,8 @@ def test_a_diameter_is_halved_and_that_is_told() -> None:
         ("Phase (rad)", 1.0),
     ],
 )
-def test_magnitude_and_phase_stand_for_real_and_imaginary_part(heading: str, turn: float) -> None:
+def test_magnitude_phase_stand_real_imaginary(heading: str, turn: float) -> None:
+    """Magnitude and phase stand for real and imaginary part."""
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", f"frf_magnitude_pc_per_n,{heading}")
     polar = [cmath.polar(value) for value in (7.1 - 0.5j, 7.2 - 0.6j)]
     rows = [f"{magnitude!r},{phase * turn!r}" for magnitude, phase in polar]
@@ -173,7 +176,8 @@ def test_a_phase_without_a_magnitude_is_guessed() -> None:
     assert "is it frf_phase_deg, which the table lacks?" in refusal(ABOVE + head + ROWS).reason
 
 
-def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_asked_for() -> None:
+def test_phase_without_unit_degrees_values_say() -> None:
+    """A phase without a unit is in degrees where its values say so and else asked for."""
     head = HEADINGS.replace("frf_re_pc_per_n,frf_im_pc_per_n", "frf_magnitude_pc_per_n,FRF_Phase")
 
     def written(turn: float, first: complex, second: complex) -> str:
@@ -197,20 +201,23 @@ def test_a_phase_without_a_unit_is_in_degrees_where_its_values_say_so_and_else_a
         (",1.0,0.09", ",heavy,0.09", "preload_n", "line 10, column 4"),
     ],
 )
-def test_a_cell_that_is_no_number_is_told_with_its_line(old: str, new: str, field: str, place: str) -> None:
+def test_cell_no_number_told_line(old: str, new: str, field: str, place: str) -> None:
+    """A cell that is no number is told with its line."""
     (problem,) = read(changed(old, new)).problems
     assert (problem.recording, problem.field) == ("r1", field)
     assert problem.allowed == f"must be a number ({place})"
 
 
-def test_of_several_cells_that_are_no_numbers_the_first_is_told_with_the_count() -> None:
+def test_several_cells_no_numbers_first_told() -> None:
+    """Of several cells that are no numbers the first is told with the count."""
     more = "".join(f",,,,,{line},7.{line},{'x' if line % 2 else -0.5}\n" for line in range(30, 36))
     (problem,) = read(PLAIN + more).problems
     assert problem.field == "frf_im_pc_per_n[3]"
     assert problem.allowed == "must be a number (line 13, column 8, and 2 more in this column)"
 
 
-def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:
+def test_number_above_table_none_told_line() -> None:
+    """A number above the table that is none is told with its line."""
     with pytest.raises(InvalidInput, match=r"skin.thickness_mm = 'thin': must be a number \(line 3, column 2\)"):
         read(changed("skin.thickness_mm,2.5", "skin.thickness_mm,thin"))
 
@@ -224,7 +231,8 @@ def test_a_number_above_the_table_that_is_none_is_told_with_its_line() -> None:
         ("12/24/2025", "2025-12-24T00:00:00"),
     ],
 )
-def test_local_times_are_read_and_their_zone_told(written: str, time: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_local_times_read_zone_told(written: str, time: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Local times are read and their zone told."""
     text = ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n")
     for zone, offset in (("UTC", "+00:00"), ("Europe/Berlin", "+01:00")):
         monkeypatch.setenv("UNDERSKIN_TIME_ZONE", zone)
@@ -238,7 +246,9 @@ def test_local_times_are_read_and_their_zone_told(written: str, time: str, monke
 
 
 @pytest.mark.parametrize("day", ["24.12.2025", "2025-12-24", "2025-12-24T00:00:00+01:00"])
-def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str) -> None:
+def test_date_time_day_columns_time(day: str) -> None:
+    """A date and a time of day in columns of their own are one time."""
+
     def table(headings: str, cells: str) -> str:
         return ABOVE + HEADINGS.replace("\n", headings + "\n") + ROWS.replace("-0.5\n", f"-0.5,{cells}\n", 1)
 
@@ -260,29 +270,34 @@ def test_a_date_and_a_time_of_day_in_columns_of_their_own_are_one_time(day: str)
         ("31.2.2025 09:30", "is no date and time"),
     ],
 )
-def test_a_time_that_can_be_two_or_none_is_refused(written: str, reason: str) -> None:
+def test_time_two_none_refused(written: str, reason: str) -> None:
+    """A time that can be two or none is refused."""
     refused = refusal(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS.replace("-0.5\n", f"-0.5,{written}\n"))
     assert refused.place == "line 10, column 9"
     assert reason in refused.reason
 
 
-def test_forces_in_grams_and_pounds_are_converted() -> None:
+def test_forces_grams_pounds_converted() -> None:
+    """Forces in grams and pounds are converted."""
     for unit, newtons in (("gf", 9.80665e-3), ("kgf", 9.80665), ("lbf", 4.4482216152605)):
         text = changed("preload_n", f"Preload [{unit}]").replace(",1.0,0.09", f",{1.0 / newtons},0.09")
         assert only(same_as_plain(text)).preload_n == pytest.approx(1.0)
 
 
-def test_an_id_may_begin_with_the_mark_of_comments() -> None:
+def test_id_begin_mark_comments() -> None:
+    """An id may begin with the mark of comments."""
     reading = read(PLAIN + "#2,s01,4,1.0,0.09,10,8.1,-0.5\n,,,,,20,8.2,-0.6\n")
     assert [entry.id for entry in reading.campaign.recordings] == ["r1", "#2"]
 
 
-def test_what_a_cut_file_ends_with_is_not_taken_for_a_note() -> None:
+def test_cut_file_ends_not_taken_note() -> None:
+    """What a cut file ends with is not taken for a note."""
     cut = read(PLAIN + ",,,,,30\n")
     assert [(problem.recording, problem.value) for problem in cut.problems] == [("r1", None)] * 2
     begun = read(PLAIN + "r2\n")
     assert {problem.recording for problem in begun.problems} == {"r2"}
 
 
-def test_a_campaign_may_be_called_as_the_first_heading() -> None:
+def test_campaign_called_first_heading() -> None:
+    """A campaign may be called as the first heading."""
     assert read(changed("name,palm 3", "name,ID")).campaign.name == "ID"

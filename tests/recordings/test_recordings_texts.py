@@ -94,7 +94,8 @@ def test_how_a_text_was_read_is_said() -> None:
 
 @pytest.mark.parametrize("cells", [("mb", "mb"), ("begin", ""), ("12:00:01", "12:00:02")])
 @pytest.mark.parametrize("place", ["first", "last"])
-def test_columns_of_text_are_left_out_with_a_warning(cells: tuple[str, str], place: str) -> None:
+def test_columns_text_left_out_warning(cells: tuple[str, str], place: str) -> None:
+    """Columns of text are left out with a warning."""
     said = [cells[0], *[cells[1]] * (len(DEPTH) - 1)]
     names = "Depth (um);Force (mN)"
     lines = [f"Note;{names}" if place == "first" else f"{names};Note"]
@@ -106,7 +107,8 @@ def test_columns_of_text_are_left_out_with_a_warning(cells: tuple[str, str], pla
     assert found.warnings == (f"column 'Note' holds text, such as {cells[0]!r}, and is left out",)
 
 
-def test_text_among_a_columns_numbers_is_refused_by_line() -> None:
+def test_text_among_columns_numbers_refused_line() -> None:
+    """Text among a columns numbers is refused by line."""
     lines = ["Time;Depth (um);Force (mN)", *(f"{number};{row}" for number, row in enumerate(rows(";")))]
     for place in (5, 12):
         wrong = [*lines[:place], "x" + lines[place], *lines[place + 1 :]]
@@ -114,7 +116,8 @@ def test_text_among_a_columns_numbers_is_refused_by_line() -> None:
             read_contents("\n".join(wrong).encode(), "curve.txt")
 
 
-def test_comments_may_part_the_rows_and_state_properties() -> None:
+def test_comments_part_rows_state_properties() -> None:
+    """Comments may part the rows and state properties."""
     there, back = slice(9), slice(9, None)
     lines = ["# springConstant: 0.05", "# k (N/m) = 3", "# segment: extend", "# columns: Depth Force", "# units: um mN"]
     text = [*lines, *rows(" ", part=there), "", "# segment: retract", *lines[3:], *rows(" ", part=back)]
@@ -136,7 +139,8 @@ def test_comments_may_part_the_rows_and_state_properties() -> None:
         ("Spring constant{separator}3{decimal}5{separator}N/m", "Spring constant (N/m)"),
     ],
 )
-def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str, separator: str, decimal: str) -> None:
+def test_spring_constant_above_numbers_property(line: str, name: str, separator: str, decimal: str) -> None:
+    """A spring constant above the numbers is a property."""
     if separator == " " and "{separator}" in line:
         line = line.replace("{separator}", ": ", 1).replace("{separator}", " ")
     stated = line.format(separator=separator, decimal=decimal)
@@ -146,14 +150,16 @@ def test_a_spring_constant_above_the_numbers_is_a_property(line: str, name: str,
     assert spring_constant(Property(name), found.properties, "curve.txt") == 3.5
 
 
-def test_a_comma_that_may_part_thousands_makes_no_number() -> None:
+def test_comma_part_thousands_makes_no_number() -> None:
+    """A comma that may part thousands makes no number."""
     assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,5"}, "curve.txt") == 1.5
     assert common_value("preload_n", Property("Preload (N)"), {"Preload (N)": "1,500"}, "curve.txt") == "1,500"
     with pytest.raises(FileError, match=r"is '1,500': must be a number"):
         spring_constant(Property("k (N/m)"), {"k (N/m)": "1,500"}, "curve.txt")
 
 
-def test_curves_under_headings_of_their_own_are_parts() -> None:
+def test_curves_under_headings_parts() -> None:
+    """Curves under headings of their own are parts."""
     text = [line for name in ("a", "b") for line in (f"Curve;{name}", "Depth (um);Force (mN)", *rows(";"), "")]
     found = contents("\n".join(text).encode(), "curves.txt")
     assert [block.name for block in found.blocks] == ["1", "2"]
@@ -162,7 +168,8 @@ def test_curves_under_headings_of_their_own_are_parts() -> None:
         the_curve(Contents((block,)), LABELLED)
 
 
-def test_a_large_text_that_is_read_apart_says_the_same() -> None:
+def test_large_text_read_apart_says() -> None:
+    """A large text that is read apart says the same."""
     text = "\n".join(["Note;Depth (um);Force (mN)", *(f"x;{row}" for row in rows(";")), "", "x;1;2", "x;2;3"]).encode()
     here = contents(text, "curves.txt")
     with tempfile.TemporaryFile() as stream:

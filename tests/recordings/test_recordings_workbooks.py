@@ -83,19 +83,22 @@ def refusal(data: bytes) -> FileError:
     return refused.value
 
 
-def test_a_campaign_in_a_workbook_is_that_of_the_csv() -> None:
+def test_campaign_workbook_csv() -> None:
+    """A campaign in a workbook is that of the csv."""
     reading = read_file(workbook({"May": cells(PLAIN), "Notes": [["by mb"]]}), "palm.xlsx")
     assert reading.problems == []
     assert to_dict(reading.campaign) == to_dict(read(PLAIN).campaign)
     assert reading.warnings == ["sheet 'Notes' is no campaign, and is left out"]
 
 
-def test_what_is_wrong_on_a_sheet_is_named_as_in_the_csv() -> None:
+def test_wrong_sheet_named_csv() -> None:
+    """What is wrong on a sheet is named as in the csv."""
     error = refusal(workbook({"May": cells(changed("preload_n", "prelaod_n"))}))
     assert (error.place, "did you mean preload_n?" in error.reason) == ("sheet 'May', line 9, column 4", True)
 
 
-def test_a_cell_that_is_no_number_is_told_with_its_sheet_and_line() -> None:
+def test_cell_no_number_told_sheet_line() -> None:
+    """A cell that is no number is told with its sheet and line."""
     table = cells(ROWS.replace("7.1", "7x1").replace("7.2", "x"))
     reading = read_file(workbook({"May": [*cells(ABOVE + HEADINGS), *table]}), "palm.xlsx")
     (problem,) = reading.problems
@@ -103,7 +106,8 @@ def test_a_cell_that_is_no_number_is_told_with_its_sheet_and_line() -> None:
     assert problem.allowed == "must be a number (sheet 'May', line 10, column 7, and 1 more in this column)"
 
 
-def test_the_skin_on_one_sheet_and_the_table_on_the_next_are_one_campaign() -> None:
+def test_skin_sheet_table_next_campaign() -> None:
+    """The skin on one sheet and the table on the next are one campaign."""
     table = cells(HEADINGS + ROWS)
     data = workbook({"Skin": cells(ABOVE), "Notes": [["warm day"]], "May": table})
     reading = read_file(data, "palm.xlsx")
@@ -120,7 +124,8 @@ def test_two_campaigns_in_a_workbook_are_named() -> None:
     assert error.reason == "holds a campaign on each of the sheets 'May', 'June': save each as a workbook"
 
 
-def test_formulas_count_by_the_value_that_was_kept() -> None:
+def test_formulas_count_value_kept() -> None:
+    """Formulas count by the value that was kept."""
     rows = cells(changed("skin.thickness_mm,2.5", "skin.thickness_mm,=5/2"))
     plain = workbook({"May": rows})
     error = refusal(plain)
@@ -131,7 +136,8 @@ def test_formulas_count_by_the_value_that_was_kept() -> None:
     assert reading.campaign.skin.thickness_mm == 2.25
 
 
-def test_a_date_in_a_cell_is_in_the_zone_of_the_lab(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_date_cell_zone_lab(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A date in a cell is in the zone of the lab."""
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
     rows = cells(ABOVE + HEADINGS.replace("\n", ",recorded_at\n") + ROWS)
     first = next(row for row in rows if row and row[0] == "r1")
@@ -146,7 +152,8 @@ def series(preload: float) -> Sheet:
     return [["Preload [N]", preload], ["Force\n[N]", "Charge [pC]"], *map(list, numbers)]
 
 
-def test_each_sheet_with_a_table_is_a_recording_by_its_name() -> None:
+def test_sheet_table_recording_name() -> None:
+    """Each sheet with a table is a recording by its name."""
     data = workbook({"s01": series(1.0), "about": [["Operator", "mb"]], "s02": series(2.5)})
     rig = rig_description.from_dict(
         {
@@ -177,7 +184,8 @@ def test_each_sheet_with_a_table_is_a_recording_by_its_name() -> None:
     assert any("sheet 'about' is left out: it holds no table" in warning for warning in reading.warnings)
 
 
-def test_text_with_a_decimal_comma_and_quotes_is_read() -> None:
+def test_text_decimal_comma_quotes_read() -> None:
+    """Text with a decimal comma and quotes is read."""
     held = contents(workbook({"run": [["Force [N]", 'of "A"'], ["0,5", 1.5], [-2, "2,25"]]}), "run.xlsx")
     (block,) = held.blocks
     assert (block.name, [channel.name for channel in block.channels]) == ("run", ["Force [N]", 'of "A"'])
@@ -192,7 +200,8 @@ def test_hidden_sheets_are_left_out_and_told() -> None:
     assert read_file(data.getvalue(), "palm.xlsx").warnings == ["sheet 'old' is hidden, and is left out"]
 
 
-def test_a_workbook_without_a_table_says_what_its_sheets_hold() -> None:
+def test_workbook_without_table_says_sheets_hold() -> None:
+    """A workbook without a table says what its sheets hold."""
     error = refusal(workbook({"a": [["hello"]], "b": [["x", 1]]}))
     assert "sheet 'a' holds no table" in error.reason
     assert (
@@ -204,7 +213,8 @@ def test_a_workbook_without_a_table_says_what_its_sheets_hold() -> None:
 BOMB = b"<a>" + b" " * 30_000_000
 
 
-def test_a_workbook_that_unfolds_too_far_is_refused_before_it_is_understood(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workbook_unfolds_too_far_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A workbook that unfolds too far is refused before it is understood."""
     data = with_parts(workbook({"May": cells(PLAIN)}), lambda _, part: part, **{"xl/media/image1.xml": BOMB})
     assert len(data) < 1_000_000
     error = refusal(data)
@@ -237,7 +247,9 @@ def parts() -> list[str]:
 
 
 @pytest.mark.parametrize("part", first(3, parts()))
-def test_xml_that_is_cut_in_a_sound_archive_is_refused(part: str) -> None:
+def test_xml_cut_sound_archive_refused(part: str) -> None:
+    """Xml that is cut in a sound archive is refused."""
+
     def half(name: str, content: bytes) -> bytes:
         return content[: len(content) // 2] if name == part else content
 

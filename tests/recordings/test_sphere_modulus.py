@@ -46,7 +46,8 @@ def refusal(read: Campaign) -> str:
 
 
 @pytest.mark.parametrize("depth_mm", [0.1, 0.25])
-def test_a_declared_thickness_gives_the_layer_s_law(depth_mm: float) -> None:
+def test_declared_thickness_gives_layer_s_law(depth_mm: float) -> None:
+    """A declared thickness gives the layer s law."""
     depth = ways(-0.05, depth_mm, samples=400)
     force = pressed(depth, bonded_layer(2.0, 2.0))
     found = result(campaign(depth, force, skin={"thickness_mm": 2.0}))
@@ -71,10 +72,11 @@ def test_a_sphere_pressed_deep_is_no_paraboloid(over_radius: float) -> None:
 
 @pytest.mark.parametrize("skin", [{}, {"thickness_mm": 30.0, "youngs_modulus_mpa": 1.0}])
 @pytest.mark.parametrize(("power", "radius_mm", "like"), [(1.0, 1.0, "flat punch"), (2.0, 5.0, "cone")])
-def test_a_tip_that_is_no_sphere_gives_no_modulus(
-    power: float, radius_mm: float, like: str, skin: dict[str, float]
-) -> None:
-    """The force follows another power of the depth than a sphere's."""
+def test_tip_no_sphere_gives_no_modulus(power: float, radius_mm: float, like: str, skin: dict[str, float]) -> None:
+    """A tip that is no sphere gives no modulus.
+
+    The force follows another power of the depth than a sphere's.
+    """
     depth = ways(-0.1, 0.3, -0.1, samples=400)
     force = pressed(depth, lambda at: at**power)
     assert like in refusal(campaign(depth, force, indenter_radius_mm=radius_mm, skin=skin))
@@ -88,8 +90,11 @@ def test_beyond_a_law_no_modulus_is_quoted() -> None:
     assert "of the declared thickness" in thin
 
 
-def test_adhesion_creep_and_stiffening_leave_a_sphere_a_sphere() -> None:
-    """What a sphere's force usually shows beside Hertz's law is no other tip."""
+def test_adhesion_creep_stiffening_leave_sphere() -> None:
+    """Adhesion creep and stiffening leave a sphere a sphere.
+
+    What a sphere's force usually shows beside Hertz's law is no other tip.
+    """
     depth = ways(-0.1, 0.3, samples=400)
     sticks = pressed(depth) - 0.05 * (depth > 0)
     stiffens = pressed(depth, lambda at: hertz(at) * (1 + 0.8 * np.sqrt(at / 0.3)))

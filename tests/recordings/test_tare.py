@@ -19,7 +19,8 @@ def test_a_level_in_the_air_is_no_rise() -> None:
     assert rise_of(curve(contact=80), 8) is None  # too few to tell
 
 
-def test_what_is_past_the_contact_is_told_with_where_it_begins() -> None:
+def test_past_contact_told_begins() -> None:
+    """What is past the contact is told with where it begins."""
     found = rise_of(curve(contact=50), 80)
     assert found is not None
     assert 50 < found.start < 60

@@ -60,8 +60,11 @@ def force_of(reading: Reading) -> Any:
         ("dB re 1 N", "N"), ("dB", "N"), ("livres", "N"), ("Pfund", "N"), ("mV rms", "N"), ("kn", "mN"),
     ],
 )  # fmt: skip
-def test_a_label_that_contradicts_the_rig_is_refused(label: str, stated: str) -> None:
-    """In a heading, in a row of units and as an instrument's own label; both are named."""
+def test_label_contradicts_rig_refused(label: str, stated: str) -> None:
+    """A label that contradicts the rig is refused.
+
+    In a heading, in a row of units and as an instrument's own label; both are named.
+    """
     label = label.removeprefix("дин. ")
     said = rf"is labelled '{label}', but the rig description says '{stated}'"
     force = {"channel": "Force", "unit": stated}
@@ -116,8 +119,11 @@ def test_synonyms_are_one_unit(one: str, other: str) -> None:
 
 
 @pytest.mark.parametrize("heading", ["F_m", "Q_A", "F_s", "Force CH1, A", "Load cycles", "Force (g)"])
-def test_the_end_of_a_name_is_no_label_against_the_rig(heading: str) -> None:
-    """An axis, a channel or a statistic is named so; g is a gram-force as well."""
+def test_end_name_no_label_against_rig(heading: str) -> None:
+    """The end of a name is no label against the rig.
+
+    An axis, a channel or a statistic is named so; g is a gram-force as well.
+    """
     stated = "gf" if heading == "Force (g)" else "N"
     newtons = 9.80665e-3 if stated == "gf" else 1.0
     for data, name in ((table(heading), "a.csv"), (tdms(heading, ""), "a.tdms")):
@@ -125,19 +131,24 @@ def test_the_end_of_a_name_is_no_label_against_the_rig(heading: str) -> None:
         np.testing.assert_allclose(force_of(reading), FORCE * newtons, rtol=1e-9)
 
 
-def test_one_unit_by_other_prefixes_is_no_contradiction() -> None:
+def test_unit_prefixes_no_contradiction() -> None:
+    """One unit by other prefixes is no contradiction."""
     assert not contradicts("mN/µm", "N/mm", "Stiffness (mN/µm)", "force/length")
     assert contradicts("mN/µm", "N/m", "Stiffness (mN/µm)", "force/length")
 
 
 @pytest.mark.parametrize("heading", ["F_mN", "Force lbs", "Force mV", "Force / V", "Force (V)", "Force dB"])
-def test_the_end_of_a_name_that_is_a_unit_contradicts_the_rig(heading: str) -> None:
+def test_end_name_unit_contradicts_rig(heading: str) -> None:
+    """The end of a name that is a unit contradicts the rig."""
     with pytest.raises(FileError, match=r"is labelled '.*', but the rig description says 'N'"):
         read_file(tdms(heading, ""), "a.tdms", rig({"channel": heading, "unit": "N"}))
 
 
-def test_letters_of_no_unit_have_every_meaning_of_them() -> None:
-    """MHZ may be mHz or MHz: it contradicts neither, and alone it says nothing."""
+def test_letters_no_unit_every_meaning() -> None:
+    """Letters of no unit have every meaning of them.
+
+    MHZ may be mHz or MHz: it contradicts neither, and alone it says nothing.
+    """
     assert {known.to_si for known in meanings("MHZ")} == {1e-3, 1e6}
     assert unit("MHZ") is None
     assert unit("MPA") == unit("MPa")
@@ -200,8 +211,11 @@ def test_a_phase_in_other_angles_is_refused() -> None:
 
 
 @pytest.mark.parametrize("formula", [True, False])
-def test_an_frf_in_volts_per_newton_becomes_charge_by_the_amplifier(formula: bool) -> None:
-    """V/N over mV/pC is pC/N, by a sensitivity and by a formula."""
+def test_frf_volts_per_newton_becomes_charge(formula: bool) -> None:
+    """An frf in volts per newton becomes charge by the amplifier.
+
+    V/N over mV/pC is pC/N, by a sensitivity and by a formula.
+    """
     rows = "\n".join(f"{5 * n};{0.074 + 1e-4 * n};0.001" for n in range(1, 9))
     amplifier = {} if formula else {"sensitivity": 10, "sensitivity_unit": "mV/pC"}
     parts = {name: {"channel": part.lower() if formula else part, **amplifier} for name, part in PARTS.items()}
@@ -217,7 +231,8 @@ def test_an_frf_in_volts_per_newton_becomes_charge_by_the_amplifier(formula: boo
 PARTS = {"frf_re_pc_per_n": "Re", "frf_im_pc_per_n": "Im"}
 
 
-def test_a_rate_that_the_file_states_otherwise_is_told() -> None:
+def test_rate_file_states_otherwise_told() -> None:
+    """A rate that the file states otherwise is told."""
     force = {"channel": "Force", "unit": "N"}
     reading = read_file(lvm("N"), "a.lvm", rig(force, recording={**COMMON, "sample_rate_hz": 500}))
     assert "the file states 1000 samples a second; the rig description 500, which counts" in reading.warnings

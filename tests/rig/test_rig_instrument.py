@@ -28,8 +28,11 @@ def textbook(effects: Any = None, **curves: Any) -> tuple[Any, RecordedCurve]:
     return experiment, record_curves(experiment)[0]
 
 
-def test_the_textbook_case_is_what_an_instrument_writes() -> None:
-    """7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R."""
+def test_textbook_case_instrument_writes() -> None:
+    """The textbook case is what an instrument writes.
+
+    7.5 µm, 1 MPa, 40 and 75 mJ/m², 3 N/m, 3,100 samples, air on both sides, pulled off at −(3/2) π w_s R.
+    """
     experiment, curve = textbook()
     kept = campaigns.parse(campaign_of_curves(experiment, [curve]))
     assert kept.units_checked
@@ -50,7 +53,8 @@ def test_the_textbook_case_is_what_an_instrument_writes() -> None:
     ("field", "name", "step"),
     [("displacement_mm", "displacement_step_mm", 2e-6), ("force_n", "force_step_n", 5e-8)],
 )
-def test_values_are_multiples_of_the_converters_step(field: str, name: str, step: float) -> None:
+def test_values_multiples_converters_step(field: str, name: str, step: float) -> None:
+    """Values are multiples of the converters step."""
     _, curve = textbook(**{name: step})
     written = np.array(curve.entry[field])
     assert written / step == pytest.approx(np.round(written / step), abs=1e-4)
@@ -69,7 +73,8 @@ def test_the_baseline_drifts_in_time_or_travel(name: str) -> None:
     assert np.ptp(added) > 1e-9
 
 
-def test_the_ways_the_recording_can_end_and_what_it_states() -> None:
+def test_ways_recording_end_states() -> None:
+    """The ways the recording can end and what it states."""
     experiment, curve = textbook(retract=False, times=False, stage_declared=True, modulus_declared=True)
     written = campaign_of_curves(experiment, [curve])
     (entry,) = written["recordings"]
@@ -80,7 +85,8 @@ def test_the_ways_the_recording_can_end_and_what_it_states() -> None:
     campaigns.parse(written)
 
 
-def test_the_gain_in_chi2_is_that_of_an_independent_fit() -> None:
+def test_gain_chi2_independent_fit() -> None:
+    """The gain in chi2 is that of an independent fit."""
     effects = {"contact_creep": {"fraction": 0.05, "time_s": 2.0, "fraction_2": 0.05, "time_2_s": 10.0}}
     experiment, curve = textbook(effects, displacement_step_mm=0.0, hold_s=2.0)
     force, noise = np.array(curve.entry["force_n"]), np.hypot(1e-8, 2e-9 / np.sqrt(12))
@@ -97,7 +103,8 @@ def test_the_gain_in_chi2_is_that_of_an_independent_fit() -> None:
     assert found > 30
 
 
-def test_each_of_a_pair_is_weighed_beside_the_other() -> None:
+def test_pair_weighed_beside() -> None:
+    """Each of a pair is weighed beside the other."""
     effects = {"adhesion": {"work_j_per_m2": 0.04}, "instrument_compliance": {"stiffness_n_per_mm": 1e4}}
     experiment, curve = textbook(effects, samples=400)
     truth = truth_of_curves(experiment, [curve])
@@ -118,12 +125,14 @@ def test_each_of_a_pair_is_weighed_beside_the_other() -> None:
         ({"contact_creep": {"fraction": 0.6, "time_s": 1.0, "fraction_2": 0.4, "time_2_s": 9.0}}, "must leave 0.05"),
     ],
 )
-def test_parameters_that_exclude_each_other_are_rejected(values: dict[str, Any], message: str) -> None:
+def test_parameters_exclude_rejected(values: dict[str, Any], message: str) -> None:
+    """Parameters that exclude each other are rejected."""
     with pytest.raises(RigError, match=message):
         textbook(values)
 
 
-def test_drawn_raw_curves_are_the_same_for_the_same_seed(tmp_path: Path) -> None:
+def test_drawn_raw_curves_seed(tmp_path: Path) -> None:
+    """Drawn raw curves are the same for the same seed."""
     for name in ("a", "b"):
         arguments = ["draw", "--output-dir", str(tmp_path / name), "--count", "1", "--seed", "3"]
         answer = CliRunner().invoke(command, [*arguments, "--kind", "indentation", "--what", "single"])

@@ -66,7 +66,8 @@ def test_point_forces_equal_the_oracle(quantity: str) -> None:
 
 
 @NEEDS_ORACLE
-def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
+def test_hertz_pressure_beside_sensor_equals() -> None:
+    """The hertz pressure beside the sensor equals the oracle."""
     found, exact = [], []
     for row in oracle_rows("sigma_hertz")[:: 1 if SOAK else 4]:
         poisson_ratio, slip, rho, offset, value = numbers(row)
@@ -80,7 +81,8 @@ def test_the_hertz_pressure_beside_the_sensor_equals_the_oracle() -> None:
     assert_accurate(np.array(found), np.array(exact))
 
 
-def test_every_skin_of_the_domain_meets_the_exact_layer_within_the_reported_error() -> None:
+def test_every_skin_domain_meets_exact_layer() -> None:
+    """Every skin of the domain meets the exact layer within the reported error."""
     r = np.linspace(0, 12, 121)
     for _ in range(40 if SOAK else 20):
         poisson_ratio, slip, rho = (GENERATOR.uniform(*limits) for limits in list(TABLE.domain.values())[:3])
@@ -107,15 +109,19 @@ def test_reported_errors_are_small() -> None:
 @pytest.mark.parametrize(
     ("poisson_ratio", "slip", "orders"), [(0.5, 0.0, (2, 3)), (0.5, 1.0, (2, 3)), (0.35, 0.2, (2, 3, 4))]
 )
-def test_the_elements_converge_to_the_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
+def test_elements_converge_exact_layer(poisson_ratio: float, slip: float, orders: Sequence[int]) -> None:
+    """The elements converge to the exact layer."""
     rho, r = np.array([0.1, 0.6, 2.0]), np.linspace(0, 6, 13)
     exact = elastic_layer.gamma_n(Layer(poisson_ratio, slip), r, rho[:, None])
     errors = [np.abs(solve_influence(poisson_ratio, slip, rho, r, order).normal - exact).max() for order in orders]
     assert all(coarse > 3 * fine for coarse, fine in pairwise(errors))
 
 
-def test_a_load_in_balance_is_all_that_the_base_bears() -> None:
-    """∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it."""
+def test_load_balance_base_bears() -> None:
+    """A load in balance is all that the base bears.
+
+    ∫ T̄ over the places of a sensor is −F3 but for what lies beyond the reach, below 2e-4 of it.
+    """
     influence = TABLE.at(0.5)
     assert influence is not None
     x, weight = np.polynomial.legendre.leggauss(80)
@@ -139,7 +145,8 @@ def test_superposition_mirror_and_rotation() -> None:
     assert mirrored == pytest.approx(whole, rel=1e-12)
 
 
-def test_a_force_that_points_away_from_the_sensor_pulls_at_it() -> None:
+def test_force_points_away_sensor_pulls() -> None:
+    """A force that points away from the sensor pulls at it."""
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors, place = np.zeros((1, 2)), np.array([[0.8, 0.0]])
@@ -150,7 +157,8 @@ def test_a_force_that_points_away_from_the_sensor_pulls_at_it() -> None:
 
 
 @pytest.mark.parametrize("cells", [21, 201])
-def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
+def test_map_hertz_pressure_gives_contact(cells: int) -> None:
+    """A map of the hertz pressure gives the contact."""
     influence = TABLE.at(0.6)
     assert influence is not None
     a, sensors = 1.0, np.array([[0.0, 0.0], [0.7, 0.4], [3.0, -1.0]])
@@ -163,8 +171,11 @@ def test_a_map_of_the_hertz_pressure_gives_the_contact(cells: int) -> None:
     assert found == pytest.approx(contact, rel=1.5 / cells)
 
 
-def test_uniform_pressure_over_wide_cells_is_integrated_within_them() -> None:
-    """Cells twice as wide as the layer is thick give what a map of narrow ones gives."""
+def test_uniform_pressure_over_wide_cells() -> None:
+    """Uniform pressure over wide cells is integrated within them.
+
+    Cells twice as wide as the layer is thick give what a map of narrow ones gives.
+    """
     influence = TABLE.at(0.6)
     assert influence is not None
     sensors = np.array([[0.3, 0.0], [2.0, 1.0]])
@@ -175,7 +186,8 @@ def test_uniform_pressure_over_wide_cells_is_integrated_within_them() -> None:
     assert first == pytest.approx(second, rel=3e-5)
 
 
-def test_beyond_the_reach_nothing_is_extrapolated() -> None:
+def test_beyond_reach_nothing_extrapolated() -> None:
+    """Beyond the reach nothing is extrapolated."""
     influence = TABLE.at(0.6)
     assert influence is not None
     assert np.isnan(influence.gamma_n([12.01, -0.1])).all()

@@ -39,8 +39,10 @@ def test_there_is_no_cell_outside(axis: int) -> None:
         assert POINT_SPLINE.cell(*point) is None
 
 
-def test_the_table_answers_a_point_as_it_answers_a_column() -> None:
-    """σ to rounding; the error exactly, at nodes and limits too.
+def test_table_answers_point_answers_column() -> None:
+    """The table answers a point as it answers a column.
+
+    σ to rounding; the error exactly, at nodes and limits too.
 
     Not at L's nodes: there the last bit of the cube root decides which of two cells' errors is reported.
     """

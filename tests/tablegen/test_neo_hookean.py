@@ -16,7 +16,8 @@ def full(components: np.ndarray) -> np.ndarray:
     return np.array([[rr, rz, 0], [zr, zz, 0], [0, 0, tt]])
 
 
-def test_volume_and_cofactor_are_those_of_the_matrix() -> None:
+def test_volume_cofactor_matrix() -> None:
+    """Volume and cofactor are those of the matrix."""
     for f in F:
         matrix = full(f)
         assert volume_ratio(f) == pytest.approx(np.linalg.det(matrix), rel=1e-12)
@@ -28,7 +29,8 @@ def energy(f: np.ndarray, p: np.ndarray) -> np.ndarray:
     return np.asarray((np.square(f).sum(axis=-1) - 3 - 2 * np.log(np.abs(volume))) / 2 - p * (volume - 1))
 
 
-def test_stress_is_the_derivative_of_the_energy_and_tangent_that_of_the_stress() -> None:
+def test_stress_derivative_energy_tangent_stress() -> None:
+    """Stress is the derivative of the energy and tangent that of the stress."""
     step = 1e-6
     for i in range(5):
         moved = np.zeros(5)
@@ -39,7 +41,8 @@ def test_stress_is_the_derivative_of_the_energy_and_tangent_that_of_the_stress()
         assert tangent(F, P)[..., i] == pytest.approx(slopes, rel=1e-5, abs=1e-5)
 
 
-def test_no_stress_at_rest_and_young_s_modulus_is_three() -> None:
+def test_no_stress_rest_young_s_modulus_three() -> None:
+    """No stress at rest and young s modulus is three."""
     assert stress(IDENTITY, np.zeros(())) == pytest.approx(np.zeros(5), abs=1e-15)
     strain = 1e-6  # axial strain e, lateral −e/2, no lateral stress
     f = IDENTITY + strain * np.array([-0.5, 0, 0, 1, -0.5])
@@ -47,8 +50,11 @@ def test_no_stress_at_rest_and_young_s_modulus_is_three() -> None:
     assert stress(f, p)[3] / strain == pytest.approx(3.0, rel=1e-5)
 
 
-def test_uniaxial_compression_follows_the_exact_law() -> None:
-    """Nominal stress λ − λ⁻² for stretch λ (G = 1)."""
+def test_uniaxial_compression_follows_exact_law() -> None:
+    """Uniaxial compression follows the exact law.
+
+    Nominal stress λ − λ⁻² for stretch λ (G = 1).
+    """
     stretch = 0.7
     f = np.array([stretch**-0.5, 0, 0, stretch, stretch**-0.5])
     p = np.asarray(f[0] ** 2 - 1)

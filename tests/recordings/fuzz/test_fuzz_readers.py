@@ -157,7 +157,8 @@ def damaged(draw: st.DrawFn, files: list[bytes]) -> bytes:
 
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("kind", sorted(MODULES))
-def test_damaged_files_are_refused_with_their_name(reader: Reader, kind: str, part: int) -> None:
+def test_damaged_files_refused_name(reader: Reader, kind: str, part: int) -> None:
+    """Damaged files are refused with their name."""
     files = sound_files()[kind]
     for sound in files:
         assert reader.said(kind, sound) == "read"
@@ -177,7 +178,9 @@ def test_damaged_files_are_refused_with_their_name(reader: Reader, kind: str, pa
 
 @pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("kind", sorted(MODULES) if SOAK else FOREIGN)
-def test_damaged_files_are_refused_by_the_process_apart(kind: str, part: int) -> None:
+def test_damaged_files_refused_process_apart(kind: str, part: int) -> None:
+    """Damaged files are refused by the process apart."""
+
     @seed(part)
     @LIKE_ALL(max_examples=COUNT_APART)
     @given(data=damaged(sound_files()[kind]))

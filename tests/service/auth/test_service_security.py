@@ -108,7 +108,8 @@ def test_names_in_the_setting_are_known(keyed: Keyed, locked: httpx.Client, host
     assert locked.get(ONE_SIGMA, headers=headers).status_code == 200
 
 
-def test_an_unknown_host_is_refused_whatever_the_key(keyed: Keyed, locked: httpx.Client) -> None:
+def test_unknown_host_refused_whatever_key(keyed: Keyed, locked: httpx.Client) -> None:
+    """An unknown host is refused whatever the key."""
     headers = {"Host": "evil.example", **bearer(keyed.tokens["robot"])}
     problem_of(locked.get(ONE_SIGMA, headers=headers), 421)
 
@@ -120,15 +121,15 @@ def test_a_page_of_another_origin_cannot_post(http: httpx.Client, path: str, ori
 
 
 @pytest.mark.parametrize("origin", FOREIGN)
-def test_a_page_of_another_origin_cannot_post_with_a_key_either(
-    keyed: Keyed, locked: httpx.Client, origin: str
-) -> None:
+def test_page_origin_cannot_post_key_either(keyed: Keyed, locked: httpx.Client, origin: str) -> None:
+    """A page of another origin cannot post with a key either."""
     headers = {"Origin": origin, **bearer(keyed.tokens["robot"])}
     problem_of(locked.post("/v1/sigma", json=SIGMA, headers=headers), 403)
 
 
 @pytest.mark.parametrize("method", ["PUT", "PATCH", "DELETE"])
-def test_other_methods_that_change_something_are_refused_as_well(http: httpx.Client, method: str) -> None:
+def test_methods_change_something_refused_well(http: httpx.Client, method: str) -> None:
+    """Other methods that change something are refused as well."""
     problem_of(http.request(method, "/v1/sigma", headers={"Origin": FOREIGN[0]}), 403)
 
 
@@ -210,7 +211,8 @@ def test_what_is_not_a_key_is_refused(keyed: Keyed, locked: httpx.Client, spoile
     problem_of(locked.get(ONE_SIGMA, headers=[(b"Authorization", sent.encode("latin-1"))]), 401)
 
 
-def test_neither_the_name_nor_the_hash_of_a_key_is_a_key(keyed: Keyed, locked: httpx.Client) -> None:
+def test_neither_name_nor_hash_key_key(keyed: Keyed, locked: httpx.Client) -> None:
+    """Neither the name nor the hash of a key is a key."""
     for sent in [part for entry in keys_in(keyed.folder).entries() for part in (entry.name, entry.sha256)]:
         problem_of(locked.get(ONE_SIGMA, headers=bearer(sent)), 401)
 
@@ -231,7 +233,8 @@ def test_tokens_are_kept_nowhere(keyed: Keyed, locked: httpx.Client) -> None:
         assert not any(token.encode() in text for text in [*written, listed.encode()])
 
 
-def test_a_running_server_follows_the_command_line_within_a_second(tmp_path: Path) -> None:
+def test_running_server_follows_command_line(tmp_path: Path) -> None:
+    """A running server follows the command line within a second."""
     with running(tmp_path) as started:
         assert httpx.get(started.url + ONE_SIGMA).status_code == 200
         made = command(tmp_path, "key", "create", "first")
@@ -291,7 +294,8 @@ def test_a_damaged_file_of_keys_opens_nothing(tmp_path: Path) -> None:
     assert "Traceback" not in started.log.read_text()
 
 
-def test_a_file_of_keys_of_another_shape_opens_nothing(tmp_path: Path) -> None:
+def test_file_keys_shape_opens_nothing(tmp_path: Path) -> None:
+    """A file of keys of another shape opens nothing."""
     token = keys_in(tmp_path).create("lab", "read")
     kept = tmp_path / "data" / "keys.json"
     good = kept.read_text()
@@ -306,7 +310,8 @@ def test_a_file_of_keys_of_another_shape_opens_nothing(tmp_path: Path) -> None:
 # Reached from other machines
 
 
-def test_without_keys_other_machines_are_not_let_in(tmp_path: Path) -> None:
+def test_without_keys_machines_not_let(tmp_path: Path) -> None:
+    """Without keys other machines are not let in."""
     assert "on 0.0.0.0 without API keys" in refusal(tmp_path, "serve", "--host", "0.0.0.0", "--port", "0")
     names = "skin.example.org"
     assert f"as {names} without API keys" in refusal(tmp_path, "serve", "--port", "0", UNDERSKIN_HOSTS=names)

@@ -130,9 +130,8 @@ def is_refused_within_a_second(browser: httpx.Client) -> bool:
     return status == LOGIN_FIRST
 
 
-def test_a_session_is_listed_and_ended_by_another_of_its_key(
-    keyed: tuple[Server, dict[str, str]], log_in: Browser
-) -> None:
+def test_session_listed_ended_key(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
+    """A session is listed and ended by another of its key."""
     server, _ = keyed
     lost, own, other = log_in("mara", "the lost one"), log_in("mara", "at home"), log_in("otto", "otto's")
     rows = listed(server.place)
@@ -165,9 +164,8 @@ def test_a_logout_ends_copies_of_the_cookie_too(keyed: tuple[Server, dict[str, s
     assert listed(server.place) == {}
 
 
-def test_the_command_line_ends_a_session_on_every_server_also_after_a_restart(
-    keyed: tuple[Server, dict[str, str]], log_in: Browser
-) -> None:
+def test_command_line_ends_session_every_server(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
+    """The command line ends a session on every server also after a restart."""
     server, keys = keyed
     place = server.place
     lost, kept = log_in("mara", "the lost one"), log_in("mara", "at home")
@@ -226,10 +224,11 @@ def test_a_logout_during_a_look_is_kept(tmp_path: Path, monkeypatch: pytest.Monk
     assert sessions.has_ended(cookie)
 
 
-def test_the_log_tells_nothing_of_a_key_where_the_store_fails(
-    keyed: tuple[Server, dict[str, str]], log_in: Browser
-) -> None:
-    """Whoever has a key's digest can sign cookies. The last test here, since the store is spoilt then."""
+def test_log_tells_nothing_key_store_fails(keyed: tuple[Server, dict[str, str]], log_in: Browser) -> None:
+    """The log tells nothing of a key where the store fails.
+
+    Whoever has a key's digest can sign cookies. The last test here, since the store is spoilt then.
+    """
     server, keys = keyed
     browser = log_in("mara", "at home")
     token = token_of(browser.get("/sessions").text)

@@ -38,13 +38,15 @@ def test_a_port_in_use_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", ["a file/data", "/proc/underskin"])
-def test_a_data_folder_that_cannot_be_written_is_named(tmp_path: Path, place: str) -> None:
+def test_data_folder_cannot_written_named(tmp_path: Path, place: str) -> None:
+    """A data folder that cannot be written is named."""
     (tmp_path / "a file").touch()  # in the way whoever runs this, and /proc takes no folder even from root
     data = tmp_path / place
     assert f"the data folder {data} (UNDERSKIN_DATA) is not writable: " in refusal(tmp_path, UNDERSKIN_DATA=str(data))
 
 
-def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_as_it_is(tmp_path: Path) -> None:
+def test_data_folder_made_owner_alone_stays(tmp_path: Path) -> None:
+    """A data folder is made for its owner alone and one that is there stays as it is."""
     with running(tmp_path):
         assert (tmp_path / "data").stat().st_mode & 0o777 == 0o700
     own, shared = tmp_path / "own", tmp_path / "shared"
@@ -55,7 +57,8 @@ def test_a_data_folder_is_made_for_its_owner_alone_and_one_that_is_there_stays_a
         assert folder.stat().st_mode & 0o777 == mode
 
 
-def test_a_data_folder_lost_later_makes_the_server_not_ready(tmp_path: Path) -> None:
+def test_data_folder_lost_later_makes_server(tmp_path: Path) -> None:
+    """A data folder lost later makes the server not ready."""
     with running(tmp_path) as started:
         (tmp_path / "data").rename(tmp_path / "moved")
         refused = httpx.get(f"{started.url}/ready")
@@ -138,7 +141,8 @@ def test_a_truncated_table_ends_the_start(table: Path) -> None:
     assert "is truncated or damaged" in refused_table(table)
 
 
-def test_something_else_than_a_table_ends_the_start(table: Path) -> None:
+def test_something_else_table_ends_start(table: Path) -> None:
+    """Something else than a table ends the start."""
     table.write_text("a_over_h,rt_over_h,sigma\n")
     assert "is not an HDF5 file" in refused_table(table)
 
@@ -158,7 +162,8 @@ def test_a_damaged_byte_ends_the_start(table: Path) -> None:
     assert "is truncated or damaged" in refused_table(table)
 
 
-def test_a_table_of_an_older_schema_ends_the_start(table: Path) -> None:
+def test_table_older_schema_ends_start(table: Path) -> None:
+    """A table of an older schema ends the start."""
     with h5py.File(table, "r+") as file:
         file.attrs["schema"] = "underskin-sigma/0"
     assert "has schema 'underskin-sigma/0'; this version reads 'underskin-sigma/1'" in refused_table(table)
@@ -168,9 +173,8 @@ def test_a_table_of_an_older_schema_ends_the_start(table: Path) -> None:
 
 
 @pytest.mark.parametrize(("number", "ended"), [(signal.SIGTERM, -15), (signal.SIGINT, 130)])
-def test_a_signal_ends_the_server_after_the_answers_under_way(
-    tmp_path: Path, number: signal.Signals, ended: int
-) -> None:
+def test_signal_ends_server_after_answers(tmp_path: Path, number: signal.Signals, ended: int) -> None:
+    """A signal ends the server after the answers under way."""
     with running(tmp_path) as started, connect(started) as idle, connect(started) as busy:
         idle.sendall(f"GET /health HTTP/1.1\r\n{HEAD}\r\n".encode())
         assert read_answer(idle)[0] == 200

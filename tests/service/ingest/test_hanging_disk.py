@@ -47,9 +47,8 @@ def send(server: Server, number: int) -> int:
 
 
 @pytest.mark.parametrize("call", CALLS if SOAK else ["writing"])
-def test_others_are_answered_while_the_disk_of_uploads_hangs(
-    hanging_server: Server, disk: HangingDisk, call: str
-) -> None:
+def test_answered_disk_uploads_hangs(hanging_server: Server, disk: HangingDisk, call: str) -> None:
+    """Others are answered while the disk of uploads hangs."""
     count = MANY if call == "writing" else FEW
     with ThreadPoolExecutor(FEW + count) as pool:
         with disk.hanging(call):
@@ -66,7 +65,8 @@ def test_others_are_answered_while_the_disk_of_uploads_hangs(
         assert {one.result() for one in sent} == {201}
 
 
-def test_the_headers_of_an_export_are_answered_without_making_it(hanging_server: Server, disk: HangingDisk) -> None:
+def test_headers_export_answered_without_making(hanging_server: Server, disk: HangingDisk) -> None:
+    """The headers of an export are answered without making it."""
     http = hanging_server.http
     sent = http.post("/v1/campaigns?skin=exported", json=campaign("exported")).json()
     for path in ("/v1/skins/exported/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):

@@ -43,7 +43,8 @@ def require_estimated(server: Server, ids: dict[str, str]) -> None:
         assert first["estimator"] == name
 
 
-def test_the_query_and_the_form_choose_the_estimator(server: Server) -> None:
+def test_query_form_choose_estimator(server: Server) -> None:
+    """The query and the form choose the estimator."""
     content = orjson.dumps(shaken("shaken"))
     ids = {}
     for name in ESTIMATORS:
@@ -60,7 +61,8 @@ def test_the_query_and_the_form_choose_the_estimator(server: Server) -> None:
     assert answer.json()["notes"] == ["Hv is for time series, which 6 of 6 recordings are not"]
 
 
-def test_the_estimator_stays_with_a_skin_that_moves(server: Server, elsewhere: Server, tmp_path: Path) -> None:
+def test_estimator_stays_skin_moves(server: Server, elsewhere: Server, tmp_path: Path) -> None:
+    """The estimator stays with a skin that moves."""
     sent = server.http.post("/v1/campaigns?estimator=Hv&skin=palm", json=shaken("shaken")).json()["id"]
     with Client(str(server.http.base_url)) as client, Client(str(elsewhere.http.base_url)) as other:
         client.skins.export("palm", tmp_path / "palm.h5")
@@ -70,7 +72,8 @@ def test_the_estimator_stays_with_a_skin_that_moves(server: Server, elsewhere: S
     assert d33(elsewhere, sent) == d33(server, sent)
 
 
-def test_the_estimator_is_a_part_of_the_request_that_a_key_stands_for(server: Server) -> None:
+def test_estimator_part_request_key_stands(server: Server) -> None:
+    """The estimator is a part of the request that a key stands for."""
     headers = {"Idempotency-Key": "one"}
     document = shaken("shaken")
     first = server.http.post("/v1/campaigns?estimator=H2", json=document, headers=headers)
@@ -79,7 +82,8 @@ def test_the_estimator_is_a_part_of_the_request_that_a_key_stands_for(server: Se
     assert server.http.post("/v1/campaigns?estimator=Hv", json=document, headers=headers).status_code == 422
 
 
-def test_the_client_and_the_commands_choose_the_estimator(server: Server, tmp_path: Path) -> None:
+def test_client_commands_choose_estimator(server: Server, tmp_path: Path) -> None:
+    """The client and the commands choose the estimator."""
     file = tmp_path / "shaken.json"
     file.write_bytes(orjson.dumps(shaken("shaken")))
     there = ["--url", str(server.http.base_url)]

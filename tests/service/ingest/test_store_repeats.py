@@ -36,7 +36,8 @@ def post(server: Server, document: Document, **query: str) -> Document:
     return dict(answer.json())
 
 
-def test_a_campaign_that_comes_twice_is_told_and_counts_once(server: Server) -> None:
+def test_campaign_comes_twice_told_counts_once(server: Server) -> None:
+    """A campaign that comes twice is told and counts once."""
     days = [made(f"day {month}", month, d33=14 - 0.1 * month) for month in range(1, 7)]
     first = [post(server, day) for day in days]
     assert [entry["notes"] for entry in first] == [[]] * 6
@@ -66,7 +67,8 @@ def test_a_campaign_that_comes_twice_is_told_and_counts_once(server: Server) -> 
     assert (csv.count(first[0]["id"]), csv.count(again[0]["id"])) == (3, 0)
 
 
-def test_a_twin_counts_once_the_other_is_withdrawn_or_corrected(server: Server) -> None:
+def test_twin_counts_once_withdrawn_corrected(server: Server) -> None:
+    """A twin counts once the other is withdrawn or corrected."""
     day = made("monday")
     first = post(server, day)["id"]
     twin = post(server, renamed(day, "again"))["id"]
@@ -78,7 +80,8 @@ def test_a_twin_counts_once_the_other_is_withdrawn_or_corrected(server: Server) 
     assert points(server, "palm") == [corrected["id"]]
 
 
-def test_a_correction_that_changes_nothing_is_told(server: Server) -> None:
+def test_correction_changes_nothing_told(server: Server) -> None:
+    """A correction that changes nothing is told."""
     day = made("monday")
     first = post(server, day)["id"]
     again = post(server, day, corrects=first, reason="E was mistyped")
@@ -91,7 +94,8 @@ def test_a_correction_that_changes_nothing_is_told(server: Server) -> None:
     assert post(server, thicker, corrects=last["id"], reason="the cable was fine")["notes"] == []  # it is in use again
 
 
-def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) -> None:
+def test_two_points_share_recording_fuller(server: Server) -> None:
+    """Of two points that share a recording the fuller counts."""
     whole = made("whole")
     some = [one for one in whole["recordings"] if one["sensor"] == "s0"][:1]
     own = made("own", 2)["recordings"]
@@ -115,7 +119,8 @@ def test_of_two_points_that_share_a_recording_the_fuller_counts(server: Server) 
     assert "sensor s0: its recordings count in campaign" in page
 
 
-def test_recordings_typed_by_hand_without_a_time_are_all_kept(server: Server) -> None:
+def test_recordings_typed_hand_without_time_kept(server: Server) -> None:
+    """Recordings typed by hand without a time are all kept."""
     day = campaign("typed", sensors=1, lines=5)
     typed = {"frf_re_pc_per_n": [7.0] * 5, "frf_im_pc_per_n": [0.0] * 5}
     base = {name: value for name, value in day["recordings"][0].items() if name not in ("recorded_at", "coherence")}
@@ -139,7 +144,8 @@ def test_recordings_typed_by_hand_without_a_time_are_all_kept(server: Server) ->
     assert third["notes"][0].startswith("1 of these 2 recordings is in campaign typed of skin palm already")
 
 
-def test_an_excluded_recording_keeps_no_other_from_counting(server: Server) -> None:
+def test_excluded_recording_keeps_no_counting(server: Server) -> None:
+    """An excluded recording keeps no other from counting."""
     day = made("monday")
     first = post(server, day)["id"]
     for recording in ("s0-1N", "s0-2N"):
@@ -151,7 +157,8 @@ def test_an_excluded_recording_keeps_no_other_from_counting(server: Server) -> N
     assert used == {"s0": twin, "s1": first, "s2": first}
 
 
-def test_a_copy_is_known_at_another_time_and_on_another_skin_but_not_with_other_numbers(server: Server) -> None:
+def test_copy_known_time_skin_not_numbers(server: Server) -> None:
+    """A copy is known at another time and on another skin but not with other numbers."""
     day = made("monday")
     first = post(server, day)["id"]
     post(server, renamed(day, "later", recorded_at="2018-01-03T09:00:00Z"))

@@ -110,7 +110,8 @@ def test_the_skin_can_be_said_for_all(server: Server) -> None:
     assert server.http.get(f"/v1/campaigns/{kept['id']}").json()["skin"]["id"] == "palm"
 
 
-def test_the_same_request_is_kept_once_and_apart_is_another(server: Server) -> None:
+def test_request_kept_once_apart(server: Server) -> None:
+    """The same request is kept once and apart is another."""
     key = {"Idempotency-Key": "monday"}
     first = post(server, presses(), **key)
     assert post(server, presses(), **key).json() == first.json()
@@ -119,7 +120,8 @@ def test_the_same_request_is_kept_once_and_apart_is_another(server: Server) -> N
     assert len(server.http.get("/v1/campaigns").json()["campaigns"]) == 1
 
 
-def test_a_list_goes_together_and_a_joined_campaign_corrects(server: Server) -> None:
+def test_list_goes_together_joined_campaign(server: Server) -> None:
+    """A list goes together and a joined campaign corrects."""
     first = server.http.post("/v1/campaigns?skin=palm", json=WHOLE).json()["id"]
     documents = [orjson.loads(content) for _, content in presses()]
     answer = server.http.post(f"/v1/campaigns?together=palm&corrects={first}&reason=again", json=documents)
@@ -128,7 +130,8 @@ def test_a_list_goes_together_and_a_joined_campaign_corrects(server: Server) -> 
     assert [entry["id"] for entry in server.http.get("/v1/campaigns?skin=palm").json()["campaigns"]] == [kept["id"]]
 
 
-def test_instrument_files_of_two_formats_and_their_rig(server: Server) -> None:
+def test_instrument_files_two_formats_rig(server: Server) -> None:
+    """Instrument files of two formats and their rig."""
     files = [("one.tdms", tdms(1)), ("two.tdms", tdms(2)), ("three.lvm", lvm(repeats=1).encode())]
     form = [("rig", ("bench.yaml", RIG.encode())), *(("file", file) for file in files)]
     answer = server.http.post("/v1/campaigns?skin=gel&together=Monday", files=form)

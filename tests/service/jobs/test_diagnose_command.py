@@ -12,7 +12,8 @@ from tests.support.store_server import Server
 from underskin.cli.app import app
 
 
-def test_reports_of_kept_campaigns_are_those_of_the_service(working: Server, tmp_path: Path) -> None:
+def test_reports_kept_campaigns_service(working: Server, tmp_path: Path) -> None:
+    """Reports of kept campaigns are those of the service."""
     reports = tmp_path / "reports"
     kept, few = sent(working, small()), [word for name in BESIDE_SKINS for word in ("--without", name)]
     given = ["--campaign", kept, "--campaign", "nowhere", "--url", str(working.http.base_url), *few]
@@ -32,7 +33,8 @@ def test_what_to_diagnose_must_be_given_once(given: list[str], tmp_path: Path) -
     assert not (tmp_path / "reports").exists()
 
 
-def test_without_a_folder_reports_go_into_one_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_folder_reports_go(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a folder reports go into one of their own."""
     monkeypatch.chdir(tmp_path)
     result = CliRunner().invoke(app, ["diagnose", "nowhere.json"])
     assert result.exit_code == 2

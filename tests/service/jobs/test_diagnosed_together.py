@@ -32,7 +32,8 @@ def refused(server: Server, path: str, body: Any, status: int) -> dict[str, Any]
     return problem_of(server.http.post(path, json=body), status)
 
 
-def test_campaigns_of_a_skin_are_diagnosed_together(working: Server) -> None:
+def test_campaigns_skin_diagnosed_together(working: Server) -> None:
+    """Campaigns of a skin are diagnosed together."""
     with Client(str(working.http.base_url)) as client:
         ids = [sent(working, resonant("array", preloads=(1.0,), lines=6, seed=seed)) for seed in range(2)]
         asked = partial(client.skins.diagnose, "palm", name="palm since May", without=BESIDE_SKINS)
@@ -68,8 +69,11 @@ def test_skins_of_a_fleet_are_diagnosed_together(working: Server) -> None:
         assert again == {"id": done["id"], "state": "done"}
 
 
-def test_blocks_alone_are_refused_at_once_and_beside_one_campaign_of_frfs_are_not(server: Server) -> None:
-    """Campaigns are compared by FRFs."""
+def test_blocks_alone_refused_once_beside(server: Server) -> None:
+    """Blocks alone are refused at once and beside one campaign of frfs are not.
+
+    Campaigns are compared by FRFs.
+    """
     travel = [0.05 * step for step in range(20)]
     cylinder = {"id": "b", "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0}
     cylinder |= {"displacement_mm": travel, "force_n": [125.0 * one for one in travel]}
@@ -110,7 +114,8 @@ def test_all_or_chosen_campaigns_are_queued_once(server: Server, client: Client)
         client.skins.adopt("palm", whole["id"])
 
 
-def test_asked_twice_under_one_key_is_queued_once(server: Server) -> None:
+def test_asked_twice_under_key_queued_once(server: Server) -> None:
+    """Asked twice under one key is queued once."""
     sent_to(server, "palm", 2)
     key = {"Idempotency-Key": "mine"}
     first = server.http.post("/v1/skins/palm/diagnosis", headers=key).json()
@@ -141,7 +146,8 @@ def test_asked_at_once_is_queued_once(server: Server) -> None:
     assert (len(told), len(set(told))) == (8, 2)
 
 
-def test_a_change_of_a_campaign_outdates_what_is_of_it(server: Server, client: Client) -> None:
+def test_change_campaign_outdates(server: Server, client: Client) -> None:
+    """A change of a campaign outdates what is of it."""
     ids = sent_to(server, "palm", 4)
     whole = client.skins.diagnose("palm")["id"]
     chosen = client.skins.diagnose("palm", ids[:2])["id"]
@@ -178,7 +184,8 @@ def test_a_correction_outdates_a_fleet(server: Server, client: Client) -> None:
     assert [entry["id"] for entry in client.diagnoses.all(skin="palm-1")] == [again, fleet]
 
 
-def test_a_skin_with_too_few_campaigns_is_refused(server: Server, client: Client) -> None:
+def test_skin_too_few_campaigns_refused(server: Server, client: Client) -> None:
+    """A skin with too few campaigns is refused."""
     assert "no skin 'palm'" in refused(server, "/v1/skins/palm/diagnosis", {}, 404)["detail"]
     first, second = sent_to(server, "palm", 2)
     client.campaigns.withdraw(second, "wrong sphere")
@@ -247,7 +254,8 @@ def test_a_wrong_request_names_the_field(server: Server, client: Client) -> None
         assert code in (None, error["code"]), body
 
 
-def test_a_skin_of_a_fleet_without_a_campaign_in_use_is_named(server: Server, client: Client) -> None:
+def test_skin_fleet_without_campaign_use_named(server: Server, client: Client) -> None:
+    """A skin of a fleet without a campaign in use is named."""
     for skin in ("a", "b"):
         sent_to(server, skin, 1)
     client.campaigns.withdraw(sent_to(server, "c", 1)[0], "wrong sphere")

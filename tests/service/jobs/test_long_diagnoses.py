@@ -81,8 +81,11 @@ def state(store: Database, diagnosis_id: str) -> str:
 
 
 @pytest.mark.soak
-def test_short_diagnoses_do_not_wait_for_long_ones(store: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With one worker that is at a long one, and another long one before them in the queue."""
+def test_short_diagnoses_not_wait_long_ones(store: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Short diagnoses do not wait for long ones.
+
+    With one worker that is at a long one, and another long one before them in the queue.
+    """
     for name, seconds in (("_LONG_S", 0.3), ("_SHORT_S", 1.0), ("_POLL_S", 0.05), ("_BEAT_S", 0.05)):
         monkeypatch.setattr(runner, name, seconds)
     first, second = (in_queue(store, "long", sensors) for sensors in (4, 3))
@@ -102,8 +105,11 @@ def test_short_diagnoses_do_not_wait_for_long_ones(store: Database, monkeypatch:
         runs.stop()
 
 
-def test_one_beyond_the_limit_of_time_fails_with_its_setting(place: Place) -> None:
-    """And the next one is done."""
+def test_beyond_limit_time_fails_setting(place: Place) -> None:
+    """One beyond the limit of time fails with its setting.
+
+    And the next one is done.
+    """
     settings = {"UNDERSKIN_DIAGNOSIS_WORKERS": "1", "UNDERSKIN_DIAGNOSIS_SECONDS": "2"}
     with running(place, **settings) as server:
         long = resonant("long", preloads=[0.5 + 0.1 * step for step in range(20)], lines=60)

@@ -41,7 +41,8 @@ def row_of(place: Place, diagnosis_id: str) -> AnyRow:
         return store.read(diagnoses.find, diagnosis_id)
 
 
-def test_a_diagnosis_whose_worker_is_slow_to_start_is_kept_alive_and_never_run_twice_at_once(place: Place) -> None:
+def test_diagnosis_worker_slow_start_kept_alive(place: Place) -> None:
+    """A diagnosis whose worker is slow to start is kept alive and never run twice at once."""
     with running(place, **TWO) as server:
         with no_worker_starts(server):
             diagnosis_id = begun(server, small())
@@ -62,9 +63,10 @@ def test_a_diagnosis_whose_worker_is_slow_to_start_is_kept_alive_and_never_run_t
 
 
 @pytest.mark.soak
-def test_a_diagnosis_for_which_no_thread_starts_is_put_back_and_done_later(
+def test_diagnosis_no_thread_starts_put_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
+    """A diagnosis for which no thread starts is put back and done later."""
     tried: list[float] = []
     start: Callable[[threading.Thread], None] = threading.Thread.start
 

@@ -29,7 +29,8 @@ def test_head_has_the_headers_of_get_and_no_body(http: httpx.Client, path: str) 
         assert asked.headers.get(name) == whole.headers.get(name)
 
 
-def test_head_of_what_takes_post_alone_is_refused(http: httpx.Client) -> None:
+def test_head_takes_post_alone_refused(http: httpx.Client) -> None:
+    """Head of what takes post alone is refused."""
     assert http.head("/umbridge/Evaluate").status_code == 405
 
 
@@ -112,7 +113,8 @@ def test_wrong_value_is_named_with_its_row(
     ("field", "value", "guess"),
     [("thickness_mm", 0.0025, "m"), ("thickness_mm", 2500.0, "µm"), ("youngs_modulus_mpa", 16e6, "Pa")],
 )
-def test_slip_of_units_is_guessed_and_can_be_meant(http: httpx.Client, field: str, value: float, guess: str) -> None:
+def test_slip_units_guessed_meant(http: httpx.Client, field: str, value: float, guess: str) -> None:
+    """Slip of units is guessed and can be meant."""
     fields = {**FRF, field: value}
     (error,) = problem_of(http.post("/v1/frf", json=fields), 422)["errors"]
     assert error["field"] == field
@@ -127,7 +129,8 @@ def test_unequal_columns_are_both_named(http: httpx.Client) -> None:
     assert "rt_over_h" in detail
 
 
-def test_a_skin_without_an_adopted_model_is_not_found(http: httpx.Client) -> None:
+def test_skin_without_adopted_model_not_found(http: httpx.Client) -> None:
+    """A skin without an adopted model is not found."""
     for path, good in (("/v1/frf", FRF), ("/v1/d33", D33)):
         answer = http.post(path, json={**good, "model": "adopted", "skin_id": "palm-3"})
         assert "'palm-3' has no adopted model" in problem_of(answer, 404)["detail"]
@@ -166,8 +169,11 @@ def test_csv_that_is_not_understood(http: httpx.Client, body: bytes, status: int
     assert says in problem_of(answer, status)["detail"]
 
 
-def test_rows_of_a_spreadsheet_come_back_with_what_they_are_called(http: httpx.Client) -> None:
-    """Semicolons, decimal commas and a column of words, as German spreadsheets have them."""
+def test_rows_spreadsheet_come_back_called(http: httpx.Client) -> None:
+    """Rows of a spreadsheet come back with what they are called.
+
+    Semicolons, decimal commas and a column of words, as German spreadsheets have them.
+    """
     body = b"sep=;\r\nPress;a_over_h;rt_over_h\r\nerste;0,3;0,6\r\nzweite;0,4;0,6\r\n"
     headers = {"Content-Type": "text/csv", "Accept": "text/csv"}
     header, *rows = http.post("/v1/sigma", content=body, headers=headers).text.splitlines()
@@ -187,15 +193,15 @@ def test_what_csv_cannot_tell_is_said(http: httpx.Client) -> None:
     assert "application/json" in error["allowed"]
 
 
-def test_values_too_large_for_a_double_are_outside_not_a_failure(http: httpx.Client) -> None:
+def test_values_too_large_double_outside(http: httpx.Client) -> None:
+    """Values too large for a double are outside not a failure."""
     answer = http.post("/v1/frf", json={**FRF, "preload_n": [1.0, 1e308], "units_checked": True})
     assert answer.status_code == 200
     assert answer.json()["status"] == ["ok", "out_of_domain"]
 
 
-def test_what_nobody_expected_is_a_problem_with_the_traceback_in_the_log(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_nobody_expected_problem_traceback_log(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """What nobody expected is a problem with the traceback in the log."""
     with in_process(tmp_path) as service:
 
         @service.api.get("/fails")

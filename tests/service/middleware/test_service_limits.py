@@ -55,7 +55,8 @@ def test_csv_counts_as_well(client: httpx.Client) -> None:
 
 
 @pytest.mark.usefixtures("client")
-def test_a_declared_length_is_refused_before_anything_is_sent(small: Server) -> None:
+def test_declared_length_refused_before_anything(small: Server) -> None:
+    """A declared length is refused before anything is sent."""
     for length in (LIMIT + 1, 2**64 - 1):
         with connect(small) as connection:
             head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\nExpect: 100-continue\r\n\r\n"
@@ -64,7 +65,8 @@ def test_a_declared_length_is_refused_before_anything_is_sent(small: Server) -> 
 
 
 @pytest.mark.usefixtures("client")
-def test_a_body_without_end_is_answered_once_it_exceeds_the_limit(small: Server) -> None:
+def test_body_without_end_answered_once_exceeds(small: Server) -> None:
+    """A body without end is answered once it exceeds the limit."""
     with connect(small) as connection:
         connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Transfer-Encoding: chunked\r\n\r\n".encode())
         connection.sendall(b"c350\r\n" + b" " * LIMIT + b"\r\n")  # the limit itself still waits for more
@@ -73,7 +75,8 @@ def test_a_body_without_end_is_answered_once_it_exceeds_the_limit(small: Server)
 
 
 @pytest.mark.usefixtures("client")
-def test_the_connection_serves_on_after_a_refused_body(small: Server) -> None:
+def test_connection_serves_after_refused_body(small: Server) -> None:
+    """The connection serves on after a refused body."""
     length = LIMIT + 1
     with connect(small) as connection:
         head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: {length}\r\n\r\n"
@@ -84,7 +87,8 @@ def test_the_connection_serves_on_after_a_refused_body(small: Server) -> None:
 
 
 @pytest.mark.usefixtures("client")
-def test_what_exceeds_a_length_that_is_too_small_is_not_taken_for_body(small: Server) -> None:
+def test_exceeds_length_too_small_not_taken_body(small: Server) -> None:
+    """What exceeds a length that is too small is not taken for body."""
     body = padded("/v1/sigma", LIMIT + 1)
     with connect(small) as connection:
         head = f"POST /v1/sigma HTTP/1.1\r\n{HEAD}Content-Length: 20\r\n\r\n"
@@ -103,7 +107,8 @@ def test_what_exceeds_a_length_that_is_too_small_is_not_taken_for_body(small: Se
     ["Content-Length: 20\r\nTransfer-Encoding: chunked\r\n", "Content-Length: 20\r\nContent-Length: 90000\r\n"],
 )
 @pytest.mark.usefixtures("client")
-def test_contradictory_lengths_end_the_connection(small: Server, lengths: str) -> None:
+def test_contradictory_lengths_end_connection(small: Server, lengths: str) -> None:
+    """Contradictory lengths end the connection."""
     with connect(small) as connection:
         connection.sendall(f"POST /v1/sigma HTTP/1.1\r\n{HEAD}{lengths}\r\n".encode())
         status, headers, _ = read_answer(connection)
@@ -113,7 +118,8 @@ def test_contradictory_lengths_end_the_connection(small: Server, lengths: str) -
 
 @pytest.mark.parametrize("path", BODIES)
 @pytest.mark.usefixtures("client")
-def test_a_sender_who_gives_up_is_logged_without_a_traceback(small: Server, path: str) -> None:
+def test_sender_gives_up_logged(small: Server, path: str) -> None:
+    """A sender who gives up is logged without a traceback."""
     request_id = f"gone{path.replace('/', '-')}"
     with connect(small) as connection:
         head = f"POST {path} HTTP/1.1\r\n{HEAD}X-Request-ID: {request_id}\r\nContent-Length: 1000\r\n\r\n"

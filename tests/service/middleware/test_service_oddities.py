@@ -129,9 +129,8 @@ def test_many_mistakes_at_once_are_all_named(http: httpx.Client) -> None:
 @pytest.mark.parametrize(
     "request_line", ["GET /\xff HTTP/1.1", "BREW /v1/sigma HTTP/1.1", "hello", "GET /health HTTP/9"]
 )
-def test_what_is_not_http_ends_its_connection_only(
-    http: httpx.Client, shared_server: Server, request_line: str
-) -> None:
+def test_not_http_ends_connection(http: httpx.Client, shared_server: Server, request_line: str) -> None:
+    """What is not http ends its connection only."""
     with connect(shared_server) as connection:
         connection.sendall(f"{request_line}\r\n{HEAD}\r\n".encode("latin-1"))
         status, headers, _ = read_answer(connection)

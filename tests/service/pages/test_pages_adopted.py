@@ -37,7 +37,8 @@ def numbers(text: str) -> list[float]:
     return [float(one.replace("−", "-")) for one in found]
 
 
-def test_an_adopted_model_heads_its_skin_and_the_start(visitor: Visit, server: Server) -> None:
+def test_adopted_model_heads_skin_start(visitor: Visit, server: Server) -> None:
+    """An adopted model heads its skin and the start."""
     page = visitor.page
     campaign_id, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-a")
     visitor.go("/skins/palm-a")
@@ -99,7 +100,8 @@ def test_an_adopted_model_heads_its_skin_and_the_start(visitor: Visit, server: S
     assert page.get_by_role("region", name="Skins").evaluate("box => box.scrollWidth <= box.clientWidth")
 
 
-def test_a_d33_that_its_report_quotes_is_the_one_to_quote(server: Server) -> None:
+def test_d33_report_quotes_quote(server: Server) -> None:
+    """A d33 that its report quotes is the one to quote."""
     found = mistuned()
     quotable = {**found, "d33": {**found["d33"], "quotable": True}}
     _, diagnosis_id = diagnosed(server, resonant("sure"), quotable, "palm-e")
@@ -110,7 +112,8 @@ def test_a_d33_that_its_report_quotes_is_the_one_to_quote(server: Server) -> Non
 
 
 @pytest.mark.parametrize("path", ["design", "loads"])
-def test_a_design_starts_from_d33_by_the_adopted_model(server: Server, path: str) -> None:
+def test_design_starts_d33_adopted_model(server: Server, path: str) -> None:
+    """A design starts from d33 by the adopted model."""
     skin = f"from-{path}"
     document = resonant(skin)
     document["skin"].pop("d33_pc_per_n", None)
@@ -127,7 +130,8 @@ def test_a_design_starts_from_d33_by_the_adopted_model(server: Server, path: str
     assert "not to be quoted yet" in told
 
 
-def test_what_comes_later_is_told_by_the_adopted_model_too(server: Server) -> None:
+def test_comes_later_told_adopted_model(server: Server) -> None:
+    """What comes later is told by the adopted model too."""
     _, diagnosis_id = diagnosed(server, resonant("before"), mistuned(), "palm-b")
     server.http.post("/v1/skins/palm-b/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
     later = sent(server, resonant("later"), "palm-b")
@@ -137,7 +141,8 @@ def test_what_comes_later_is_told_by_the_adopted_model_too(server: Server) -> No
     assert f"array {by_model:.4g} pC/N" in row
 
 
-def test_an_outdated_model_is_said_to_serve_nothing(server: Server) -> None:
+def test_outdated_model_said_serve_nothing(server: Server) -> None:
+    """An outdated model is said to serve nothing."""
     campaign_id, diagnosis_id = diagnosed(server, resonant("gone"), mistuned(), "palm-c")
     server.http.post("/v1/skins/palm-c/model", json={"diagnosis_id": diagnosis_id}).raise_for_status()
     sent(server, resonant("stays"), "palm-c")
@@ -261,8 +266,11 @@ def test_a_tag_says_how_sure_it_is(
 
 
 @pytest.mark.parametrize(("probability", "settled"), [(0.341, False), (0.998, True)])
-def test_the_first_button_adopts_what_is_settled_alone(server: Server, probability: float, settled: bool) -> None:
-    """A law that holds a third of the probability can still be adopted, at the foot of the page, where that is said."""
+def test_first_button_adopts_settled_alone(server: Server, probability: float, settled: bool) -> None:
+    """The first button adopts what is settled alone.
+
+    A law that holds a third of the probability can still be adopted, at the foot of the page, where that is said.
+    """
     found = {**report(), "verdict": "unexplained", "probability": probability, "mechanisms": [], "unnamed": WARMTH}
     _, diagnosis_id = diagnosed(server, resonant("law"), found, f"law {settled}")
     shown = server.http.get(f"/diagnoses/{diagnosis_id}").text

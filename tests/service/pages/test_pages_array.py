@@ -40,7 +40,8 @@ def place_of(figure: Locator, sensor: str) -> tuple[float, float]:
 
 
 @pytest.mark.soak
-def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visit) -> None:
+def test_click_map_leads_sensor_s_history(lab: Visit) -> None:
+    """A click on the map leads to a sensor s history and recordings."""
     page = lab.page
     page.mouse.click(*place_of(page.locator("#figure-map"), "s03"))
     page.wait_for_url("**sensor=s03*")
@@ -76,7 +77,8 @@ def test_a_click_on_the_map_leads_to_a_sensor_s_history_and_recordings(lab: Visi
     page.wait_for_url("**sensor=s05*")
 
 
-def test_the_map_says_who_differs_and_prints_who_is_who(lab: Visit) -> None:
+def test_map_says_differs_prints(lab: Visit) -> None:
+    """The map says who differs and prints who is who."""
     figure = lab.page.locator("#figure-map")
     assert "beyond chance" in figure.locator("figcaption").inner_text()
     drawn = figure.locator(".plot .textpoint").all_text_contents()
@@ -93,7 +95,8 @@ def test_the_same_is_chosen_with_keys(lab: Visit) -> None:
     page.wait_for_url("**sensor=s01*")
 
 
-def test_every_page_says_that_its_bars_are_95_percent(lab: Visit) -> None:
+def test_every_page_says_bars_95_percent(lab: Visit) -> None:
+    """Every page says that its bars are 95 percent."""
     page = lab.page
     title = "plot => plot.layout.yaxis.title.text"
     assert "95 %" in page.locator("#figure-history .plot").evaluate(title)
@@ -104,7 +107,8 @@ def test_every_page_says_that_its_bars_are_95_percent(lab: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(visitor: Visit, server: Server) -> None:
+def test_many_sensors_pointed_gets_line(visitor: Visit, server: Server) -> None:
+    """Of many sensors the one that is pointed at gets its line."""
     made = Made(sensors=14, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6)
     sent(server, to_dict(campaign(made, table())), "many")
     page = visitor.page
@@ -120,9 +124,8 @@ def test_of_many_sensors_the_one_that_is_pointed_at_gets_its_line(visitor: Visit
 
 
 @pytest.mark.soak
-def test_a_map_of_many_sensors_names_as_many_as_have_room_and_dims_those_alike_in_the_dark(
-    visitor: Visit, server: Server
-) -> None:
+def test_map_many_sensors_names_many_room_dims(visitor: Visit, server: Server) -> None:
+    """A map of many sensors names as many as have room and dims those alike in the dark."""
     document = to_dict(campaign(Made(sensors=40, spheres_mm=(4.0,), preloads_n=(1.0, 2.0), lines=6), table()))
     for number, sensor in enumerate(document["skin"]["sensors"]):  # in two rows
         sensor["x_mm"], sensor["y_mm"] = 8.0 * (number % 20), 8.0 * (number // 20)

@@ -53,7 +53,8 @@ def compared(visitor: Visit, skin: str, width: int, figures: int) -> Page:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_a_skin_before_and_after_and_the_sensor_that_changed(visitor: Visit, server: Server, width: int) -> None:
+def test_skin_before_after_sensor_changed(visitor: Visit, server: Server, width: int) -> None:
+    """A skin before and after and the sensor that changed."""
     skin = f"aged{width}"
     before = sent(server, to_dict(campaign(BEFORE, table())), skin)
     second = sent(server, to_dict(weakened(campaign(BEFORE, table()), "s2", 0.7)), skin)
@@ -104,7 +105,8 @@ def test_nothing_to_compare_is_said(server: Server) -> None:
     assert server.http.get("/compare?first=c-none", headers=BROWSING).status_code == 404
 
 
-def test_first_is_the_one_recorded_first_however_late_it_arrives(server: Server) -> None:
+def test_first_recorded_first_however_late(server: Server) -> None:
+    """First is the one recorded first however late it arrives."""
     ids = {}
     for year in (2020, 2017):
         made = campaign(BEFORE, table())
@@ -115,7 +117,9 @@ def test_first_is_the_one_recorded_first_however_late_it_arrives(server: Server)
     assert chosen == [ids[2017], ids[2020]]
 
 
-def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_elsewhere_are_named(server: Server) -> None:
+def test_without_choice_last_two_skin_compared(server: Server) -> None:
+    """Without a choice the last two of one skin are compared and sensors elsewhere are named."""
+
     def of_year(year: int, skin: str, shift_mm: float = 0.0) -> str:
         made = campaign(replace(BEFORE, sensors=2), table())
         dated = tuple(replace(one, recorded_at=f"{year}-05-03T09:00:00Z") for one in made.recordings)
@@ -139,7 +143,8 @@ def test_without_a_choice_the_last_two_of_one_skin_are_compared_and_sensors_else
     assert re.sub(r"<[^>]+>|&nbsp;", "", said) == "s1 by 6.00mm"
 
 
-def test_two_skins_without_a_sensor_in_common_say_so_and_how_sensors_are_matched(server: Server) -> None:
+def test_two_skins_without_sensor_common_say(server: Server) -> None:
+    """Two skins without a sensor in common say so and how sensors are matched."""
     first = store_server.campaign("left", sensors=2, lines=3)
     second = store_server.campaign("right", sensors=9, lines=3)
     for one in [*second["skin"]["sensors"], *second["recordings"]]:
@@ -155,7 +160,8 @@ def test_two_skins_without_a_sensor_in_common_say_so_and_how_sensors_are_matched
 
 
 @pytest.mark.soak
-def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_pages(server: Server) -> None:
+def test_campaigns_offered_compared_pages(server: Server) -> None:
+    """Of more campaigns than are offered the others are compared from their pages."""
     many = [store_server.campaign(f"day {number}", sensors=1, lines=3) for number in range(202)]
     for number, document in enumerate(many):
         (recorded, _) = document["recordings"]
@@ -172,7 +178,8 @@ def test_of_more_campaigns_than_are_offered_the_others_are_compared_from_their_p
     assert re.findall(r'value="([^"]*)" selected', chosen) == [second, kept[-1]["id"]]
 
 
-def test_sensors_without_d33_leave_nothing_to_draw() -> None:
+def test_sensors_without_d33_leave_nothing_draw() -> None:
+    """Sensors without d33 leave nothing to draw."""
     nothing = dict.fromkeys(("d33_pc_per_n", "d33_uncertainty_pc_per_n"))
     rows = [{"sensor": "s0", "first_pc_per_n": None, "second_pc_per_n": None}]
     assert drawn_maps([], [{"sensors": [{"sensor": "s0", **nothing}]}] * 2, rows) == []
@@ -184,7 +191,8 @@ def one_sensor(number: int) -> dict[str, object]:
     return to_dict(replace(made, name=f"single {number}", recordings=undated))
 
 
-def test_only_what_has_frfs_is_offered_and_none_with_itself(server: Server) -> None:
+def test_frfs_offered_none_itself(server: Server) -> None:
+    """Only what has frfs is offered and none with itself."""
     first = sent(server, one_sensor(1), "mixed")
     sent(server, block("a block", recorded_at="2031-01-01T00:00:00Z"), "mixed")
     text = server.http.get("/compare?skin=mixed", headers=BROWSING).text
@@ -208,7 +216,8 @@ def pressed(name: str, moduli_mpa: Sequence[float], year: int) -> dict[str, obje
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(visitor: Visit, server: Server, width: int) -> None:
+def test_curves_two_campaigns_difference_moduli(visitor: Visit, server: Server, width: int) -> None:
+    """Curves of two campaigns and the difference of their moduli."""
     skin = f"pressed{width}"
     ids = [sent(server, pressed("before", (2.0, 2.02, 1.98), 2030), skin)]
     ids.append(sent(server, pressed("after", (1.5, 1.52, 1.48), 2031), skin))
@@ -232,7 +241,8 @@ def test_curves_of_two_campaigns_and_the_difference_of_their_moduli(visitor: Vis
     assert float(rows[3]["youngs_modulus_mpa"]) == pytest.approx(1.5, rel=1e-6)
 
 
-def test_single_curves_have_a_difference_without_an_interval(server: Server) -> None:
+def test_single_curves_difference(server: Server) -> None:
+    """Single curves have a difference without an interval."""
     for name, modulus, year in (("soft", 2.0, 2030), ("hard", 3.0, 2031)):
         sent(server, pressed(name, [modulus], year), "single")
     text = server.http.get("/compare?skin=single", headers=BROWSING).text
@@ -244,7 +254,8 @@ def test_single_curves_have_a_difference_without_an_interval(server: Server) -> 
     assert (cells[0], cells[2]) == ("–", "–")
 
 
-def test_kinds_of_which_there_are_campaigns_are_offered(server: Server) -> None:
+def test_kinds_campaigns_offered(server: Server) -> None:
+    """Kinds of which there are campaigns are offered."""
     sent(server, one_sensor(6), "kinds")
     first = sent(server, block("alone", recorded_at="2031-01-01T00:00:00Z"), "kinds")
     text = server.http.get("/compare?skin=kinds", headers=BROWSING).text
@@ -257,7 +268,8 @@ def test_kinds_of_which_there_are_campaigns_are_offered(server: Server) -> None:
     assert server.http.get("/compare?kind=tension", headers=BROWSING).status_code == 422
 
 
-def test_a_map_is_grey_where_that_of_its_campaign_is(server: Server) -> None:
+def test_map_grey_campaign(server: Server) -> None:
+    """A map is grey where that of its campaign is."""
     ids = [sent(server, to_dict(campaign(BEFORE, table())) | {"name": f"alike {number}"}, "alike") for number in (1, 2)]
     own = server.http.get(f"/campaigns/{ids[0]}", headers=BROWSING).text
     beside = server.http.get("/compare?skin=alike", headers=BROWSING).text
@@ -267,7 +279,8 @@ def test_a_map_is_grey_where_that_of_its_campaign_is(server: Server) -> None:
     assert [told[0] in caption for caption in captions] == [True, True, False]
 
 
-def test_a_discarded_campaign_is_not_counted_at_the_start(server: Server) -> None:
+def test_discarded_campaign_not_counted_start(server: Server) -> None:
+    """A discarded campaign is not counted at the start."""
     kept = [sent(server, one_sensor(number), "counted") for number in (2, 3)]
     reason = {"reason": "a mere trial"}
     for one, count in zip(kept, (1, 0), strict=True):
@@ -277,7 +290,8 @@ def test_a_discarded_campaign_is_not_counted_at_the_start(server: Server) -> Non
     assert "none in use" in start
 
 
-def test_the_start_tells_a_time_of_arrival_from_one_of_recording(server: Server) -> None:
+def test_start_tells_time_arrival_recording(server: Server) -> None:
+    """The start tells a time of arrival from one of recording."""
     sent(server, one_sensor(4), "arrived")
     sent(server, block("pressed", recorded_at="2021-01-01T00:00:00Z"), "recorded")
     assert '<span class="quiet">received <time' in server.http.get("/?find=arrived", headers=BROWSING).text

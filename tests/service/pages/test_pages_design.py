@@ -24,7 +24,8 @@ def fits_and_is_accessible(visitor: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_a_design_is_pinned_and_the_other_one_moves_beside_it(visitor: Visit) -> None:
+def test_design_pinned_moves_beside(visitor: Visit) -> None:
+    """A design is pinned and the other one moves beside it."""
     page = visitor.page
     visitor.go("/design")
     visitor.drawn(2)
@@ -75,7 +76,8 @@ def test_a_pinned_design_that_cannot_be_is_told(server: Server) -> None:
 
 
 @pytest.mark.soak
-def test_a_material_gives_its_number_and_leaves_the_others(visitor: Visit) -> None:
+def test_material_gives_number_leaves(visitor: Visit) -> None:
+    """A material gives its number and leaves the others."""
     page = visitor.page
     visitor.go("/design?thickness_mm=3")
     page.get_by_text("Materials, with their sources").press("Enter")
@@ -102,7 +104,8 @@ def test_an_unknown_material_is_refused(server: Server) -> None:
     assert "material" in answer.text
 
 
-def test_what_is_asked_is_searched_and_what_is_offered_leads_to_its_design(visitor: Visit) -> None:
+def test_asked_searched_offered_leads_design(visitor: Visit) -> None:
+    """What is asked is searched and what is offered leads to its design."""
     page = visitor.page
     visitor.go("/design")
     page.get_by_role("link", name="which skins resolve what you ask").press("Enter")
@@ -136,9 +139,8 @@ def test_where_no_skin_does_the_limit_is_named(visitor: Visit) -> None:
 
 
 @pytest.mark.parametrize(("pitches", "ends"), [((0.8, 0.95), (0.8, 0.95)), ((0.9, 0.901), (0.95 * 0.901, 0.901))])
-def test_colours_of_the_map_span_the_pitches_that_are_shown(
-    pitches: tuple[float, float], ends: tuple[float, float]
-) -> None:
+def test_colours_map_span_pitches_shown(pitches: tuple[float, float], ends: tuple[float, float]) -> None:
+    """Colours of the map span the pitches that are shown."""
     pitch = np.array([[*pitches, np.nan, 5.0]])
     figure = design_region(np.ones(4), np.ones(1), pitch, pitch, np.array([[True, True, False, False]]), [])
     assert (figure.data[2].zmin, figure.data[2].zmax) == pytest.approx(ends)

@@ -51,9 +51,8 @@ def test_a_diagnosis_is_watched_read_and_adopted(visitor: Visit, server: Server)
     assert page.get_by_role("button", name="Adopt this model").count() == 0
 
 
-def test_on_paper_there_is_the_report_and_nothing_to_press_and_the_saved_file_needs_nothing_else(
-    visitor: Visit, place: str, downloads: Path
-) -> None:
+def test_paper_report_nothing_press_saved_file(visitor: Visit, place: str, downloads: Path) -> None:
+    """On paper there is the report and nothing to press and the saved file needs nothing else."""
     page = visitor.page
     visitor.go(place)
     visitor.drawn(4)
@@ -77,7 +76,8 @@ def test_on_paper_there_is_the_report_and_nothing_to_press_and_the_saved_file_ne
     visitor.wrong.clear()  # the file itself is not of the server
 
 
-def test_a_figure_s_numbers_are_those_of_the_report(server: Server, place: str) -> None:
+def test_figure_s_numbers_report(server: Server, place: str) -> None:
+    """A figure s numbers are those of the report."""
     tables = {
         name: list(csv.DictReader(server.http.get(f"{place}/{name}.csv").text.splitlines()))
         for name in ("where", "before_after", "explanations", "parameters")
@@ -133,9 +133,8 @@ def test_a_curve_is_chosen_with_keys(visitor: Visit, server: Server) -> None:
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_the_models_are_laid_over_one_frf_after_another_with_keys(
-    visitor: Visit, server: Server, place: str, width: int
-) -> None:
+def test_models_laid_over_frf_after_keys(visitor: Visit, server: Server, place: str, width: int) -> None:
+    """The models are laid over one frf after another with keys."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
     visitor.go(place)
@@ -167,7 +166,8 @@ def test_the_models_are_laid_over_one_frf_after_another_with_keys(
     assert on.is_disabled()
 
 
-def test_one_that_waits_is_cancelled_and_asked_for_again(visitor: Visit, server: Server) -> None:
+def test_waits_cancelled_asked(visitor: Visit, server: Server) -> None:
+    """One that waits is cancelled and asked for again."""
     page = visitor.page
     visitor.go(f"/diagnoses/{asked(server, sent(server, resonant('waits'), 'waits'))}")
     assert "waits for its turn" in page.get_by_role("status").inner_text()
@@ -180,7 +180,8 @@ def test_one_that_waits_is_cancelled_and_asked_for_again(visitor: Visit, server:
     page.get_by_text("It was cancelled").wait_for()
 
 
-def test_a_law_that_no_expression_says_is_refused_in_one_sentence(server: Server) -> None:
+def test_law_no_expression_says_refused_sentence(server: Server) -> None:
+    """A law that no expression says is refused in one sentence."""
     free = Made(deepcopy(made().report), made().figures)
     law = {"acts_on": "thickness", "axis": "sensor", "form": "step", "expression": "h = h0·(1 + 0.2·[sensor = s1])"}
     seen = {"parameters": [], "probability": 1.0, "rivals": [], "range": {"sensor": ["s1", "s2"]}}
@@ -212,7 +213,8 @@ def test_a_report_without_its_figures_says_so(server: Server) -> None:
     assert server.http.get(f"{place}/parameters.csv").status_code == 200
 
 
-def test_an_imported_report_of_odd_shape_is_said_to_be_one(server: Server) -> None:
+def test_imported_report_odd_shape_said(server: Server) -> None:
+    """An imported report of odd shape is said to be one."""
     place = keep(server, "odd", Made({**made().report, "location": None}, {}))
     for path in (place, f"{place}/report.html"):
         answer = server.http.get(path, headers=BROWSING)
@@ -220,7 +222,8 @@ def test_an_imported_report_of_odd_shape_is_said_to_be_one(server: Server) -> No
         assert "lacks what a page shows" in answer.text
 
 
-def test_what_changes_something_needs_the_session_s_own_form(server: Server) -> None:
+def test_changes_something_needs_session_s_form(server: Server) -> None:
+    """What changes something needs the session s own form."""
     diagnosis_id = keep(server, "forms", made()).rpartition("/")[2]
     campaign_id = server.http.get(f"/v1/diagnoses/{diagnosis_id}").json()["campaign_id"]
     for path in (
@@ -236,7 +239,8 @@ def test_what_changes_something_needs_the_session_s_own_form(server: Server) -> 
     assert server.http.get("/v1/skins/forms/model").status_code == 404
 
 
-def test_who_may_read_only_sees_no_button_and_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
+def test_read_sees_no_button_changes_nothing(locked: tuple[Server, dict[str, str]]) -> None:
+    """Who may read only sees no button and changes nothing."""
     server, keys = locked
     diagnosis_id = asked(server, campaign_id := sent(server, resonant("locked"), "locked"))
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:

@@ -17,7 +17,8 @@ _OF_PLOT = "document.querySelector('#figure-frf-of-sensor .plot').data"
 
 @pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, WIDTHS))
-def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(visitor: Visit, server: Server, width: int) -> None:
+def test_click_sensor_leads_frfs_table_history(visitor: Visit, server: Server, width: int) -> None:
+    """A click on a sensor leads to its frfs table and history."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
     place = keep(server, f"sensors{width}", made())
@@ -53,7 +54,8 @@ def test_a_click_on_a_sensor_leads_to_its_frfs_table_and_history(visitor: Visit,
     assert not page.locator("#array").is_visible()
 
 
-def test_figures_of_older_versions_tell_the_recordings_by_name(server: Server) -> None:
+def test_figures_older_versions_tell_recordings(server: Server) -> None:
+    """Figures of older versions tell the recordings by name."""
     figures = dict(made().figures)
     older = orjson.loads(figures["frf"])
     for name in ("indenters_mm", "preloads_n", "left_percent"):

@@ -43,7 +43,8 @@ def calm(browser: Browser, server: Server) -> Iterator[Visit]:
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_section_and_base_are_what_the_interface_serves(visitor: Visit, width: int) -> None:
+def test_section_base_interface_serves(visitor: Visit, width: int) -> None:
+    """Section and base are what the interface serves."""
     visitor.page.set_viewport_size({"width": width, "height": 844})
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)
@@ -105,7 +106,8 @@ def test_the_slider_moves_the_load_by_keys(visitor: Visit, width: int) -> None:
 
 
 @pytest.mark.soak
-def test_the_load_plays_to_its_end_and_pauses_by_key(visitor: Visit) -> None:
+def test_load_plays_end_pauses_key(visitor: Visit) -> None:
+    """The load plays to its end and pauses by key."""
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)
     button = visitor.page.get_by_role("button", name="Play")
@@ -128,7 +130,8 @@ def test_the_load_plays_to_its_end_and_pauses_by_key(visitor: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_frames_that_did_not_come_are_asked_for_again(visitor: Visit) -> None:
+def test_frames_not_come_asked(visitor: Visit) -> None:
+    """Frames that did not come are asked for again."""
     visitor.go(f"/field?{QUERY}")
     visitor.drawn(2)
     visitor.page.route("**/field/frames?*", lambda route: route.fulfill(status=503, body="busy"), times=2)
@@ -144,7 +147,8 @@ def test_frames_that_did_not_come_are_asked_for_again(visitor: Visit) -> None:
     visitor.wrong.clear()
 
 
-def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
+def test_nothing_plays_asks_less_motion(calm: Visit) -> None:
+    """Nothing plays for who asks for less motion."""
     calm.go(f"/field?{QUERY}")
     calm.drawn(2)
     assert calm.page.get_by_role("button", name="Play").count() == 0
@@ -154,7 +158,8 @@ def test_nothing_plays_for_who_asks_for_less_motion(calm: Visit) -> None:
     calm.require_accessible()
 
 
-def test_the_request_that_does_the_same_accepts_what_the_page_accepts(server: Server) -> None:
+def test_request_accepts_page_accepts(server: Server) -> None:
+    """The request that does the same accepts what the page accepts."""
     small = QUERY.replace("indenter_radius_mm=4", "indenter_radius_mm=0.007").replace(
         "preload_n=3", "preload_n=0.00001"
     )
@@ -178,7 +183,8 @@ def test_what_is_exact_and_what_is_not_is_said(server: Server) -> None:
     assert "finite strain is left out" in said
 
 
-def test_errors_stand_in_the_form_and_the_limit_is_named(visitor: Visit) -> None:
+def test_errors_stand_form_limit_named(visitor: Visit) -> None:
+    """Errors stand in the form and the limit is named."""
     visitor.go("/field?thickness_mm=0.0025")
     assert "thickness h [mm]" in visitor.page.get_by_role("alert").inner_text()
     assert visitor.page.get_by_label("thickness h").input_value() == "0.0025"
@@ -205,7 +211,8 @@ def test_design_leads_there_with_its_sliders(visitor: Visit) -> None:
 
 
 @pytest.mark.parametrize("width", first(1, WIDTHS[::-1]))
-def test_loads_show_the_base_and_lead_to_each_sphere(visitor: Visit, width: int) -> None:
+def test_loads_show_base_lead_sphere(visitor: Visit, width: int) -> None:
+    """Loads show the base and lead to each sphere."""
     visitor.page.set_viewport_size({"width": width, "height": 844})
     visitor.go("/loads?loads=0 0 4 1%0A%0A12 8 10 2")
     visitor.drawn(2)
@@ -228,7 +235,8 @@ def test_loads_show_the_base_and_lead_to_each_sphere(visitor: Visit, width: int)
 
 
 @pytest.mark.soak
-def test_shear_pulls_and_gets_colours_with_0_in_the_middle(visitor: Visit) -> None:
+def test_shear_pulls_gets_colours_0_middle(visitor: Visit) -> None:
+    """Shear pulls and gets colours with 0 in the middle."""
     visitor.go("/loads?loads=8 8 4 1 0.8 0")
     visitor.drawn(2)
     shown = trace(visitor, "base")
@@ -236,7 +244,8 @@ def test_shear_pulls_and_gets_colours_with_0_in_the_middle(visitor: Visit) -> No
     assert -min(map(min, shown["z"])) > 0.01 * shown["zmax"]
 
 
-def test_too_many_loads_are_not_drawn_on_the_base(visitor: Visit) -> None:
+def test_too_many_loads_not_drawn_base(visitor: Visit) -> None:
+    """Too many loads are not drawn on the base."""
     loads = "%0A".join(f"{8 * place} 0 4 0.1" for place in range(7))
     visitor.go(f"/loads?loads={loads}")
     visitor.drawn(1)

@@ -63,7 +63,8 @@ def test_a_mistyped_number_stays_in_its_form(visitor: Visit, kept: str) -> None:
     visitor.require_accessible()
 
 
-def test_a_change_that_is_refused_says_so_in_its_form(visitor: Visit, kept: str) -> None:
+def test_change_refused_says_form(visitor: Visit, kept: str) -> None:
+    """A change that is refused says so in its form."""
     page = visitor.page
     visitor.go(kept)
     page.get_by_text("Exclude a recording, or correct").click()
@@ -85,7 +86,8 @@ def test_a_change_that_is_refused_says_so_in_its_form(visitor: Visit, kept: str)
     refused(visitor)
 
 
-def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(visitor: Visit) -> None:
+def test_design_outside_table_says_limit_old(visitor: Visit) -> None:
+    """A design outside the table says which limit and what is old is grey."""
     page = visitor.page
     visitor.go("/design")
     visitor.drawn(2)
@@ -110,7 +112,8 @@ def test_a_design_outside_the_table_says_which_limit_and_what_is_old_is_grey(vis
 
 
 @pytest.mark.soak
-def test_a_second_upload_leaves_the_first_draft_and_the_form_lists_both(visitor: Visit) -> None:
+def test_second_upload_leaves_first_draft_form(visitor: Visit) -> None:
+    """A second upload leaves the first draft and the form lists both."""
     page = visitor.page
     for name in ("first", "second"):
         look_at(visitor, [file(f"{name}.json", as_json(campaign(f"draft {name}", sensors=1)))], skin="drafts")
@@ -137,7 +140,8 @@ def test_an_emptied_field_is_asked_for(visitor: Visit, path: str) -> None:
     assert page.locator(".error:visible").count() == 0
 
 
-def test_what_was_told_is_greyed_while_a_slider_is_empty(visitor: Visit) -> None:
+def test_told_greyed_slider_empty(visitor: Visit) -> None:
+    """What was told is greyed while a slider is empty."""
     visitor.go("/design")
     visitor.page.locator("#thickness_mm").fill("")
     visitor.page.get_by_text("fill it in").wait_for()

@@ -11,7 +11,8 @@ from tests.support.repository import ROOT
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_the_glossary_holds_every_term_and_is_filtered(visitor: Visit, width: int) -> None:
+def test_glossary_holds_every_term_filtered(visitor: Visit, width: int) -> None:
+    """The glossary holds every term and is filtered."""
     written = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     terms = [term for term in re.findall(r"^\| ([^|]+?) \|", written, flags=re.MULTILINE) if term != "term"]
     page = visitor.page

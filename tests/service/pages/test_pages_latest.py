@@ -45,7 +45,8 @@ def test_campaigns_are_in_the_order_of_recording(visitor: Visit) -> None:
 
 
 @pytest.mark.usefixtures("aged")
-def test_a_block_leaves_the_skin_its_geometry_and_its_map(visitor: Visit) -> None:
+def test_block_leaves_skin_geometry_map(visitor: Visit) -> None:
+    """A block leaves the skin its geometry and its map."""
     visitor.go(f"/skins/{SKIN}")
     visitor.drawn(2)
     facts = visitor.page.locator(".facts").inner_text()
@@ -60,7 +61,8 @@ def test_a_block_leaves_the_skin_its_geometry_and_its_map(visitor: Visit) -> Non
     assert visitor.page.get_by_role("alert").count() == 0
 
 
-def test_a_campaign_of_one_sensor_leaves_the_others_on_the_map(server: Server, visitor: Visit) -> None:
+def test_campaign_sensor_leaves_map(server: Server, visitor: Visit) -> None:
+    """A campaign of one sensor leaves the others on the map."""
     of_one = recorded(campaign("in October", sensors=1), "2026-10-01")
     for document in (recorded(campaign("in May", sensors=3), "2026-05-03"), of_one):
         server.http.post("/v1/campaigns?skin=parts", json=document).raise_for_status()
@@ -100,7 +102,8 @@ def test_older_campaigns_are_on_the_pages_behind(server: Server, visitor: Visit)
     assert visitor.page.get_by_label("Colour by").input_value() == "trend"
 
 
-def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(server: Server) -> None:
+def test_skin_last_campaign_not_diagnosed_shows(server: Server) -> None:
+    """A skin whose last campaign is not diagnosed shows the diagnosis before."""
     earlier, last = (resonant(name) for name in ("May", "September"))
     diagnosed(server, earlier, report(), skin="half")
     assert "not diagnosed" not in said(server, "/?find=half", "half")
@@ -110,8 +113,11 @@ def test_a_skin_whose_last_campaign_is_not_diagnosed_shows_the_diagnosis_before(
     assert "of May; the last campaign is not diagnosed" in row
 
 
-def test_skins_are_in_the_order_of_recording_from_page_to_page(server: Server) -> None:
-    """Whatever the order they arrived in; a campaign over several days says so."""
+def test_skins_order_recording_page_page(server: Server) -> None:
+    """Skins are in the order of recording from page to page.
+
+    Whatever the order they arrived in; a campaign over several days says so.
+    """
     emptied(server)
     for number in range(30):
         day = f"2022-{1 + 7 * number % 30 // 3:02d}-{1 + 7 * number % 30 % 3:02d}"

@@ -39,7 +39,8 @@ def dark(browser: Browser, server: Server) -> Iterator[Visit]:
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_a_table_is_sorted_and_filtered_with_the_keyboard(visitor: Visit, place: str, width: int) -> None:
+def test_table_sorted_filtered_keyboard(visitor: Visit, place: str, width: int) -> None:
+    """A table is sorted and filtered with the keyboard."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
     visitor.go(place)
@@ -93,7 +94,8 @@ def test_a_workbook_holds_what_the_csv_does(visitor: Visit, place: str) -> None:
     assert isinstance(rows[1][0], str)
 
 
-def test_a_file_is_named_after_skin_and_campaign_however_odd_their_names(visitor: Visit, server: Server) -> None:
+def test_file_named_after_skin_campaign_however(visitor: Visit, server: Server) -> None:
+    """A file is named after skin and campaign however odd their names."""
     skin = 'Hand "ä" 9\u624b'
     sent = server.http.post("/v1/campaigns", params={"skin": skin}, json=campaign('of "May", 1/2')).raise_for_status()
     visitor.go(f"/campaigns/{sent.json()['id']}")
@@ -127,7 +129,8 @@ def test_no_text_of_a_workbook_is_a_formula() -> None:
     assert [cell.value for cell in sheet["B"]] == ["value", 2.5, None]
 
 
-def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
+def test_workbook_keeps_texts_read_like_numbers() -> None:
+    """A workbook keeps texts that read like numbers."""
     names = ["01", "1", "1_0", "1e3", "inf", "nan", "NaN", "'quoted"]
     made = workbook(
         {"sensor": names, "value": list(np.arange(8.0)), "preload_n": [1, float("nan"), *[np.float32(2)] * 6]}
@@ -138,7 +141,8 @@ def test_a_workbook_keeps_texts_that_read_like_numbers() -> None:
     assert [row[1:] for row in rows] == [(0, 1), (1, None), *((number, 2) for number in range(2, 8))]
 
 
-def test_pages_are_dark_where_the_reader_prefers_it(dark: Visit, place: str) -> None:
+def test_pages_dark_reader_prefers(dark: Visit, place: str) -> None:
+    """Pages are dark where the reader prefers it."""
     for path in first(
         3, ("/", "/loads?thickness_mm=x", place, "/upload", "/skins/many", "/design", "/field", "/d33", "/fleets")
     ):
@@ -164,7 +168,8 @@ def test_titles_of_panels_stay_apart_on_a_phone(visitor: Visit) -> None:
     assert all(above[1] < below[0] for above, below in pairwise(boxes))
 
 
-def test_a_single_curve_has_its_way_back_in_another_colour(server: Server) -> None:
+def test_single_curve_way_back_colour(server: Server) -> None:
+    """A single curve has its way back in another colour."""
     document = block("there and back")
     (recording,) = document["recordings"]
     for name in ("displacement_mm", "force_n"):

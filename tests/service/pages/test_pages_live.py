@@ -16,7 +16,8 @@ MARK = "window.sameDocument = true"
 STAYED = "window.sameDocument === true"
 
 
-def test_a_campaign_that_arrives_is_shown_without_a_reload(visitor: Visit, server: Server) -> None:
+def test_campaign_arrives_shown_without_reload(visitor: Visit, server: Server) -> None:
+    """A campaign that arrives is shown without a reload."""
     page = visitor.page
     sent(server, campaign("first", sensors=1), "live")
     visitor.go("/skins/live")
@@ -40,7 +41,8 @@ def test_a_campaign_that_arrives_is_shown_without_a_reload(visitor: Visit, serve
     visitor.require_accessible()
 
 
-def test_a_verdict_and_a_withdrawal_are_shown_without_a_reload(visitor: Visit, server: Server) -> None:
+def test_verdict_withdrawal_shown_without_reload(visitor: Visit, server: Server) -> None:
+    """A verdict and a withdrawal are shown without a reload."""
     page = visitor.page
     campaign_id = sent(server, campaign("only", sensors=1), "verdict")
     visitor.go("/skins/verdict")
@@ -60,7 +62,8 @@ def test_a_verdict_and_a_withdrawal_are_shown_without_a_reload(visitor: Visit, s
 
 
 @pytest.mark.soak
-def test_the_choice_of_a_sensor_stays_and_works_after_the_page_was_renewed(visitor: Visit, server: Server) -> None:
+def test_choice_sensor_stays_works_after_page(visitor: Visit, server: Server) -> None:
+    """The choice of a sensor stays and works after the page was renewed."""
     page = visitor.page
     sent(server, campaign("first", sensors=2), "chosen")
     visitor.go("/skins/chosen?sensor=s1")
@@ -76,7 +79,8 @@ def test_the_choice_of_a_sensor_stays_and_works_after_the_page_was_renewed(visit
     page.wait_for_url("**/skins/chosen?**sensor=s0**")
 
 
-def test_what_a_bench_saves_is_on_the_page_at_once(visitor: Visit, server: Server, tmp_path: Path) -> None:
+def test_bench_saves_page_once(visitor: Visit, server: Server, tmp_path: Path) -> None:
+    """What a bench saves is on the page at once."""
     page = visitor.page
     sent(server, campaign("yesterday", sensors=1), "bench")
     visitor.go("/skins/bench")

@@ -63,7 +63,8 @@ def test_what_is_wrong_is_said_on_the_page(server: Server, query: dict[str, str]
 
 
 @pytest.mark.slow
-def test_d33_by_the_adopted_model_stands_beside_the_paper_s(tmp_path: Path) -> None:
+def test_d33_adopted_model_stands_beside_paper_s(tmp_path: Path) -> None:
+    """D33 by the adopted model stands beside the paper s."""
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
         _, diagnosis_id = diagnosed(server, resonant("monday"), mistuned(), "palm-m")
         query = {"skin": "palm-m", "rows": "4 1 7.06 0.1\n8 2 7.45 0.1"}

@@ -21,9 +21,8 @@ from underskin.recordings.campaign import parse
 
 
 @pytest.mark.soak
-def test_a_law_is_kept_from_its_diagnosis_and_the_campaign_diagnosed_with_and_without_it(
-    visitor: Visit, server: Server
-) -> None:
+def test_law_kept_diagnosis_campaign_diagnosed(visitor: Visit, server: Server) -> None:
+    """A law is kept from its diagnosis and the campaign diagnosed with and without it."""
     page = visitor.page
     found = underskin.diagnose(parse(warmed()), table(), without=beside())
     _, diagnosis_id = diagnosed(server, warmed(), dict(found.document), "warmed")
@@ -64,7 +63,8 @@ def _require_accessible_at_both_widths(visitor: Visit) -> None:
         visitor.require_accessible()
 
 
-def test_each_law_has_its_picture_its_twins_and_where_it_was_found(server: Server, visitor: Visit) -> None:
+def test_law_picture_twins_found(server: Server, visitor: Visit) -> None:
+    """Each law has its picture its twins and where it was found."""
     campaign_id, diagnosis_id = diagnosed(server, resonant("swinging"), report(), skin="found")
     page = visitor.page
     visitor.go("/mechanisms")
@@ -91,9 +91,8 @@ def test_each_law_has_its_picture_its_twins_and_where_it_was_found(server: Serve
 
 
 @pytest.mark.parametrize("verdict", first(1, ["ambiguous", "unexplained"]))
-def test_a_mechanism_is_found_where_it_is_surely_present_whatever_the_verdict(
-    server: Server, visitor: Visit, verdict: str
-) -> None:
+def test_mechanism_found_surely_present_whatever(server: Server, visitor: Visit, verdict: str) -> None:
+    """A mechanism is found where it is surely present whatever the verdict."""
     counted = []
     for probability in (None, 0.9, 0.55):
         if probability is not None:
@@ -115,7 +114,8 @@ def _row_of(visitor: Visit, name: str) -> str:
     return visitor.page.get_by_role("row", name=name).locator("td").last.inner_text()
 
 
-def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(server: Server) -> None:
+def test_withdrawn_left_out_counts_found_nowhere(server: Server) -> None:
+    """What was withdrawn or left out counts as found nowhere."""
     campaign_id, _ = diagnosed(server, resonant("taken back"), report(), skin="back")
     rows = server.http.get("/mechanisms/contact_resonance/found.csv").text.splitlines()
     assert rows[0] == "diagnosis,campaign,skin,name,ended_at,verdict,probability"
@@ -126,7 +126,8 @@ def test_what_was_withdrawn_or_left_out_counts_as_found_nowhere(server: Server) 
     assert campaign_id not in left
 
 
-def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> None:
+def test_pictures_drawings_line_strength(server: Server) -> None:
+    """Pictures are drawings with a line for each strength."""
     answer = server.http.get("/mechanisms/adhesion/picture.svg")
     assert answer.headers["content-type"] == "image/svg+xml"
     tree = ElementTree.fromstring(answer.text)
@@ -142,7 +143,8 @@ def test_pictures_are_drawings_with_a_line_for_each_strength(server: Server) -> 
         assert server.http.get(f"/mechanisms/cheese/{path}").status_code == 404
 
 
-def test_the_lab_s_own_stand_beside_with_their_files(visitor: Visit, server: Server) -> None:
+def test_lab_s_stand_beside_files(visitor: Visit, server: Server) -> None:
+    """The lab s own stand beside with their files."""
     damped = (
         WARM.replace("warm_amplifier", "long_cable")
         .replace("acts_on: gain", "acts_on: frequency_response")

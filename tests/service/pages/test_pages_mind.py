@@ -11,7 +11,8 @@ from tests.support.store_server import Server, campaign
 
 
 @pytest.mark.soak
-def test_a_recording_is_excluded_and_the_campaign_withdrawn_by_clicks(visitor: Visit, server: Server) -> None:
+def test_recording_excluded_campaign_withdrawn(visitor: Visit, server: Server) -> None:
+    """A recording is excluded and the campaign withdrawn by clicks."""
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=mind", json=campaign("a loose cable")).json()
     before = server.http.get(f"/v1/campaigns/{kept['id']}/d33").json()["array"]["d33_pc_per_n"]
@@ -61,7 +62,8 @@ def test_a_key_tells_who_it_is_whatever_is_typed(locked: tuple[Server, dict[str,
 
 
 @pytest.mark.soak
-def test_a_recording_that_is_not_there_is_said_so(visitor: Visit, server: Server) -> None:
+def test_recording_not_said(visitor: Visit, server: Server) -> None:
+    """A recording that is not there is said so."""
     page = visitor.page
     kept = server.http.post("/v1/campaigns?skin=slip", json=campaign("a slip")).json()
     visitor.go(f"/campaigns/{kept['id']}")
@@ -99,7 +101,8 @@ def test_who_undoes_is_asked_without_keys(visitor: Visit, server: Server) -> Non
     assert server.http.get(f"/v1{place}").json()["excluded"] == 0
 
 
-def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(server: Server) -> None:
+def test_excluded_cannot_undone_said(server: Server) -> None:
+    """Where all is excluded and where that cannot be undone is said."""
     kept = server.http.post("/v1/campaigns?skin=bare", json=campaign("bare", sensors=1)).json()
     place = f"/campaigns/{kept['id']}"
 
@@ -122,7 +125,8 @@ def test_where_all_is_excluded_and_where_that_cannot_be_undone_is_said(server: S
 
 
 @pytest.mark.soak
-def test_an_excluded_recording_takes_the_model_out_of_force(visitor: Visit, server: Server) -> None:
+def test_excluded_recording_takes_model(visitor: Visit, server: Server) -> None:
+    """An excluded recording takes the model out of force."""
     page = visitor.page
     campaign_id, diagnosis_id = diagnosed(server, resonant("explained"), report(), "adopts")
     visitor.go(f"/diagnoses/{diagnosis_id}")
@@ -145,7 +149,8 @@ def test_an_excluded_recording_takes_the_model_out_of_force(visitor: Visit, serv
     assert page.get_by_role("button", name="Adopt this model").count() == 0
 
 
-def test_an_ambiguous_diagnosis_names_its_rivals_and_what_would_settle_it(visitor: Visit, server: Server) -> None:
+def test_ambiguous_diagnosis_names_rivals_settle(visitor: Visit, server: Server) -> None:
+    """An ambiguous diagnosis names its rivals and what would settle it."""
     page = visitor.page
     rivals = [
         {"mechanisms": ["timing_delay"], "probability": 0.41, "why_not": "the recordings hardly tell it apart"},

@@ -33,7 +33,8 @@ def declared(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_the_modulus_under_the_answer_is_the_first_to_quote(visitor: Visit, server: Server, width: int) -> None:
+def test_modulus_under_answer_first_quote(visitor: Visit, server: Server, width: int) -> None:
+    """The modulus under the answer is the first to quote."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
     skin = f"moduli{width}"
@@ -60,7 +61,8 @@ def test_the_modulus_under_the_answer_is_the_first_to_quote(visitor: Visit, serv
     visitor.require_accessible()
 
 
-def test_no_modulus_is_quoted_before_an_answer_is_settled(server: Server) -> None:
+def test_no_modulus_quoted_before_answer_settled(server: Server) -> None:
+    """No modulus is quoted before an answer is settled."""
     campaign_id, diagnosis_id = diagnosed(server, declared("open"), of_curves("ambiguous"), "open")
     bare = sent(server, declared("bare"), "bare")
     for one in (campaign_id, bare):
@@ -70,7 +72,8 @@ def test_no_modulus_is_quoted_before_an_answer_is_settled(server: Server) -> Non
     assert "Do not quote it yet" in page
 
 
-def test_a_modulus_of_recordings_that_are_no_longer_in_use_is_not_quoted(server: Server) -> None:
+def test_modulus_recordings_no_longer_use(server: Server) -> None:
+    """A modulus of recordings that are no longer in use is not quoted."""
     document = to_dict(pressed(1e5, [2.0, 3.0]))
     document = {**document, "name": "changed", "skin": {**document["skin"], "youngs_modulus_mpa": 2.5}}
     campaign_id, _ = diagnosed(server, document, of_curves("explained"), "changed")

@@ -11,7 +11,8 @@ SKIN = "my-first"
 
 
 @pytest.mark.soak
-def test_from_the_start_to_a_history_by_the_adopted_model(patient: Visit, diagnosing: Server) -> None:
+def test_start_history_adopted_model(patient: Visit, diagnosing: Server) -> None:
+    """From the start to a history by the adopted model."""
     page = patient.page
     patient.go("/")
     page.get_by_role("button", name="Load the example skin").click()

@@ -151,7 +151,8 @@ def test_a_view_says_which_d33_it_starts_from(
     assert "the skin declares none" not in again
 
 
-def test_what_nobody_declared_is_the_prototype_s_and_said(server: Server) -> None:
+def test_nobody_declared_prototype_s_said(server: Server) -> None:
+    """What nobody declared is the prototype s and said."""
     document = campaign("alone", id="alone", sensors=1)
     assert server.http.post("/v1/campaigns", json=document).status_code == 201
     text = server.http.get("/design?skin=alone", headers=BROWSING).text
@@ -195,7 +196,8 @@ def _base(server: Server, loads: str) -> str:
     return server.http.get(f"/loads/base.csv?loads={loads}").raise_for_status().text
 
 
-def test_a_load_that_no_sensor_feels_and_one_that_strains_the_layer_much_are_told(server: Server) -> None:
+def test_load_no_sensor_feels_strains_layer_much(server: Server) -> None:
+    """A load that no sensor feels and one that strains the layer much are told."""
     text = server.http.get("/loads?loads=0 0 4 1%0A%0A500 500 4 1", headers=BROWSING).text
     (told,) = re.findall(r"<b>Check load in line 3:</b> (.*?)</p>", text)
     assert re.fullmatch(r"it lies 673.2 mm from the nearest sensor and adds nothing: sensors feel .*", told)
@@ -260,7 +262,8 @@ def test_a_band_without_lines_is_refused_by_name(server: Server) -> None:
 
 
 @pytest.mark.slow
-def test_the_example_comes_back_once_all_of_it_was_withdrawn(tmp_path: Path) -> None:
+def test_example_comes_back_once_withdrawn(tmp_path: Path) -> None:
+    """The example comes back once all of it was withdrawn."""
     with (  # a server of its own: withdrawn campaigns stay
         running(Place(tmp_path)) as server,
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as anyone,

@@ -11,7 +11,8 @@ from underskin.findings.codes import FindingCode
 from underskin.recordings.campaign import to_dict
 
 
-def test_a_list_says_what_is_lacking_each_with_its_own_probability(server: Server) -> None:
+def test_list_says_lacking_probability(server: Server) -> None:
+    """A list says what is lacking each with its own probability."""
     both = [
         {**report()["mechanisms"][0], "name": name, "probability": probability}
         for name, probability in (("timing_delay", 0.98), ("contact_resonance", 0.841))
@@ -61,7 +62,8 @@ def test_no_finding_is_shown_by_its_code(visitor: Visit, server: Server) -> None
     assert not any("_" in words for words in shown)
 
 
-def test_what_is_not_settled_points_to_a_section_that_is_there(visitor: Visit, server: Server) -> None:
+def test_not_settled_points_section(visitor: Visit, server: Server) -> None:
+    """What is not settled points to a section that is there."""
     _, diagnosis_id = diagnosed(server, resonant("pointed"), report(), "pointed")
     visitor.go(f"/diagnoses/{diagnosis_id}")
     heading = visitor.page.get_by_role("heading", name="What the model lacks, and the values found")
@@ -72,7 +74,8 @@ def test_what_is_not_settled_points_to_a_section_that_is_there(visitor: Visit, s
     assert "but what would not show here would change it" in summary  # why, and not a list of what may be the reason
 
 
-def test_a_campaign_of_curves_says_what_d33_needs(server: Server) -> None:
+def test_campaign_curves_says_d33_needs(server: Server) -> None:
+    """A campaign of curves says what d33 needs."""
     campaign_id = sent(server, to_dict(pressed(1e5, [2.0])), "curves")
     page = said(server, f"/campaigns/{campaign_id}").partition("The same by request")[0]
     assert "it holds no frequency responses (FRFs), from which d33 is calculated" in page

@@ -70,9 +70,8 @@ def _ticked_off_as_they_arrive(visitor: Visit, server: Server, planned: list[dic
 
 
 @pytest.mark.soak
-def test_the_next_experiment_is_planned_within_the_reader_s_rig(
-    patient: Visit, diagnosing: Server, diagnosis_id: str
-) -> None:
+def test_next_experiment_planned_within_reader_s(patient: Visit, diagnosing: Server, diagnosis_id: str) -> None:
+    """The next experiment is planned within the reader s rig."""
     expected = underskin.diagnose(campaign(NARROW, table()), table(), limits=LIMITS, without=WITHOUT)["next_experiment"]
     page = patient.page
     patient.go(f"/diagnoses/{diagnosis_id}")
@@ -127,9 +126,8 @@ def test_limits_that_no_rig_has_are_refused(server: Server, kept_id: str, query:
     assert re.search(told, shown) is not None, shown
 
 
-def test_the_plan_of_a_report_is_taken_as_a_table_and_a_workbook(
-    visitor: Visit, server: Server, tmp_path: Path
-) -> None:
+def test_plan_report_taken_table_workbook(visitor: Visit, server: Server, tmp_path: Path) -> None:
+    """The plan of a report is taken as a table and a workbook."""
     first = {"sensor": "s1", "indenter_radius_mm": 4.0, "preload_n": 3.0, "position_mm": [0.0, 2.5], "repeats": 2}
     recordings = [first, {**first, "sensor": "=s2", "dwell_s": 60.0, "repeats": 1}]
     planned = {

@@ -85,7 +85,8 @@ def test_a_map_is_seen_computed_and_saved(visitor: Visit, server: Server) -> Non
         (b"mm,0,1\n" + b"0,1,1\n" * 200_000, "at most 1 MB"),
     ],
 )
-def test_what_is_wrong_with_a_map_is_said_beside_it(server: Server, content: bytes, told: str) -> None:
+def test_wrong_map_said_beside(server: Server, content: bytes, told: str) -> None:
+    """What is wrong with a map is said beside it."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
         form = {"form_token": token_of(somebody.get("/loads/map").text), "thickness_mm": "2.25", "map": SMALL}
         answer = somebody.post("/loads/map", data=form, files={"file": ("pressed.csv", content)})
@@ -102,9 +103,8 @@ def test_much_more_than_a_map_is_not_taken(server: Server) -> None:
     assert "exceeds 2.1 MB" in answer.text
 
 
-def test_a_map_needs_the_session_s_own_form_and_no_right_to_write(
-    server: Server, locked: tuple[Server, dict[str, str]]
-) -> None:
+def test_map_needs_session_s_form_no_right_write(server: Server, locked: tuple[Server, dict[str, str]]) -> None:
+    """A map needs the session s own form and no right to write."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody:
         assert somebody.post("/loads/map", files={"map": (None, SMALL)}).status_code == 403
     other, keys = locked

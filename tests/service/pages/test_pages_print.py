@@ -123,7 +123,8 @@ def place(server: Server, printed: Made) -> str:
 
 
 @pytest.mark.soak
-def test_the_summary_of_a_page_is_one_sheet_on_which_no_texts_overlap(visitor: Visit, place: str) -> None:
+def test_summary_page_sheet_no_texts_overlap(visitor: Visit, place: str) -> None:
+    """The summary of a page is one sheet on which no texts overlap."""
     page = visitor.page
     visitor.go(place)
     folded = page.locator("details.part")
@@ -162,7 +163,8 @@ def test_so_is_that_of_a_saved_file(visitor: Visit, server: Server, place: str, 
 
 
 @pytest.mark.parametrize("width", first(1, [390, 1180]))
-def test_a_folded_part_is_opened_with_keys_and_draws(visitor: Visit, server: Server, width: int) -> None:
+def test_folded_part_opened_keys_draws(visitor: Visit, server: Server, width: int) -> None:
+    """A folded part is opened with keys and draws."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 800})
     place = keep(server, f"folded{width}", made())

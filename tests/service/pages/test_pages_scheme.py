@@ -93,9 +93,8 @@ def addresses(server: Server) -> dict[str, str]:
         ],
     ),
 )
-def test_figures_are_dark_on_the_screen_and_light_on_paper(
-    dark: Visit, addresses: dict[str, str], path: str, figures: int
-) -> None:
+def test_figures_dark_screen_light_paper(dark: Visit, addresses: dict[str, str], path: str, figures: int) -> None:
+    """Figures are dark on the screen and light on paper."""
     dark.go(path.format(**addresses))
     dark.drawn(figures)
     require_dark(dark.page)
@@ -105,9 +104,8 @@ def test_figures_are_dark_on_the_screen_and_light_on_paper(
 
 
 @pytest.mark.soak
-def test_a_saved_figure_and_what_a_browser_prints_are_on_white(
-    dark: Visit, addresses: dict[str, str], downloads: Path
-) -> None:
+def test_saved_figure_browser_prints_white(dark: Visit, addresses: dict[str, str], downloads: Path) -> None:
+    """A saved figure and what a browser prints are on white."""
     page = dark.page
     dark.go(f"/campaigns/{addresses['campaign']}")
     dark.drawn(4)

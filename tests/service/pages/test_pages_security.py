@@ -20,7 +20,8 @@ def anyone(server: Server) -> Iterator[httpx.Client]:
         yield client
 
 
-def test_every_page_has_a_policy_that_lets_nothing_in(anyone: httpx.Client) -> None:
+def test_every_page_policy_lets_nothing(anyone: httpx.Client) -> None:
+    """Every page has a policy that lets nothing in."""
     for path in ("/", "/design", "/nothing"):
         policy = anyone.get(path).headers["content-security-policy"]
         assert policy.startswith("default-src 'none'; script-src 'self';")
@@ -29,7 +30,8 @@ def test_every_page_has_a_policy_that_lets_nothing_in(anyone: httpx.Client) -> N
         assert "unsafe-inline" not in policy.replace("style-src-attr 'unsafe-inline'", "")
 
 
-def test_behind_tls_the_cookie_goes_through_tls_only(anyone: httpx.Client) -> None:
+def test_behind_tls_cookie_goes_through_tls(anyone: httpx.Client) -> None:
+    """Behind tls the cookie goes through tls only."""
     plain, secure = anyone.get("/"), anyone.get("/", headers={"X-Forwarded-Proto": "https", "Cookie": "other=1"})
     assert "; secure" not in plain.headers["set-cookie"].lower()
     assert "; secure" in secure.headers["set-cookie"].lower()
@@ -155,9 +157,8 @@ def test_a_session_ends_with_its_key(locked: tuple[Server, dict[str, str]]) -> N
         assert guest.get("/").status_code == 303
 
 
-def test_a_session_ends_with_its_time_which_nobody_can_move(
-    locked: tuple[Server, dict[str, str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_session_ends_time_nobody_move(locked: tuple[Server, dict[str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """A session ends with its time which nobody can move."""
     server, _ = locked
     (key,) = [one for one in KeyStore(server.place.folder).entries() if one.name == "the reader"]
     good = session.logged_in(key)

@@ -67,7 +67,8 @@ def looked_at(client: httpx.Client, content: bytes) -> str:
 
 
 @pytest.mark.soak
-def test_an_exported_skin_comes_in_where_somebody_says_so(visitor: Visit, server: Server, export: bytes) -> None:
+def test_exported_skin_comes_somebody_says(visitor: Visit, server: Server, export: bytes) -> None:
+    """An exported skin comes in where somebody says so."""
     page = visitor.page
     look_at(visitor, [file("palm.h5", export)])
     status = page.get_by_role("status")
@@ -145,9 +146,10 @@ def _other(_content: bytes) -> bytes:
         ],
     ),
 )
-def test_a_file_that_cannot_come_in_says_what_is_wrong_with_it(
+def test_file_cannot_come_says_wrong(
     sender: httpx.Client, empty: Server, export: bytes, spoil: Callable[[bytes], bytes], told: str
 ) -> None:
+    """A file that cannot come in says what is wrong with it."""
     shown = looked_at(sender, spoil(export))
     assert "It cannot be read" in shown
     assert told in shown
@@ -167,7 +169,8 @@ def test_an_exported_skin_comes_alone(sender: httpx.Client, export: bytes) -> No
 
 
 @pytest.mark.slow
-def test_bringing_a_skin_in_needs_the_session_s_own_form_and_is_done_once(empty: Server, export: bytes) -> None:
+def test_bringing_skin_needs_session_s_form_done(empty: Server, export: bytes) -> None:
+    """Bringing a skin in needs the session s own form and is done once."""
     server = empty
     with (
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as own,

@@ -8,7 +8,8 @@ from tests.support.store_server import Server
 from underskin.surrogate.sigma_table import SIGMA_TABLE, tables_folder
 
 
-def test_each_table_tells_its_range_its_errors_and_how_it_was_made(visitor: Visit, server: Server) -> None:
+def test_table_tells_range_errors_how_made(visitor: Visit, server: Server) -> None:
+    """Each table tells its range its errors and how it was made."""
     page = visitor.page
     visitor.go("/design")
     page.get_by_role("link", name="Tables").click()

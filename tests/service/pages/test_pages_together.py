@@ -16,7 +16,8 @@ def sent_to(server: Server, skin: str, *names: str) -> list[str]:
 
 
 @pytest.mark.soak
-def test_the_campaigns_of_a_skin_are_diagnosed_by_keyboard(visitor: Visit, server: Server) -> None:
+def test_campaigns_skin_diagnosed_keyboard(visitor: Visit, server: Server) -> None:
+    """The campaigns of a skin are diagnosed by keyboard."""
     page = visitor.page
     sent_to(server, "alone", "the only one")
     visitor.go("/skins/alone")
@@ -114,7 +115,8 @@ def test_a_fleet_is_chosen_without_a_script(browser: Browser, server: Server) ->
 
 
 @pytest.mark.soak
-def test_what_is_chosen_stays_while_the_list_is_searched(visitor: Visit, server: Server) -> None:
+def test_chosen_stays_list_searched(visitor: Visit, server: Server) -> None:
+    """What is chosen stays while the list is searched."""
     for name in ("ring", "disc", "plate"):
         sent_to(server, f"make-a-{name}", name)
     page = visitor.page
@@ -140,7 +142,8 @@ def test_what_is_chosen_stays_while_the_list_is_searched(visitor: Visit, server:
         assert page.get_by_role("link", name=f"make-a-{name}").count() == 1
 
 
-def test_a_filter_of_the_page_hides_no_skin_that_is_ticked(visitor: Visit, server: Server) -> None:
+def test_filter_page_hides_no_skin_ticked(visitor: Visit, server: Server) -> None:
+    """A filter of the page hides no skin that is ticked."""
     for number in range(12):
         sent_to(server, f"make-b-{number}", f"b{number}")
     page = visitor.page
@@ -160,7 +163,8 @@ def test_the_page_of_fleets_is_accessible(visitor: Visit, server: Server) -> Non
     assert "No skin is called so" in visitor.page.get_by_role("main").inner_text()
 
 
-def test_a_fleet_with_a_skin_that_has_nothing_to_diagnose_is_refused_in_the_form(server: Server) -> None:
+def test_fleet_skin_nothing_diagnose_refused(server: Server) -> None:
+    """A fleet with a skin that has nothing to diagnose is refused in the form."""
     sent_to(server, "bare-0", "a")
     (only,) = sent_to(server, "bare-1", "b")
     sent_to(server, "bare-2", "c")

@@ -22,7 +22,8 @@ def mistuned(**skin: Any) -> dict[str, Any]:
     return {**document, "name": "off", "skin": {**document["skin"], **off, **skin}}
 
 
-def test_the_page_s_interval_holds_a_d33_of_a_skin_within_its_tolerances(server: Server) -> None:
+def test_page_s_interval_holds_d33_skin(server: Server) -> None:
+    """The page s interval holds a d33 of a skin within its tolerances."""
     campaign_id = sent(server, mistuned(), "off")
     answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
     array, relative = answer["array"], answer["array_relative"]
@@ -34,7 +35,8 @@ def test_the_page_s_interval_holds_a_d33_of_a_skin_within_its_tolerances(server:
     assert "The interval includes what the declared thickness, sensor radius and modulus may be off by" in told
 
 
-def test_stated_tolerances_replace_the_usual_ones(server: Server) -> None:
+def test_stated_tolerances_replace_usual_ones(server: Server) -> None:
+    """Stated tolerances replace the usual ones."""
     exact = {"thickness_percent": 0, "sensor_radius_percent": 0, "youngs_modulus_percent": 0}
     campaign_id = sent(server, mistuned(tolerances=exact), "exact")
     answer = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
@@ -43,7 +45,8 @@ def test_stated_tolerances_replace_the_usual_ones(server: Server) -> None:
     assert server.http.get(f"/v1/campaigns/{campaign_id}/document").json()["skin"]["tolerances"] == exact
 
 
-def test_a_slip_of_a_curve_s_force_is_a_finding_of_its_upload(server: Server) -> None:
+def test_slip_curve_s_force_finding_upload(server: Server) -> None:
+    """A slip of a curve s force is a finding of its upload."""
     document = {**to_dict(pressed(1e5, [2.0])), "units_checked": False}
     document["recordings"][0]["force_n"] = [1e6 * force for force in document["recordings"][0]["force_n"]]
     answer = server.http.post("/v1/campaigns?skin=slip", json=document).json()

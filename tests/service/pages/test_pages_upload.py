@@ -14,7 +14,8 @@ GAIN = 7.4
 TEMPLATE = ROOT / "examples" / "formats" / "template.csv"
 
 
-def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Server) -> None:
+def test_bad_recording_explained_field_field(visitor: Visit, server: Server) -> None:
+    """A bad recording is explained field by field."""
     document = campaign("one bad", id="one-bad")
     document["recordings"][1] |= {"preload_n": -2.0, "sensor": "nowhere"}
     look_at(visitor, [file("one bad.json", as_json(document))])
@@ -30,7 +31,8 @@ def test_a_bad_recording_is_explained_field_by_field(visitor: Visit, server: Ser
 
 
 @pytest.mark.soak
-def test_a_rig_description_reads_a_recording_and_its_form_keeps_what_it_says(visitor: Visit, server: Server) -> None:
+def test_rig_description_reads_recording_form(visitor: Visit, server: Server) -> None:
+    """A rig description reads a recording and its form keeps what it says."""
     page = visitor.page
     look_at(visitor, [file("press.tdms", shaker_tdms(GAIN))], rig=SHAKER_RIG, skin="shaker")
     page.get_by_text("1 recording understood").wait_for()
@@ -118,7 +120,8 @@ def test_files_that_are_dropped_are_looked_at(visitor: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_files_of_one_day_become_one_campaign_or_one_each(visitor: Visit, server: Server) -> None:
+def test_files_day_become_campaign(visitor: Visit, server: Server) -> None:
+    """Files of one day become one campaign or one each."""
     page = visitor.page
     both = [file(f"{name}.json", as_json(campaign(name, id="day"))) for name in ("morning", "evening")]
     look_at(visitor, both)
@@ -136,7 +139,8 @@ def test_files_of_one_day_become_one_campaign_or_one_each(visitor: Visit, server
     assert len(campaigns_of(server, "day")) == 3
 
 
-def test_files_of_two_skins_are_not_joined_and_nothing_is_kept(visitor: Visit, server: Server) -> None:
+def test_files_two_skins_not_joined_nothing_kept(visitor: Visit, server: Server) -> None:
+    """Files of two skins are not joined and nothing is kept."""
     page = visitor.page
     thin, thick = campaign("thin"), campaign("thick")
     thick["skin"]["thickness_mm"] = 5.0

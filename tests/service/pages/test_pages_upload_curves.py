@@ -88,7 +88,8 @@ def client(server: Server) -> Any:
         yield opened
 
 
-def test_a_curve_is_drawn_before_anything_else_is_known(client: httpx.Client) -> None:
+def test_curve_drawn_before_anything_else_known(client: httpx.Client) -> None:
+    """A curve is drawn before anything else is known."""
     upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN}))
     assert "<b>No recording</b> understood yet" in upload.page
     depth, force = upload.curve
@@ -100,7 +101,8 @@ def test_a_curve_is_drawn_before_anything_else_is_known(client: httpx.Client) ->
     assert upload.page.index('id="figure-curves"') < upload.page.index('id="mapping"')
 
 
-def test_a_heading_s_unit_is_overridden_in_the_form(client: httpx.Client) -> None:
+def test_heading_s_unit_overridden_form(client: httpx.Client) -> None:
+    """A heading s unit is overridden in the form."""
     upload = Upload(client, table({"Depth (nm)": DEPTH_UM, "Force (uN)": FORCE_UN}))
     assert upload.curve[0].max() == pytest.approx(1.5e-6)
     upload.say(**{"unit-0": "um"})
@@ -108,7 +110,8 @@ def test_a_heading_s_unit_is_overridden_in_the_form(client: httpx.Client) -> Non
     assert "is labelled 'nm'; the rig description says 'um'" in html.unescape(upload.page)
 
 
-def test_force_and_depth_come_from_a_deflection_in_the_form(client: httpx.Client) -> None:
+def test_force_depth_come_deflection_form(client: httpx.Client) -> None:
+    """Force and depth come from a deflection in the form."""
     raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
     stated = Upload(client, table(raw, "k (N/m)\t3"))
     assert stated.curve[1] == pytest.approx(1e-6 * FORCE_UN, rel=1e-5)
@@ -128,7 +131,8 @@ def test_force_and_depth_come_from_a_deflection_in_the_form(client: httpx.Client
     assert client.get(f"{upload.address}/rig.json").json() == before
 
 
-def test_curves_of_one_file_are_told_apart_in_the_form(client: httpx.Client) -> None:
+def test_curves_file_told_apart_form(client: httpx.Client) -> None:
+    """Curves of one file are told apart in the form."""
     one = table({"Depth (um)": DEPTH_UM, "Force (uN)": FORCE_UN})
     upload = Upload(client, one + "\n\n" + one.partition("eoh\n")[2])
     upload.say(curves="groups", indenter_radius_mm="0.0075", units_checked="yes")
@@ -154,7 +158,8 @@ def test_what_is_turned_is_shown_turned(client: httpx.Client) -> None:
     assert all(np.nanmin(decoded(trace["y"])) >= 0 for trace in course["data"])
 
 
-def test_a_force_that_falls_is_told_in_the_words_of_the_form(client: httpx.Client) -> None:
+def test_force_falls_told_words_form(client: httpx.Client) -> None:
+    """A force that falls is told in the words of the form."""
     upload = Upload(client, table({"Depth (um)": DEPTH_UM, "Force (uN)": -FORCE_UN}))
     upload.say(indenter_radius_mm="0.0075", units_checked="yes")
     told = "compression is positive here: say “automatic” as the sign for displacement and force"
@@ -163,7 +168,8 @@ def test_a_force_that_falls_is_told_in_the_words_of_the_form(client: httpx.Clien
     assert "<b>1</b> recording understood" in upload.page
 
 
-def test_a_formula_that_is_cleared_gives_way_to_the_guess(client: httpx.Client) -> None:
+def test_formula_cleared_gives_way_guess(client: httpx.Client) -> None:
+    """A formula that is cleared gives way to the guess."""
     raw = {"Piezo (um)": DEPTH_UM + DEFLECTION_UM, "Deflection (nm)": 1e3 * DEFLECTION_UM}
     upload = Upload(client, table(raw, "k (N/m)\t3"))
     formula = {"derived-name-0": "depth", "derived-is-0": "displacement_mm"}

@@ -15,8 +15,11 @@ def frf_shown(visitor: Visit) -> float:
     )
 
 
-def test_the_estimator_of_the_form_is_looked_with_and_kept(visitor: Visit, server: Server) -> None:
-    """Noise of 30 % in both channels: H2 is 1.09² times H1."""
+def test_estimator_form_looked_kept(visitor: Visit, server: Server) -> None:
+    """The estimator of the form is looked with and kept.
+
+    Noise of 30 % in both channels: H2 is 1.09² times H1.
+    """
     page, upload = visitor.page, file("shaken.json", as_json(shaken("shaken")))
     look_at(visitor, [upload])
     as_before = frf_shown(visitor)
@@ -32,7 +35,8 @@ def test_the_estimator_of_the_form_is_looked_with_and_kept(visitor: Visit, serve
     assert {recording["estimator"] for recording in recordings} == {"H2"}
 
 
-def test_the_form_of_a_skin_explains_the_estimators(visitor: Visit) -> None:
+def test_form_skin_explains_estimators(visitor: Visit) -> None:
+    """The form of a skin explains the estimators."""
     visitor.go("/upload?skin=palm")
     options = visitor.page.get_by_label("Estimator").locator("option").all_inner_texts()
     assert [option.split(":")[0] for option in options[1:]] == ["H1", "H2", "Hv"]

@@ -51,7 +51,8 @@ def test_alike_refusals_are_told_once(visitor: Visit) -> None:
     visitor.require_accessible()
 
 
-def test_alike_recordings_of_a_file_are_told_once(visitor: Visit) -> None:
+def test_alike_recordings_file_told_once(visitor: Visit) -> None:
+    """Alike recordings of a file are told once."""
     document = campaign("half", sensors=12, id="half")
     for number, recording in enumerate(document["recordings"]):
         if number % 2:
@@ -91,7 +92,8 @@ def test_the_mapping_fits_a_phone(visitor: Visit) -> None:
     assert all(one is not None and other is not None and one["y"] < other["y"] for one, other in pairwise(tops))
 
 
-def test_two_channels_for_one_field_are_pointed_out_and_refused(visitor: Visit) -> None:
+def test_two_channels_field_pointed_out_refused(visitor: Visit) -> None:
+    """Two channels for one field are pointed out and refused."""
     page = visitor.page
     look_at(visitor, [file("two forces.csv", TWO_FORCES)])
     assert "Force right [N] may be force as well as Force left [N]" in page.get_by_role("main").inner_text()
@@ -129,7 +131,8 @@ def test_two_channels_for_one_field_are_pointed_out_and_refused(visitor: Visit) 
     assert page.get_by_label("What Force right [N] is").input_value() == "force_n"
 
 
-def test_the_request_names_the_files_that_were_chosen(visitor: Visit) -> None:
+def test_request_names_files_chosen(visitor: Visit) -> None:
+    """The request names the files that were chosen."""
     page = visitor.page
     visitor.go("/upload")
     page.get_by_label("Files").set_input_files([file("it's 1.csv", TWO_FORCES), file("b.csv", TWO_FORCES)])
@@ -146,7 +149,8 @@ def test_the_request_names_the_files_that_were_chosen(visitor: Visit) -> None:
 
 @pytest.mark.soak
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore:unclosed file:ResourceWarning")
-def test_every_frf_of_a_universal_file_becomes_a_recording(visitor: Visit) -> None:
+def test_every_frf_universal_file_becomes(visitor: Visit) -> None:
+    """Every frf of a universal file becomes a recording."""
     page = visitor.page
     look_at(visitor, [file("array.uff", uff(0, frf_datasets(["s1", "s2", "s3"])))])
     assert page.get_by_label("What FRF is").input_value() == "frf_pc_per_n"

@@ -53,7 +53,8 @@ def binary(server: Server, skin: str) -> list[tuple[str, bytes]]:
     return [(f"{number}.h5", content) for number in range(FILES)]
 
 
-def test_files_that_are_read_while_their_upload_makes_room_are_read(small: Server) -> None:
+def test_files_read_upload_makes_room_read(small: Server) -> None:
+    """Files that are read while their upload makes room are read."""
     files = binary(small, "read")
     with browser(small) as client, ThreadPoolExecutor(1) as pool:
         sending = pool.submit(send, client, files)
@@ -66,7 +67,8 @@ def test_files_that_are_read_while_their_upload_makes_room_are_read(small: Serve
 
 
 @pytest.mark.soak
-def test_what_is_being_kept_while_its_upload_makes_room_is_kept(small: Server) -> None:
+def test_being_kept_upload_makes_room_kept(small: Server) -> None:
+    """What is being kept while its upload makes room is kept."""
     files = binary(small, "kept")
     with browser(small) as client, ThreadPoolExecutor(1) as pool:
         place = send(client, files).headers["location"]

@@ -26,7 +26,8 @@ def shaken() -> tuple[str, float]:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("width", first(1, [390, 1280]))
-def test_the_dynamic_force_of_noise_is_measured_and_not_asked_for(visitor: Visit, server: Server, width: int) -> None:
+def test_dynamic_force_noise_measured_not_asked(visitor: Visit, server: Server, width: int) -> None:
+    """The dynamic force of noise is measured and not asked for."""
     page = visitor.page
     page.set_viewport_size({"width": width, "height": 844})
     text, amplitude = shaken()

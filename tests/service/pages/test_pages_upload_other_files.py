@@ -44,7 +44,8 @@ def keep_curve(visitor: Visit, skin: str) -> None:
 
 
 @pytest.mark.soak
-def test_a_shaker_s_file_is_not_read_with_the_settings_of_a_force_microscope(visitor: Visit) -> None:
+def test_shaker_s_file_not_read_settings_force(visitor: Visit) -> None:
+    """A shaker s file is not read with the settings of a force microscope."""
     page = visitor.page
     keep_curve(visitor, "pdms-7")
     look_at(visitor, [file("shaker.tdms", shaker())], skin="pdms-7")
@@ -68,7 +69,8 @@ def test_a_shaker_s_file_is_not_read_with_the_settings_of_a_force_microscope(vis
 
 
 @pytest.mark.soak
-def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not_be_kept(visitor: Visit) -> None:
+def test_files_two_instruments_say_channels(visitor: Visit) -> None:
+    """Files of two instruments say which channels are whose and what will not be kept."""
     page = visitor.page
     curve = file("afm.txt", text_of_raw_curve(above="# both"))
     look_at(visitor, [file("shaker.tdms", shaker()), curve])
@@ -92,7 +94,8 @@ def test_files_of_two_instruments_say_which_channels_are_whose_and_what_will_not
 
 
 @pytest.mark.soak
-def test_a_rig_description_that_cannot_be_used_is_named_and_not_what_was_typed(visitor: Visit) -> None:
+def test_rig_description_cannot_used_named(visitor: Visit) -> None:
+    """A rig description that cannot be used is named and not what was typed."""
     page = visitor.page
     curve = file("afm.txt", text_of_raw_curve(above="# rig"))
     look_at(visitor, [curve], rig="schema: rig/1\nkind: indentation\n")
@@ -105,7 +108,8 @@ def test_a_rig_description_that_cannot_be_used_is_named_and_not_what_was_typed(v
     expect(alert).to_contain_text("What you typed is still in the form")
 
 
-def test_a_second_file_of_the_instrument_says_what_it_is_read_by_and_can_start_without(visitor: Visit) -> None:
+def test_second_file_instrument_says_read_start(visitor: Visit) -> None:
+    """A second file of the instrument says what it is read by and can start without."""
     page = visitor.page
     keep_curve(visitor, "pdms-8")
     look_at(visitor, [file("next.txt", text_of_raw_curve(above="# next"))], skin="pdms-8")
@@ -121,7 +125,8 @@ def test_a_second_file_of_the_instrument_says_what_it_is_read_by_and_can_start_w
 
 
 @pytest.mark.soak
-def test_a_typed_value_counts_for_more_than_a_property(visitor: Visit) -> None:
+def test_typed_value_counts_property(visitor: Visit) -> None:
+    """A typed value counts for more than a property."""
     page = visitor.page
     look_at(visitor, [file("typed.txt", text_of_raw_curve(above="# Tip radius [mm]: 5"))])
     source = page.get_by_label("sphere radius R: where it is")
@@ -140,7 +145,8 @@ def one_refused() -> dict[str, Any]:
     return document
 
 
-def test_why_recordings_are_refused_stands_above_what_is_kept_and_on_its_page(visitor: Visit) -> None:
+def test_why_recordings_refused_stands(visitor: Visit) -> None:
+    """Why recordings are refused stands above what is kept and on its page."""
     page = visitor.page
     page.set_viewport_size({"width": PHONE, "height": 844})
     good = file("good.json", as_json(campaign("whole", id="partly")))
@@ -167,9 +173,8 @@ def test_why_recordings_are_refused_stands_above_what_is_kept_and_on_its_page(vi
 
 
 @pytest.mark.parametrize(("first", "said"), [(60.0, "these will give no d33"), (None, "no d33 will come of this")])
-def test_that_a_preload_beyond_the_table_gives_no_d33_is_said_before(
-    server: Server, first: float | None, said: str
-) -> None:
+def test_preload_beyond_table_gives_no_d33_said(server: Server, first: float | None, said: str) -> None:
+    """That a preload beyond the table gives no d33 is said before."""
     document = campaign("heavy", sensors=2, id="heavy")
     for number, recording in enumerate(document["recordings"]):
         recording["preload_n"] = 60.0 if first is None or number == 0 else recording["preload_n"]
@@ -180,7 +185,8 @@ def test_that_a_preload_beyond_the_table_gives_no_d33_is_said_before(
 
 
 @pytest.mark.soak
-def test_a_kind_that_lacks_a_channel_is_said_in_the_form_s_words(visitor: Visit) -> None:
+def test_kind_lacks_channel_said_form_s_words(visitor: Visit) -> None:
+    """A kind that lacks a channel is said in the form s words."""
     page = visitor.page
     look_at(visitor, [file("shaker.tdms", shaker())])
     page.get_by_label("Kind of recording").select_option("indentation")

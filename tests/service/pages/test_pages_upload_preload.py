@@ -44,7 +44,8 @@ channels: {force_n: {channel: Force}, charge_pc: {channel: Charge}}
 """
 
 
-def test_a_stated_preload_is_held_against_the_force_of_each_file(server: Server) -> None:
+def test_stated_preload_held_against_force_file(server: Server) -> None:
+    """A stated preload is held against the force of each file."""
     with httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as client:
         form = {"form_token": token_of(client.get("/upload").text)}
         files = [("file", (f"{force}.tdms", shaken(force))) for force in (1.0, 2.0)]
@@ -55,7 +56,8 @@ def test_a_stated_preload_is_held_against_the_force_of_each_file(server: Server)
 
 
 @pytest.mark.soak
-def test_a_typed_preload_is_held_against_the_force_of_each_file(visitor: Visit) -> None:
+def test_typed_preload_held_against_force_file(visitor: Visit) -> None:
+    """A typed preload is held against the force of each file."""
     page = visitor.page
     # A piezo sensor goes to 0 from the preload that it was pressed by; a creeping one never holds still.
     piezo, creeping = file("piezo.tdms", shaken(2 * np.exp(-8 * TIME))), file("creeping.tdms", shaken(3 - 0.5 * TIME))

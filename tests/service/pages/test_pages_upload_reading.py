@@ -51,9 +51,8 @@ def counted(server: int) -> Iterator[list[int]]:
 @pytest.mark.parametrize(
     "paths", first(1, [["/0/frf.csv", "/0/traces.csv"], ["?file={}"], ["?first=1"], ["/0/frf.xlsx"]])
 )
-def test_two_files_at_a_time_are_read_to_be_looked_at(
-    server: Server, upload: tuple[httpx.Client, str], paths: list[str]
-) -> None:
+def test_two_files_time_read_looked(server: Server, upload: tuple[httpx.Client, str], paths: list[str]) -> None:
+    """Two files at a time are read to be looked at."""
     browser, address = upload
     wanted = [address + paths[number % len(paths)].format(number) for number in range(FILES)]
 

@@ -29,7 +29,8 @@ def posted(client: httpx.Client, name: str = "by hand") -> str:
     return answer.headers["location"]
 
 
-def test_kept_twice_is_kept_once_and_what_is_discarded_can_be_taken_back(sender: httpx.Client, server: Server) -> None:
+def test_kept_twice_kept_once_discarded_taken(sender: httpx.Client, server: Server) -> None:
+    """Kept twice is kept once and what is discarded can be taken back."""
     place = posted(sender, "twice")
     form = {"form_token": token_of(sender.get(place).text), "skin": "twice"}
     first, second = (sender.post(f"{place}/keep", data=form) for _ in range(2))
@@ -90,7 +91,8 @@ def test_who_may_read_only_uploads_nothing(locked: tuple[Server, dict[str, str]]
 
 
 @pytest.mark.slow
-def test_an_upload_beyond_the_limit_is_refused_on_a_page(tmp_path: Path) -> None:
+def test_upload_beyond_limit_refused_page(tmp_path: Path) -> None:
+    """An upload beyond the limit is refused on a page."""
     with (
         running(Place(tmp_path / "small"), UNDERSKIN_MAX_UPLOAD_MB="0.1") as server,
         httpx.Client(base_url=server.http.base_url, headers=BROWSING, timeout=60) as somebody,
@@ -108,7 +110,8 @@ def upload(folder: Path, size: int) -> Upload:
     return Upload(path, "a", "file", "", in_form=True)
 
 
-def test_the_shelf_holds_no_more_than_one_upload_may(tmp_path: Path) -> None:
+def test_shelf_holds_no_upload(tmp_path: Path) -> None:
+    """The shelf holds no more than one upload may."""
     arriving, shelf_folder = tmp_path / "arriving", tmp_path / "shelf"
     arriving.mkdir()
     shelf_folder.mkdir()

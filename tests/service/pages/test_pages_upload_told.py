@@ -41,7 +41,8 @@ def read_it(page: Page) -> None:
     page.wait_for_load_state()
 
 
-def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept(visitor: Visit) -> None:
+def test_campaign_declares_notes_shown(visitor: Visit) -> None:
+    """What a campaign declares and notes is shown before and after it is kept."""
     page = visitor.page
     document = campaign("hand of May", sensors=6, id="noted")
     for number, recording in enumerate(document["recordings"]):
@@ -66,7 +67,8 @@ def test_what_a_campaign_declares_and_notes_is_shown_before_and_after_it_is_kept
 
 
 @pytest.mark.soak
-def test_one_recording_of_an_array_tells_when_how_and_of_how_many_sensors(visitor: Visit, server: Server) -> None:
+def test_recording_array_tells_how_how_many(visitor: Visit, server: Server) -> None:
+    """One recording of an array tells when how and of how many sensors."""
     page = visitor.page
     dated = campaign("hand of April", sensors=6, id="hand")
     server.http.post("/v1/campaigns", json=dated).raise_for_status()

@@ -36,9 +36,8 @@ def test_loading_the_example_again_adds_nothing(newcomer: Visit) -> None:
     assert newcomer.page.get_by_role("row", name="example, ").count() == 4
 
 
-def test_a_skin_s_page_gives_its_figures_numbers_and_request_with_times_in_the_viewer_s_zone(
-    newcomer: Visit, downloads: Path
-) -> None:
+def test_skin_s_page_gives_figures_numbers(newcomer: Visit, downloads: Path) -> None:
+    """A skin s page gives its figures numbers and request with times in the viewer s zone."""
     page = newcomer.page
     newcomer.drawn(2)
     figure = page.locator("#figure-history")
@@ -76,7 +75,8 @@ def test_what_is_not_there_is_said_on_a_page(visitor: Visit) -> None:
     assert visitor.wrong.pop().startswith("Failed to load resource")  # the browser says so of every 404
 
 
-def test_a_slider_of_the_design_view_answers_at_once(newcomer: Visit) -> None:
+def test_slider_design_view_answers_once(newcomer: Visit) -> None:
+    """A slider of the design view answers at once."""
     page = newcomer.page
     page.get_by_role("link", name="Design view").click()
     newcomer.drawn(2)

@@ -20,7 +20,8 @@ from tests.support.store_server import Server, campaign
         ((7.0, 7.0, 7.0), "7.000 (95 %: 7.000 to 7.000)"),
     ],
 )
-def test_digits_of_a_value_and_its_interval_agree(numbers: tuple[float, float, float], shown: str) -> None:
+def test_digits_value_interval_agree(numbers: tuple[float, float, float], shown: str) -> None:
+    """Digits of a value and its interval agree."""
     assert re.sub("<[^>]*>", "", interval(*numbers)) == shown
     places = {len(part.partition(".")[2]) for part in re.findall(r"[\d.]+", shown.replace("95 %", ""))}
     ends = [re.sub("<[^>]*>", "", end_of(one, *numbers[1:])) for one in numbers]
@@ -28,7 +29,8 @@ def test_digits_of_a_value_and_its_interval_agree(numbers: tuple[float, float, f
     assert len(places) == 1
 
 
-def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(server: Server, visitor: Visit) -> None:
+def test_campaign_says_sensors_differ_averaged(server: Server, visitor: Visit) -> None:
+    """A campaign says what its sensors differ by and what was averaged."""
     page = visitor.page
     sent = server.http.post("/v1/campaigns?skin=words", json=campaign("alike", sensors=6, lines=60)).raise_for_status()
     place = f"/campaigns/{sent.json()['id']}"
@@ -47,7 +49,8 @@ def test_a_campaign_says_what_its_sensors_differ_by_and_what_was_averaged(server
     visitor.require_accessible()
 
 
-def test_a_date_without_a_time_is_that_day_whatever_the_zone(server: Server, visitor: Visit) -> None:
+def test_date_without_time_day_whatever_zone(server: Server, visitor: Visit) -> None:
+    """A date without a time is that day whatever the zone."""
     document = campaign("of a day", sensors=1)
     for recording in document["recordings"]:
         recording["recorded_at"] = "2026-05-03T00:00:00+00:00"
@@ -58,7 +61,8 @@ def test_a_date_without_a_time_is_that_day_whatever_the_zone(server: Server, vis
     assert ":" in page.locator("dt:text-is('received') + dd").inner_text()
 
 
-def test_a_length_that_has_no_sign_is_refused_without_words_on_magnitude(server: Server) -> None:
+def test_length_no_sign_refused_without_words(server: Server) -> None:
+    """A length that has no sign is refused without words on magnitude."""
     asked = {"thickness_mm": "2.5", "youngs_modulus_mpa": "16", "poisson_ratio": "0.5", "sensor_radius_mm": "1.5"}
     asked |= {"indenter_radius_mm": "0.001", "preload_n": "1"}
     told = server.http.get("/field", params=asked, headers=BROWSING).text
@@ -73,8 +77,11 @@ def test_what_was_not_given_has_no_unit() -> None:
 
 
 @pytest.mark.parametrize("second", [1.0, 0.7])
-def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(server: Server, second: float) -> None:
-    """Of a skin declared exactly: usual tolerances hide how the interval lies."""
+def test_array_s_interval_not_symmetric(server: Server, second: float) -> None:
+    """An array s interval that is not symmetric is explained where it stands.
+
+    Of a skin declared exactly: usual tolerances hide how the interval lies.
+    """
     skin, document = f"second sensor {second}", campaign("two sensors", sensors=2)
     exact = dict.fromkeys(("thickness_percent", "sensor_radius_percent", "youngs_modulus_percent"), 0)
     document["skin"] = {**document["skin"], "tolerances": exact}
@@ -91,7 +98,8 @@ def test_an_array_s_interval_that_is_not_symmetric_is_explained_where_it_stands(
         assert page.count("The interval reaches further up than down: a sphere that misses the middle") == lopsided
 
 
-def test_a_load_that_looks_wrong_is_named_by_its_line(visitor: Visit) -> None:
+def test_load_looks_wrong_named_line(visitor: Visit) -> None:
+    """A load that looks wrong is named by its line."""
     visitor.go("/loads?loads=10+8+4+1%0A14+16+10+60")
     assert "Check load in line 2:" in visitor.page.locator(".note[role=status]").first.inner_text()
     visitor.require_accessible()

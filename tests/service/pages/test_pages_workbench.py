@@ -74,7 +74,8 @@ def test_a_raw_curve_becomes_depth_and_force(sized: Visit, server: Server) -> No
 
 
 @pytest.mark.soak
-def test_a_wrong_term_is_named_beside_its_formula(sized: Visit) -> None:
+def test_wrong_term_named_beside_formula(sized: Visit) -> None:
+    """A wrong term is named beside its formula."""
     page = sized.page
     look_at(sized, [file("wrong.txt", text_of_raw_curve(above="# wrong"))])
     fill_in(page)
@@ -164,7 +165,8 @@ def test_everything_is_done_by_keyboard_alone(visitor: Visit) -> None:
 
 
 @pytest.mark.soak
-def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Server) -> None:
+def test_instrument_s_template_offered_next_time(sized: Visit, server: Server) -> None:
+    """An instrument s template is offered next time."""
     page = sized.page
     width = page.viewport_size["width"] if page.viewport_size else 0
     text = text_of_raw_curve().replace("Height (nm)", f"Z{width} (nm)")
@@ -200,7 +202,8 @@ def test_an_instrument_s_template_is_offered_next_time(sized: Visit, server: Ser
 
 
 @pytest.mark.soak
-def test_recordings_of_a_file_are_listed_page_by_page(sized: Visit) -> None:
+def test_recordings_file_listed_page_page(sized: Visit) -> None:
+    """Recordings of a file are listed page by page."""
     page = sized.page
     head = (
         "schema,campaign/1\nname,many\nskin.poisson_ratio,0.5\n\nid,kind,indenter_radius_mm,displacement_mm,force_n\n"

@@ -14,7 +14,8 @@ from tests.support.store_server import Place, campaign, running
 
 @pytest.mark.soak
 @pytest.mark.alone
-def test_many_workbooks_leave_threads_for_other_pages(tmp_path: Path) -> None:
+def test_many_workbooks_leave_threads_pages(tmp_path: Path) -> None:
+    """Many workbooks leave threads for other pages."""
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
         sent = server.http.post("/v1/campaigns", json=campaign("long", lines=1000)).raise_for_status().json()
         path = f"/campaigns/{sent['id']}/frf.xlsx"
@@ -35,7 +36,8 @@ def test_many_workbooks_leave_threads_for_other_pages(tmp_path: Path) -> None:
 @pytest.mark.soak
 @pytest.mark.alone
 @pytest.mark.parametrize("path", ["/design/search", "/design/search/region.csv"])
-def test_many_long_answers_leave_threads_for_other_pages(tmp_path: Path, path: str) -> None:
+def test_many_long_answers_leave_threads_pages(tmp_path: Path, path: str) -> None:
+    """Many long answers leave threads for other pages."""
     with running(Place(tmp_path), UNDERSKIN_DIAGNOSIS_WORKERS="0") as server, ExitStack() as stack:
         times = []
         for _ in range(6):

@@ -94,7 +94,8 @@ def test_all_that_is_wrong_is_told_at_once(
     assert {field: ids.split() for field, ids in marked.items()} == expected
 
 
-def test_what_is_wrong_with_a_pinned_design_marks_no_field(server: Server) -> None:
+def test_wrong_pinned_design_marks_no_field(server: Server) -> None:
+    """What is wrong with a pinned design marks no field."""
     page = server.http.get("/design", params={"pin": "pitch_mm=x&preload_n=-1"}, headers=BROWSING).text
     assert "A, pinned: pitch of the array [mm]: x – must be a number" in page
     assert "A, pinned: force F [N]: -1.0" in page
@@ -108,7 +109,8 @@ def test_many_wrong_lines_are_counted(server: Server) -> None:
 
 
 @pytest.mark.soak
-def test_a_wrong_map_and_a_wrong_skin_are_told_at_once(visitor: Visit) -> None:
+def test_wrong_map_wrong_skin_told_once(visitor: Visit) -> None:
+    """A wrong map and a wrong skin are told at once."""
     page = visitor.page
     visitor.go("/loads/map")
     page.get_by_label("thickness h").fill("zwei")
@@ -119,7 +121,8 @@ def test_a_wrong_map_and_a_wrong_skin_are_told_at_once(visitor: Visit) -> None:
     visitor.require_accessible()
 
 
-def test_a_wrong_field_is_described_by_its_sentence(visitor: Visit) -> None:
+def test_wrong_field_described_sentence(visitor: Visit) -> None:
+    """A wrong field is described by its sentence."""
     page = visitor.page
     visitor.go("/design?thickness_mm=zwei&preload_n=-1")
     for width in first(1, (390, 1280)):

@@ -59,7 +59,8 @@ def history(d33: list[list[float]], uncertainty: float) -> History:
         ([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], [True, False]),
     ],
 )
-def test_a_slope_is_coloured_where_its_trend_is_significant(d33: list[list[float]], coloured: list[bool]) -> None:
+def test_slope_coloured_trend_significant(d33: list[list[float]], coloured: list[bool]) -> None:
+    """A slope is coloured where its trend is significant."""
     places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(3)]
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
@@ -70,8 +71,11 @@ def test_a_slope_is_coloured_where_its_trend_is_significant(d33: list[list[float
     assert ("no sensor's differs from 0" in drawn.about) is not any(coloured)
 
 
-def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
-    """One of sixty dies; by Student's t of 1 degree of freedom nothing is told over the whole array."""
+def test_trend_too_few_campaigns_tell_many() -> None:
+    """A trend that too few campaigns tell of many sensors is named.
+
+    One of sixty dies; by Student's t of 1 degree of freedom nothing is told over the whole array.
+    """
     places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(60)]
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     answer = {"sensors": [{"sensor": place["id"], "flags": []} for place in places]}
@@ -81,7 +85,8 @@ def test_a_trend_that_too_few_campaigns_tell_of_many_sensors_is_named() -> None:
     assert "Taken alone, s37 would have a trend (95 %)" in about
 
 
-def test_sensors_without_a_trend_are_white_and_said_why() -> None:
+def test_sensors_without_trend_white_said_why() -> None:
+    """Sensors without a trend are white and said why."""
     places = [{"id": f"s{number}", "x_mm": 4.0 * number, "y_mm": 0.0} for number in range(5)]
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     of_skin = history([[20.0, 21.0, 22.001], [20.0, 20.1, 19.9]], 0.001)
@@ -99,9 +104,10 @@ def test_sensors_without_a_trend_are_white_and_said_why() -> None:
 
 
 @pytest.mark.parametrize("values", [[20.0, 20.9, 22.4], [20.0, 21.0, 22.001], [20.0, 20.9, 22.4, 23.0]])
-def test_the_pointer_tells_an_interval_that_holds_0_just_where_the_trend_is_not_significant(
+def test_pointer_tells_interval_holds_0_just(
     values: list[float],
 ) -> None:
+    """The pointer tells an interval that holds 0 just where the trend is not significant."""
     places = [{"id": "s0", "x_mm": 0, "y_mm": 0}]
     row = cast("AnyRow", SimpleNamespace(name="latest", about={"skin": {"sensors": places}}))
     of_skin = history([values], 0.001)

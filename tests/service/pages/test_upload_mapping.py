@@ -45,7 +45,8 @@ def form_of(document: dict[str, Any]) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("file", RIGS, ids=lambda file: str(file.stem))
-def test_a_form_that_nobody_changed_says_the_same(file: Path) -> None:
+def test_form_nobody_changed_says(file: Path) -> None:
+    """A form that nobody changed says the same."""
     document = yaml.safe_load(file.read_text())
     found, wrong = document_of(form_of(document), document)
     rig_description.from_dict(found)
@@ -53,11 +54,13 @@ def test_a_form_that_nobody_changed_says_the_same(file: Path) -> None:
     assert found == document | {"recording": document.get("recording", {})}
 
 
-def test_every_channel_of_every_kind_can_be_chosen() -> None:
+def test_every_channel_every_kind_chosen() -> None:
+    """Every channel of every kind can be chosen."""
     assert {name for kind in KINDS for name in rig_description.channel_fields(kind)} == set(CHANNELS)
 
 
-def test_magnitude_and_phase_are_not_taken_for_a_real_part() -> None:
+def test_magnitude_phase_not_taken_real_part() -> None:
+    """Magnitude and phase are not taken for a real part."""
     channels = [channel("Frequency", "Hz"), channel("FRF magnitude", "pC/N"), channel("FRF phase", "deg")]
     found = guessed(channels, {}, {})
     assert found["channels"] == {
@@ -71,17 +74,20 @@ def test_magnitude_and_phase_are_not_taken_for_a_real_part() -> None:
     ]
 
 
-def test_a_piezo_and_a_deflection_in_volts_are_an_indentation() -> None:
+def test_piezo_deflection_volts_indentation() -> None:
+    """A piezo and a deflection in volts are an indentation."""
     channels = [channel("Time", "s"), channel("Piezo", "V"), channel("Deflection", "V")]
     assert guessed(channels, {}, {})["kind"] == "indentation"
 
 
-def test_a_percent_sign_behind_a_percentage_is_no_mistake() -> None:
+def test_percent_sign_behind_percentage() -> None:
+    """A percent sign behind a percentage is no mistake."""
     form = {"kind": "indentation", "channel-0": "F", "is-0": "force_n", "tare-force_n": "15 %"}
     assert document_of(form, {})[0]["channels"]["force_n"]["tare_percent"] == 15
 
 
-def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
+def test_channels_file_states_guessed_unit_name() -> None:
+    """Channels and what a file states are guessed by unit and name."""
     channels = [channel("Kraftmessdose", "mN"), channel("Charge amplifier", "V"), channel("temperature", "V")]
     found = guessed(channels, {"preload [mN]": 500.0, "sensor": "s01", "operator": "me"}, {"thickness_mm": 2.5})
     assert found["kind"] == "frf"
@@ -96,14 +102,16 @@ def test_channels_and_what_a_file_states_are_guessed_by_unit_and_name() -> None:
     assert set(curve["channels"]) == {"displacement_mm", "force_n", "time_s"}
 
 
-def test_a_deflection_that_is_used_is_not_said_to_be_passed_over() -> None:
+def test_deflection_used_not_said_passed() -> None:
+    """A deflection that is used is not said to be passed over."""
     sprung = [channel("Piezo", "nm"), channel("Deflection", "nm"), channel("Height", "nm")]
     assert passed_over(sprung[:2], guessed(sprung[:2], {}, {})) == []
     (told,) = passed_over(sprung, guessed(sprung, {}, {}))
     assert told.startswith("Height may be displacement as well as Piezo")
 
 
-def test_a_testing_machine_s_table_is_guessed_to_be_a_compression() -> None:
+def test_testing_machine_s_table_guessed() -> None:
+    """A testing machine s table is guessed to be a compression."""
     table = [channel("Time (s)", "s"), channel("Compression (mm)", "mm"), channel("Load (N)", "N")]
     found = guessed([*table, channel("Engineering Strain [-]", "-")], {}, {})
     assert found["kind"] == "compression"
@@ -112,7 +120,8 @@ def test_a_testing_machine_s_table_is_guessed_to_be_a_compression() -> None:
     assert guessed([channel("Displacement (mm)", "mm"), channel("Load (N)", "N")], {}, {})["kind"] == "indentation"
 
 
-def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate() -> None:
+def test_parts_frf_guessed_complex_ones_sample() -> None:
+    """Both parts of an frf are guessed and complex ones and the sample rate."""
     parts = [channel("frequency", ""), channel("FRF real", "pC/N"), channel("FRF imaginary", "pC/N")]
     assert set(guessed(parts, {}, {})["channels"]) == {"frequency_hz", "frf_re_pc_per_n", "frf_im_pc_per_n"}
     assert guessed([channel("H1", "pC/N", is_complex=True)], {}, {})["channels"] == {"frf_pc_per_n": {"channel": "H1"}}
@@ -120,7 +129,8 @@ def test_both_parts_of_an_frf_are_guessed_and_complex_ones_and_the_sample_rate()
     assert stated["recording"] == {"sample_rate_hz": {"property": "Sampling rate"}}
 
 
-def test_what_is_missing_is_said_in_the_form_s_words() -> None:
+def test_missing_said_form_s_words() -> None:
+    """What is missing is said in the form s words."""
     assert field_words("frf_im_pc_per_n") == "FRF, imaginary part"
     assert field_words("channels.charge_pc.sensitivity") == "sensitivity of the charge"
     channels = [channel("force", "N")]
@@ -141,7 +151,8 @@ def test_what_is_missing_is_said_in_the_form_s_words() -> None:
     assert (field_of(missing, []), what_to_do(missing, [])) == ("frf_im_pc_per_n", "required")
 
 
-def test_a_channel_of_another_kind_of_recording_is_said_without_its_value() -> None:
+def test_channel_kind_recording_said() -> None:
+    """A channel of another kind of recording is said without its value."""
     channels = [channel("charge", "pC")]
     refused = {"code": "not_one_of", "field": "channels.charge_pc", "value": "a value of type dict", "allowed": "x"}
     assert what_came(refused, channels) is None
@@ -149,14 +160,16 @@ def test_a_channel_of_another_kind_of_recording_is_said_without_its_value() -> N
     assert what_came(refused, []) == "a value of type dict"
 
 
-def test_a_unit_other_than_the_label_says_that_the_label_is_wrong() -> None:
+def test_unit_label_says_label_wrong() -> None:
+    """A unit other than the label says that the label is wrong."""
     form = {"kind": "frf", "channel-0": "F", "is-0": "force_n", "label-0": "g", "unit-0": "N"}
     assert document_of(form, {})[0]["channels"]["force_n"] == {"channel": "F", "labelled": "g", "unit": "N"}
     same = {**form, "label-0": "N"}
     assert document_of(same, {})[0]["channels"]["force_n"] == {"channel": "F"}
 
 
-def test_a_time_is_typed_in_the_lab_s_zone_and_shown_as_it_was_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_typed_lab_s_zone_shown_typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A time is typed in the lab s zone and shown as it was typed."""
     monkeypatch.setenv("UNDERSKIN_TIME_ZONE", "Europe/Rome")
     for typed in ("2026-05-03 14:30", "3.5.2026 14:30", "2026-05-03T12:30Z"):
         found, wrong = document_of({"recorded_at": typed}, {})
@@ -173,7 +186,8 @@ def test_a_time_is_typed_in_the_lab_s_zone_and_shown_as_it_was_typed(monkeypatch
     assert "two days, 3 May 2026 or 5 March 2026: write it as 2026-05-03 or 2026-03-05" in ambiguous.allowed
 
 
-def test_a_file_that_states_its_time_is_taken_at_its_word() -> None:
+def test_file_states_time_taken_word() -> None:
+    """A file that states its time is taken at its word."""
     channels = [channel("force", "N"), channel("charge", "pC")]
     for name, value in (("Date/Time", "03.05.2026 14:30"), ("recorded_at", "2026-05-03T14:30")):
         assert guessed(channels, {name: value}, {})["recording"] == {"recorded_at": {"property": name}}
@@ -181,7 +195,8 @@ def test_a_file_that_states_its_time_is_taken_at_its_word() -> None:
     assert guessed(channels, {"Date": "Monday", "recorded_at": "noon"}, {})["recording"] == {}
 
 
-def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
+def test_cannot_said_named_typed_kept() -> None:
+    """What cannot be said is named and what was typed is kept."""
     layout = "s1, 0, 0\ns2, 8\ns3, a, 0"
     found, (wrong,) = document_of({"sensors": layout, "thickness_mm": "2,5"}, {})
     assert wrong.field == "skin.sensors"
@@ -194,7 +209,8 @@ def test_what_cannot_be_said_is_named_and_what_was_typed_is_kept() -> None:
     assert found["channels"] == {"force_n": {"channel": "a"}}
 
 
-def test_values_are_checked_before_a_file_is_read_and_those_that_a_file_states_are_not() -> None:
+def test_values_checked_before_file_read_file() -> None:
+    """Values are checked before a file is read and those that a file states are not."""
     typed = {"kind": "frf", "poisson_ratio": "", "preload_n": "0.0001", "indenter_radius_mm": "", "dynamic_force_n": ""}
     stated = {"indenter_radius_mm-from": "R"}
     (unlikely,) = document_of({**typed, **stated}, {})[1]
@@ -210,7 +226,8 @@ def test_a_layout_is_written_as_people_write_it(line: str) -> None:
     assert found["skin"]["sensors"] == [{"id": "s1", "x_mm": 0.5, "y_mm": 8.0}]
 
 
-def test_the_time_of_a_table_is_found_so_that_no_sample_rate_is_missing() -> None:
+def test_time_table_found_no_sample_rate_missing() -> None:
+    """The time of a table is found so that no sample rate is missing."""
     found = guessed([channel("Time (s)", "s"), channel("Force (N)", "N"), channel("Charge (pC)", "pC")], {}, {})
     assert found["channels"]["time_s"] == {"channel": "Time (s)"}
 
@@ -221,7 +238,8 @@ SPRUNG = {
 }
 
 
-def test_a_deflection_in_the_form_makes_force_and_depth() -> None:
+def test_deflection_form_makes_force_depth() -> None:
+    """A deflection in the form makes force and depth."""
     form = {"kind": "indentation", "channel-0": "z", "is-0": "displacement_mm", "sign-0": "-1"}
     form |= {"channel-1": "d", "is-1": "deflection", "unit-1": "nm", "spring_constant_n_per_m": "3"}
     assert document_of({**form, "travel": "yes"}, {})[0]["channels"] == SPRUNG
@@ -235,7 +253,8 @@ def test_a_deflection_in_the_form_makes_force_and_depth() -> None:
     assert field_words("spring_constant_n_per_m") == "spring constant [N/m]"
 
 
-def test_curves_are_said_by_words_or_by_a_channel() -> None:
+def test_curves_said_words_channel() -> None:
+    """Curves are said by words or by a channel."""
     for said, curves in (("groups", "groups"), ("channel", {"channel": "n"}), ("segments", {"segments": "n"})):
         assert document_of({"curves": said, "curves-by": "n"}, {})[0]["curves"] == curves
     assert "curves" not in document_of({"curves": "", "curves-by": "n"}, {"curves": "file"})[0]

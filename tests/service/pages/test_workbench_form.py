@@ -33,7 +33,8 @@ def form_of(document: dict[str, Any], **changes: str) -> dict[str, str]:
     return form | changes
 
 
-def test_a_form_that_nobody_changed_says_the_same() -> None:
+def test_form_nobody_changed_says() -> None:
+    """A form that nobody changed says the same."""
     document = rig_of_raw_curve(trim={"first_sample": 3, "last_sample": 90})
     found, wrong = document_of(form_of(document), document)
     assert wrong == []
@@ -48,7 +49,8 @@ def test_a_form_that_nobody_changed_says_the_same() -> None:
     rig_description.from_dict(found)
 
 
-def test_a_derived_channel_takes_the_place_of_the_one_that_the_table_names() -> None:
+def test_derived_channel_takes_place_table_names() -> None:
+    """A derived channel takes the place of the one that the table names."""
     raw = {"channel-0": "Piezo", "is-0": "displacement_mm", "channel-1": "Bend", "is-1": "deflection", "travel": "yes"}
     made = {"derived-formula-0": "-Piezo - Bend", "derived-is-0": "displacement_mm", "spring_constant_n_per_m": "3"}
     document, wrong = document_of({"kind": "indentation"} | raw | made, {})
@@ -69,7 +71,8 @@ def test_an_emptied_row_is_taken_out() -> None:
 
 
 @pytest.mark.parametrize("number", ["007", "9" * 4301, "\u0663", "-1"], ids=["zeros", "long", "digits", "sign"])
-def test_a_name_that_the_page_does_not_write_is_no_row(number: str) -> None:
+def test_name_page_not_write_no_row(number: str) -> None:
+    """A name that the page does not write is no row."""
     document = rig_of_raw_curve()
     forged = {f"derived-formula-{number}": "5 * 'Piezo'", f"derived-is-{number}": "force_n"}
     found, wrong = document_of(form_of(document, **forged), document)
@@ -77,7 +80,8 @@ def test_a_name_that_the_page_does_not_write_is_no_row(number: str) -> None:
     assert wrong == []
 
 
-def test_two_derived_channels_of_one_name_or_for_one_field_are_refused_and_kept() -> None:
+def test_two_derived_channels_name_field_refused() -> None:
+    """Two derived channels of one name or for one field are refused and kept."""
     document = rig_of_raw_curve()
     found, wrong = document_of(form_of(document, **{"derived-name-1": "load"}), document)
     assert [error.field for error in wrong] == ["derived.load"]
@@ -89,7 +93,8 @@ def test_two_derived_channels_of_one_name_or_for_one_field_are_refused_and_kept(
     assert len(document_of(form_of(document, **unnamed), document)[1]) == 1
 
 
-def test_a_template_turns_no_depth_that_is_composed() -> None:
+def test_template_turns_no_depth_composed() -> None:
+    """A template turns no depth that is composed."""
     rig = rig_description.from_dict(rig_of_raw_curve())
     store = create_autospec(Database)
     store.read.return_value = SimpleNamespace(document=template_of(rig), kept_at="2026-11-01", kept_from=None)
@@ -103,7 +108,8 @@ def test_a_template_turns_no_depth_that_is_composed() -> None:
         page.use_template_of(store, exported)
 
 
-def test_a_template_holds_what_is_the_instrument_s_alone() -> None:
+def test_template_holds_instrument_s_alone() -> None:
+    """A template holds what is the instrument s alone."""
     skin = {"poisson_ratio": 0.5, "thickness_mm": 2}
     recording = {"indenter_radius_mm": 0.0075, "sensor": "s01", "recorded_at": {"property": "Date"}}
     rig = rig_description.from_dict(rig_of_raw_curve(skin=skin, recording=recording))
@@ -115,7 +121,9 @@ def test_a_template_holds_what_is_the_instrument_s_alone() -> None:
     assert again.derived.keys() == rig.derived.keys()
 
 
-def test_an_instrument_is_recognised_by_format_and_headings() -> None:
+def test_instrument_recognised_format_headings() -> None:
+    """An instrument is recognised by format and headings."""
+
     def contents(*headings: tuple[str, str]) -> Contents:
         return Contents((Block("", tuple(Channel(name, unit, np.zeros(2)) for name, unit in headings)),))
 
@@ -130,7 +138,8 @@ def test_an_instrument_is_recognised_by_format_and_headings() -> None:
     assert recognised("CSV", Contents(())) is None
 
 
-def test_a_zero_of_curves_is_not_carried_over_to_frfs() -> None:
+def test_zero_curves_not_carried_over_frfs() -> None:
+    """A zero of curves is not carried over to frfs."""
     base = rig_of_raw_curve()
     form = form_of(base)
     assert document_of(form, base)[0]["channels"]["force_n"]["tare_percent"] == 10
@@ -138,7 +147,8 @@ def test_a_zero_of_curves_is_not_carried_over_to_frfs() -> None:
     assert document_of(form | {"kind": "frf", "tare-force_n": "5"}, base)[0]["channels"]["force_n"]["tare_percent"] == 5
 
 
-def test_a_typed_value_counts_for_more_than_a_property_that_is_still_chosen() -> None:
+def test_typed_value_counts_property() -> None:
+    """A typed value counts for more than a property that is still chosen."""
     form = {"kind": "indentation", "indenter_radius_mm": "2", "indenter_radius_mm-from": "Tip radius [mm]"}
     assert document_of(form, {})[0]["recording"]["indenter_radius_mm"] == 2
     assert document_of(form | {"indenter_radius_mm": " "}, {})[0]["recording"]["indenter_radius_mm"] == {
@@ -146,7 +156,8 @@ def test_a_typed_value_counts_for_more_than_a_property_that_is_still_chosen() ->
     }
 
 
-def test_a_property_that_no_file_has_is_not_offered() -> None:
+def test_property_no_file_not_offered() -> None:
+    """A property that no file has is not offered."""
     lacking = FileSummary("a.txt", "text", 0, [], [], [], [], [], None)
     assert not may_state([lacking], "Tip radius [mm]")
     assert may_state([lacking, replace(lacking, properties={"Tip radius [mm]": 2.0})], "Tip radius [mm]")

@@ -64,7 +64,8 @@ def test_a_recording_with_every_field_is_valid(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", RECORDINGS)
-def test_reader_and_schema_agree_on_every_field_of_a_recording(kind: str) -> None:
+def test_reader_schema_agree_every_field(kind: str) -> None:
+    """Reader and schema agree on every field of a recording."""
     known = {
         *RECORDINGS[kind],
         "kind",
@@ -79,7 +80,8 @@ def test_reader_and_schema_agree_on_every_field_of_a_recording(kind: str) -> Non
     agree(document(RECORDINGS[kind]), ("recordings", 0), known)
 
 
-def test_reader_and_schema_agree_on_every_field_of_a_skin_and_its_sensors() -> None:
+def test_reader_schema_agree_every_field_skin() -> None:
+    """Reader and schema agree on every field of a skin and its sensors."""
     campaign = document(RECORDINGS["compression"])
     agree(campaign, ("skin",), {*campaign["skin"], "nonsense"})
     agree(campaign, ("skin", "sensors", 0), {"id", "x_mm", "y_mm", "nonsense"})
@@ -131,16 +133,16 @@ def beyond(name: str, error: InvalidInput) -> bool:
         ({}, {"conditions": {"preload_n": 2.0}}),
     ],
 )
-def test_the_service_refuses_what_the_schema_does(
-    http: httpx.Client, changes: dict[str, Any], recording: dict[str, Any]
-) -> None:
+def test_service_refuses_schema(http: httpx.Client, changes: dict[str, Any], recording: dict[str, Any]) -> None:
+    """The service refuses what the schema does."""
     campaign = document({**FRF, **recording}, **changes)
     assert not VALID.is_valid(campaign)
     answer = http.post("/v1/campaigns", json=campaign)
     assert answer.status_code == 422 or answer.json()["status"] == "refused", answer.text
 
 
-def test_the_document_gives_back_what_the_schema_describes(http: httpx.Client) -> None:
+def test_document_gives_back_schema_describes(http: httpx.Client) -> None:
+    """The document gives back what the schema describes."""
     campaign = document(*RECORDINGS.values(), name="every kind")
     sent = http.post("/v1/campaigns", json=campaign).json()
     assert {entry["status"] for entry in sent["recordings"]} == {"ok"}

@@ -16,8 +16,11 @@ BACKEND = "sqlite"
 
 
 @pytest.mark.parametrize("asked", ["bytes=999999999-", "bytes=5-9", "lines=1-2", "bytes=-5, 7-8"])
-def test_they_are_sent_whole_and_leave_nothing_behind(server: Server, asked: str) -> None:
-    """That of the next request has other bytes: parts of two are no file."""
+def test_sent_whole_leave_nothing_behind(server: Server, asked: str) -> None:
+    """They are sent whole and leave nothing behind.
+
+    That of the next request has other bytes: parts of two are no file.
+    """
     sent = server.http.post("/v1/campaigns?skin=palm", json=campaign("monday")).json()
     for path in ("/v1/skins/palm/export", f"/v1/campaigns/{sent['id']}/document?format=hdf5"):
         answer = server.http.get(path, headers={"Range": asked})
@@ -42,10 +45,11 @@ def await_gone(uploads: Path) -> None:
         time.sleep(0.05)
 
 
-def test_few_are_made_at_once_and_readers_are_answered_meanwhile(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each holds a connection of the store as long as it takes."""
+def test_few_made_once_readers_answered(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few are made at once and readers are answered meanwhile.
+
+    Each holds a connection of the store as long as it takes.
+    """
     under_way, most = 0, 0
 
     def slow(_: Any, root: str, file: Path) -> None:

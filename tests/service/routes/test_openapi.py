@@ -107,7 +107,8 @@ def test_operation_ids_are_stable(document: dict[str, Any]) -> None:
     assert {(method, path): operation["operationId"] for method, path, operation in operations(document)} == OPERATIONS
 
 
-def test_every_route_of_the_application_is_in_the_document(document: dict[str, Any], tmp_path: Path) -> None:
+def test_every_route_application_document(document: dict[str, Any], tmp_path: Path) -> None:
+    """Every route of the application is in the document."""
     with in_process(tmp_path) as service:
         api = service.api
     assert set(api.openapi()["paths"]) == set(document["paths"])
@@ -147,7 +148,8 @@ def test_every_field_is_described_with_its_unit(document: dict[str, Any]) -> Non
     assert described > 60
 
 
-def test_every_schema_is_described_and_has_valid_examples(document: dict[str, Any]) -> None:
+def test_every_schema_described_valid_examples(document: dict[str, Any]) -> None:
+    """Every schema is described and has valid examples."""
     tried = 0
     bodies = [operation["requestBody"] for *_, operation in operations(document) if "requestBody" in operation]
     inline = [media["schema"] for body in bodies for kind, media in body["content"].items() if "json" in kind]
@@ -185,7 +187,8 @@ def query(operation: dict[str, Any]) -> dict[str, Any]:
     return {name: schema["examples"][0] for name, schema in schemas.items() if "examples" in schema}
 
 
-def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client, document: dict[str, Any]) -> None:
+def test_examples_accepted_answered_described(http: httpx.Client, document: dict[str, Any]) -> None:
+    """The examples are accepted and answered as described."""
     for method, path, operation in operations(document):
         if "{" in path or path in ("/v1/skins/import", "/v1/fleets/diagnosis"):
             continue  # about what is kept already: tests/service/store
@@ -204,7 +207,8 @@ def test_the_examples_are_accepted_and_answered_as_described(http: httpx.Client,
 
 
 @pytest.mark.parametrize("path", ["/v1/sigma", "/v1/frf", "/v1/d33"])
-def test_the_examples_in_json_and_csv_are_the_same(http: httpx.Client, document: dict[str, Any], path: str) -> None:
+def test_examples_json_csv(http: httpx.Client, document: dict[str, Any], path: str) -> None:
+    """The examples in json and csv are the same."""
     bodies = examples(document["paths"][path]["post"], document)
     first, second = (http.post(path, content=body, headers={"Content-Type": kind}).json() for kind, body in bodies)
     assert first == second
@@ -215,7 +219,8 @@ def test_the_document_stays_the_same(http: httpx.Client, document: dict[str, Any
     assert http.get("/openapi.json").json() == document
 
 
-def test_a_key_is_asked_for_in_the_document_where_one_is_needed(document: dict[str, Any], locked: Server) -> None:
+def test_key_asked_document_needed(document: dict[str, Any], locked: Server) -> None:
+    """A key is asked for in the document where one is needed."""
     assert "security" not in document
     with httpx.Client(base_url=locked.url, headers=authorization(locked), timeout=60) as client:
         described = client.get("/openapi.json").json()

@@ -64,7 +64,8 @@ def contents(operation: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, An
             yield status, media_type, content
 
 
-def test_every_request_and_every_answer_has_a_valid_example(document: dict[str, Any]) -> None:
+def test_every_request_every_answer_valid(document: dict[str, Any]) -> None:
+    """Every request and every answer has a valid example."""
     checked = 0
     for operation in operations(document):
         for where, media_type, content in contents(operation):
@@ -79,7 +80,8 @@ def test_every_request_and_every_answer_has_a_valid_example(document: dict[str, 
     assert checked > 120
 
 
-def test_every_parameter_that_is_required_has_an_example(document: dict[str, Any]) -> None:
+def test_every_parameter_required_example(document: dict[str, Any]) -> None:
+    """Every parameter that is required has an example."""
     required = [
         parameter
         for operation in operations(document)
@@ -90,7 +92,8 @@ def test_every_parameter_that_is_required_has_an_example(document: dict[str, Any
     assert [parameter["name"] for parameter in required if "example" not in parameter] == []
 
 
-def test_every_property_of_every_schema_is_described(document: dict[str, Any]) -> None:
+def test_every_property_every_schema_described(document: dict[str, Any]) -> None:
+    """Every property of every schema is described."""
     described = 0
     for name, schema in document["components"]["schemas"].items():
         assert schema.get("description"), name
@@ -111,7 +114,8 @@ def test_a_server_answers_as_the_examples_say(walked: dict[str, Any]) -> None:
         assert shape(walked[name]) == shape(stored), name
 
 
-def test_a_server_calculates_what_the_examples_say(walked: dict[str, Any]) -> None:
+def test_server_calculates_examples_say(walked: dict[str, Any]) -> None:
+    """A server calculates what the examples say."""
     for name in CALCULATIONS:
         numbers, expected = list(leaves(walked[name]["answer"])), list(leaves(STORED[name]["answer"]))
         assert numbers == pytest.approx(expected, rel=1e-6, abs=1e-9), name

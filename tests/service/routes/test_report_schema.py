@@ -86,14 +86,16 @@ def test_a_report_of_every_verdict_is_described(verdict: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_report_on_every_kind_of_recording_is_described(kind: str) -> None:
+def test_report_every_kind_recording_described(kind: str) -> None:
+    """A report on every kind of recording is described."""
     require_described(
         lean_report(KINDS[kind](), table(), *(BESIDE_SKINS if kind in ("words", "FRFs and a block") else COSTLY))
     )
 
 
 @pytest.mark.slow
-def test_reports_that_explain_alone_and_together_are_described() -> None:
+def test_reports_explain_alone_together() -> None:
+    """Reports that explain alone and together are described."""
     alone, (skin, fleet) = report(), joint_reports().values()
     assert alone["verdict"] == skin["verdict"] == "explained"
     assert "per_sensor" in skin["d33"]

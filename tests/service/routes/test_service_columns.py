@@ -51,14 +51,16 @@ def test_csv_both_ways_is_the_json_answer(http: httpx.Client) -> None:
     assert columns["sigma"][2] == "NaN"
 
 
-def test_csv_names_the_frequency_of_each_column_of_spectra(http: httpx.Client) -> None:
+def test_csv_names_frequency_column_spectra(http: httpx.Client) -> None:
+    """Csv names the frequency of each column of spectra."""
     fields = {**SKIN, "preload_n": [1, 3], "d33_pc_per_n": 14, "frequency_hz": [10, 20.5]}
     columns = read_csv(http.post("/v1/frf", json=fields, headers={"Accept": "text/csv"}).text)
     assert columns["frf_re_pc_per_n[10.0 Hz]"] == columns["frf_re_pc_per_n[20.5 Hz]"] == columns["frf_pc_per_n"]
     assert columns["frf_im_pc_per_n[20.5 Hz]"] == ["0.0", "0.0"]
 
 
-def test_spectra_are_flat_and_real_and_null_outside(http: httpx.Client) -> None:
+def test_spectra_flat_real_null_outside(http: httpx.Client) -> None:
+    """Spectra are flat and real and null outside."""
     answer = post(http, "/v1/frf", **SKIN, preload_n=[1, 300], d33_pc_per_n=-14, frequency_hz=[1, 10, 100])
     assert answer["frequency_hz"] == [1, 10, 100]
     assert answer["frf_pc_per_n"][0] < 0
@@ -66,14 +68,16 @@ def test_spectra_are_flat_and_real_and_null_outside(http: httpx.Client) -> None:
     assert answer["frf_im_pc_per_n"] == [[0.0] * 3, [None] * 3]
 
 
-def test_rows_of_another_poisson_ratio_are_outside(http: httpx.Client) -> None:
+def test_rows_poisson_ratio_outside(http: httpx.Client) -> None:
+    """Rows of another poisson ratio are outside."""
     answer = post(http, "/v1/frf", **SKIN, preload_n=1, d33_pc_per_n=14, poisson_ratio=[0.5, 0.45])
     assert answer["status"] == ["ok", "out_of_domain"]
     assert answer["frf_pc_per_n"][1] is None
     assert answer["contact_radius_mm"][1] > 0
 
 
-def test_d33_from_lines_is_that_of_their_mean_in_the_band(http: httpx.Client) -> None:
+def test_d33_lines_mean_band(http: httpx.Client) -> None:
+    """D33 from lines is that of their mean in the band."""
     lines = [[7.0, 7.2, 7.4, 99.0], [8.0, 8.0, 8.3, -5.0]]
     imaginary = [[0.7, 0.6, 0.8, 5.0], [0.1, 0.2, 0.3, 5.0]]
     common = {**SKIN, "preload_n": [1, 3]}
@@ -91,7 +95,8 @@ def test_d33_from_lines_is_that_of_their_mean_in_the_band(http: httpx.Client) ->
     assert stated["frf_uncertainty_pc_per_n"] == [0.5, 0.5]
 
 
-def test_health_is_answered_while_a_large_batch_is_computed(server_url: str) -> None:
+def test_health_answered_large_batch_computed(server_url: str) -> None:
+    """Health is answered while a large batch is computed."""
     rows = 400_000
     body = {"a_over_h": np.linspace(0, 3, rows).tolist(), "rt_over_h": 0.6, "load_parameter": 0.01}
     with ThreadPoolExecutor(1) as threads, httpx.Client(base_url=server_url, timeout=60) as client:

@@ -21,7 +21,8 @@ def errors(answer: httpx.Response) -> list[dict[str, Any]]:
     return found
 
 
-def test_a_misspelt_field_is_guessed_in_csv_and_json(http: httpx.Client) -> None:
+def test_misspelt_field_guessed_csv_json(http: httpx.Client) -> None:
+    """A misspelt field is guessed in csv and json."""
     columns = {**SKIN, "prelaod_n": 1, "frf_pc_per_n": 7}
     for answer, value in ((sent(http, "/v1/d33", columns), "1"), (http.post("/v1/d33", json=columns), 1)):
         _, misspelt = errors(answer)
@@ -29,7 +30,8 @@ def test_a_misspelt_field_is_guessed_in_csv_and_json(http: httpx.Client) -> None
         assert misspelt["allowed"] == "is not a field of this request; did you mean preload_n?"
 
 
-def test_an_unknown_column_is_told_with_its_first_value(http: httpx.Client) -> None:
+def test_unknown_column_told_first_value(http: httpx.Client) -> None:
+    """An unknown column is told with its first value."""
     body = "run,a_over_h,rt_over_h\n1,0.3,0.6\n2,0.4,0.6\n"
     answer = http.post("/v1/sigma", content=body, headers={"Content-Type": "text/csv"})
     assert answer.json()["detail"] == "run = '1': is not a field of this request"
@@ -60,8 +62,11 @@ def test_all_wrong_fields_are_told_at_once(http: httpx.Client, path: str, result
     ]
 
 
-def test_what_was_read_otherwise_than_its_heading_says_is_told(http: httpx.Client) -> None:
-    """In a header of the answer, since columns have no room for it."""
+def test_read_otherwise_heading_says_told(http: httpx.Client) -> None:
+    """What was read otherwise than its heading says is told.
+
+    In a header of the answer, since columns have no room for it.
+    """
     columns = {**SKIN, "preload_n": 1, "d33_pc_per_n": 14}
     plain = sent(http, "/v1/frf", columns)
     assert "Underskin-Notes" not in plain.headers

@@ -109,9 +109,8 @@ def test_what_looks_wrong_is_used_and_said(http: httpx.Client, frf: Any, index: 
         ([-7.4], 0, "-14 pC/N, negative: is the sign of charge or force turned"),
     ],
 )
-def test_a_d33_that_no_sensor_has_is_answered_and_said(
-    http: httpx.Client, frf: Any, index: int | None, said: str
-) -> None:
+def test_d33_no_sensor_answered_said(http: httpx.Client, frf: Any, index: int | None, said: str) -> None:
+    """A d33 that no sensor has is answered and said."""
     answer = posted(http, preload_n=1, frf_pc_per_n=frf)
     assert set(answer["status"]) == {"ok"}
     (finding,) = answer["findings"]
@@ -120,7 +119,8 @@ def test_a_d33_that_no_sensor_has_is_answered_and_said(
     assert ("(1 more rows like it)" in finding["statement"]) == (index == 1)
 
 
-def test_rows_outside_are_null_and_spoil_no_other(http: httpx.Client) -> None:
+def test_rows_outside_null_spoil(http: httpx.Client) -> None:
+    """Rows outside are null and spoil no other."""
     frf: dict[str, Any] = {"frf_pc_per_n": [7.4, 7.4, 7.4], "frf_uncertainty_pc_per_n": 0.1}
     answer = posted(http, preload_n=[1, 300, 1], poisson_ratio=[0.5, 0.5, 0.45], **frf)
     assert answer["status"] == ["ok", "out_of_domain", "out_of_domain"]
@@ -146,7 +146,8 @@ def test_lines_are_averaged_over_the_band(http: httpx.Client) -> None:
         assert answer[name] == pytest.approx(same[name], rel=1e-14)
 
 
-def test_a_sent_uncertainty_replaces_the_lines_scatter(http: httpx.Client) -> None:
+def test_sent_uncertainty_replaces_lines_scatter(http: httpx.Client) -> None:
+    """A sent uncertainty replaces the lines scatter."""
     lines: dict[str, Any] = {"frequency_hz": FREQUENCY, "frf_re_pc_per_n": [[7.1, 7.2, 7.3, 7.4, 7.5, 7.6]]}
     answer = posted(http, preload_n=1, **lines, band_hz=[0, 1000], frf_uncertainty_pc_per_n=0.5)
     assert answer["frf_uncertainty_pc_per_n"] == [0.5]

@@ -28,7 +28,8 @@ def asked(http: httpx.Client, **changed: Any) -> dict[str, Any]:
     return answer
 
 
-def test_it_agrees_with_what_frf_says_of_the_same_contact(http: httpx.Client) -> None:
+def test_agrees_frf_says_contact(http: httpx.Client) -> None:
+    """It agrees with what frf says of the same contact."""
     found = asked(http)
     frf = http.post("/v1/frf", json={**SPHERE, "d33_pc_per_n": 14.0}).json()
     for name in ("contact_radius_mm", "a_over_h", "load_parameter", "sigma", "mean_stress_mpa", "rel_error"):
@@ -37,7 +38,8 @@ def test_it_agrees_with_what_frf_says_of_the_same_contact(http: httpx.Client) ->
     assert found["table_sha256"] == frf["table_sha256"]
 
 
-def test_the_section_has_hertz_s_pressure_above_and_the_sensor_s_stress_below(http: httpx.Client) -> None:
+def test_section_hertz_s_pressure_above_sensor_s(http: httpx.Client) -> None:
+    """The section has hertz s pressure above and the sensor s stress below."""
     found = asked(http, r_points=301, depth_points=3)
     r, stress = np.array(found["r_mm"]), np.array(found["sigma_zz_mpa"])
     assert stress.shape == (3, 301)
@@ -50,7 +52,8 @@ def test_the_section_has_hertz_s_pressure_above_and_the_sensor_s_stress_below(ht
     assert mean == pytest.approx(-found["mean_stress_mpa"], rel=0.01)
 
 
-def test_another_poisson_ratio_is_the_linear_layer_s(http: httpx.Client) -> None:
+def test_poisson_ratio_linear_layer_s(http: httpx.Client) -> None:
+    """Another poisson ratio is the linear layer s."""
     linear, half = asked(http, poisson_ratio=0.45), asked(http)
     assert linear["model"] == "linear_layer"
     assert linear["rel_error"] is linear["section_error"] is None  # nothing of finite strain is in it
@@ -58,7 +61,8 @@ def test_another_poisson_ratio_is_the_linear_layer_s(http: httpx.Client) -> None
     assert linear["sigma"] != half["sigma"]
 
 
-def test_outside_the_table_it_says_which_limit_and_has_no_stress(http: httpx.Client) -> None:
+def test_outside_table_says_limit_no_stress(http: httpx.Client) -> None:
+    """Outside the table it says which limit and has no stress."""
     for ratio in (0.5, 0.3):
         found = asked(http, preload_n=100, poisson_ratio=ratio)
         assert found["status"] == "out_of_domain"
@@ -98,7 +102,8 @@ def test_a_field_that_is_missing_is_named(http: httpx.Client) -> None:
     assert [(error["field"], error["code"]) for error in reply.json()["errors"]] == [("preload_n", "required")]
 
 
-def test_client_and_command_have_the_same_numbers(http: httpx.Client, server_url: str) -> None:
+def test_client_command_numbers(http: httpx.Client, server_url: str) -> None:
+    """Client and command have the same numbers."""
     expected = asked(http, r_points=5, depth_points=3)
     with Client(server_url) as client:
         found = client.field(**SPHERE, r_points=5, depth_points=3)

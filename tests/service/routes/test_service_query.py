@@ -11,7 +11,8 @@ def errors(answer: httpx.Response) -> list[tuple[str, str]]:
     return [(error["field"], error["allowed"]) for error in answer.json()["errors"]]
 
 
-def test_every_route_refuses_a_parameter_that_it_does_not_know(http: httpx.Client) -> None:
+def test_every_route_refuses_parameter_not_know(http: httpx.Client) -> None:
+    """Every route refuses a parameter that it does not know."""
     paths = http.get("/openapi.json").json()["paths"]
     asked = [(method, path) for path in paths if path.startswith("/v1/") for method in paths[path]]
     assert len(asked) > 25

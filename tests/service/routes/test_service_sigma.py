@@ -58,8 +58,11 @@ def test_columns_are_the_librarys(http: httpx.Client) -> None:
     assert answer["status"] == ["ok"] * 500
 
 
-def test_one_point_is_the_same_alone_and_in_columns(http: httpx.Client) -> None:
-    """Also where it is read differently: with `model` spelled out the API answers, without it the shorter path."""
+def test_point_alone_columns(http: httpx.Client) -> None:
+    """One point is the same alone and in columns.
+
+    Also where it is read differently: with `model` spelled out the API answers, without it the shorter path.
+    """
     points = random_points(100, beyond=1.05)
     columns = posted(http, **points)
     for row in range(100):
@@ -113,7 +116,8 @@ def test_both_paths_read_a_query_alike(http: httpx.Client, query: str) -> None:
         assert short.json()["errors"] == long.json()["errors"]
 
 
-def test_the_load_parameter_is_0_where_it_is_left_out(http: httpx.Client) -> None:
+def test_load_parameter_0_left(http: httpx.Client) -> None:
+    """The load parameter is 0 where it is left out."""
     point = {"a_over_h": 0.3, "rt_over_h": 0.6}
     alone = http.get("/v1/sigma", params=point).json()
     assert alone["sigma"] == pytest.approx(0.936505, abs=1e-6)
@@ -136,7 +140,8 @@ def test_finite_strain_reference_values(http: httpx.Client) -> None:
     assert sigma[1:] / sigma[0] == pytest.approx([1.01293, 1.02966, 1.04522, 1.07489], abs=1e-4)
 
 
-def test_rows_outside_are_null_and_spoil_no_other(http: httpx.Client) -> None:
+def test_rows_outside_null_spoil(http: httpx.Client) -> None:
+    """Rows outside are null and spoil no other."""
     a, rho, load = [0.3, 3.01, 0.3, 0.3, 1e308, 3.0], [0.6, 0.6, 3.01, 0.6, 0.6, 3.0], [0.01, 0.01, 0.01, 0.101, 0, 0.1]
     answer = posted(http, a_over_h=a, rt_over_h=rho, load_parameter=load)
     outside = [False, True, True, True, True, False]

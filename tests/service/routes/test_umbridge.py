@@ -66,7 +66,8 @@ def differences(served: Any, point: list[float]) -> Floats:
 
 
 @pytest.mark.parametrize(("name", "point"), [(name, point) for name in POINTS for point in POINTS[name] if all(point)])
-def test_derivatives_agree_with_finite_differences(server_url: str, name: str, point: list[float]) -> None:
+def test_derivatives_agree_finite_differences(server_url: str, name: str, point: list[float]) -> None:
+    """Derivatives agree with finite differences."""
     served = model(server_url, name)
     slopes = differences(served, point)
     gradient = np.array(served.gradient(0, 0, [point], [2.5]))
@@ -77,7 +78,8 @@ def test_derivatives_agree_with_finite_differences(server_url: str, name: str, p
     assert along == pytest.approx(gradient @ direction / 2.5, rel=1e-12)
 
 
-def test_the_infinite_derivative_at_zero_load_is_an_error_of_the_protocol(server_url: str) -> None:
+def test_infinite_derivative_zero_load_error(server_url: str) -> None:
+    """The infinite derivative at zero load is an error of the protocol."""
     served = model(server_url, "sigma")
     point = [[0.3, 0.6, 0.0]]
     with pytest.raises(Exception, match=r"InvalidInput.*load_parameter is infinite at 0"):
@@ -138,7 +140,8 @@ def test_errors_have_the_protocols_shape(http: httpx.Client, operation: str, bod
     assert answer.json()["error"]["message"]
 
 
-def test_the_protocols_wrapper_for_samplers_takes_our_models(server_url: str) -> None:
+def test_protocols_wrapper_samplers_takes_our(server_url: str) -> None:
+    """The protocols wrapper for samplers takes our models."""
     for name, points in POINTS.items():
         wrapped = UmbridgeLogProb(f"{server_url}/umbridge", name)
         assert wrapped.ndim == len(points[0])

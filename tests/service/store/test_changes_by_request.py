@@ -78,7 +78,8 @@ def test_what_cannot_be_kept_is_refused(server: Server, path: str, body: dict[st
     assert field in answer.text
 
 
-def test_a_trial_is_put_away_beside_campaigns_in_use(server: Server) -> None:
+def test_trial_put_away_beside_campaigns_use(server: Server) -> None:
+    """A trial is put away beside campaigns in use."""
     kept, trial = sent(server, "kept"), sent(server, "trial")
     answer = server.http.post(f"/v1/campaigns/{trial}/discard", json={"reason": "a trial"}).raise_for_status().json()
     assert (answer["state"], answer["withdraw_reason"]) == ("withdrawn", "a trial")
@@ -119,7 +120,8 @@ def test_what_something_builds_on_is_no_trial(server: Server) -> None:
         assert why in answer.json()["detail"]
 
 
-def test_a_correction_is_undone_until_something_builds_on_it(server: Server) -> None:
+def test_correction_undone_until_something(server: Server) -> None:
+    """A correction is undone until something builds on it."""
     older = sent(server, "older")
     newer = sent(server, "newer", corrects=older, reason="E was mistyped")
     assert history(server) == {newer}
@@ -140,7 +142,8 @@ def test_a_correction_is_undone_until_something_builds_on_it(server: Server) -> 
     assert undo(server, changes(server, again)[0]).status_code == 409
 
 
-def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_was_diagnosed(server: Server) -> None:
+def test_correction_skin_not_undone_once_skin(server: Server) -> None:
+    """A correction on another skin is not undone once the skin it left was diagnosed."""
     older = sent(server, "older")
     for day in ("tuesday", "wednesday"):
         sent(server, day)
@@ -153,9 +156,8 @@ def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_was_di
     assert (refused.status_code, "it was diagnosed since" in refused.text) == (409, True)
 
 
-def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_adopted_a_model(
-    server: Server, client: underskin.Client
-) -> None:
+def test_correction_skin_not_undone_once_skin_left(server: Server, client: underskin.Client) -> None:
+    """A correction on another skin is not undone once the skin it left adopted a model."""
     older = sent(server, "older")
     newer = sent(server, "newer", "hand", corrects=older, reason="it was the hand")
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
@@ -167,7 +169,8 @@ def test_a_correction_on_another_skin_is_not_undone_once_the_skin_it_left_adopte
     assert history(server, "hand") == {newer}
 
 
-def test_a_correction_that_was_corrected_is_undone_after_the_later_one(server: Server) -> None:
+def test_correction_corrected_undone_after_later(server: Server) -> None:
+    """A correction that was corrected is undone after the later one."""
     first = sent(server, "first")
     second = sent(server, "second", corrects=first, reason="E was mistyped")
     third = sent(server, "third", corrects=second, reason="and the sphere")

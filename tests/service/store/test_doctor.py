@@ -18,7 +18,8 @@ from tests.support.store_server import Place, campaign, running
 BACKEND = "sqlite"
 
 
-def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place, tmp_path: Path) -> None:
+def test_doctor_finds_nothing_wrong_server_well(place: Place, tmp_path: Path) -> None:
+    """The doctor finds nothing wrong with a server that is well."""
     folder = tmp_path / "backups"
     place.folder.chmod(0o700)
     with running(place, **scheduled(folder)) as server:
@@ -31,7 +32,8 @@ def test_the_doctor_finds_nothing_wrong_with_a_server_that_is_well(place: Place,
     assert "trial diagnosis ended" in found["workers"]["found"]
 
 
-def test_the_doctor_tells_what_is_wrong_and_what_to_do(tmp_path: Path) -> None:
+def test_doctor_tells_wrong(tmp_path: Path) -> None:
+    """The doctor tells what is wrong and what to do."""
     folder = tmp_path / "data"
     folder.mkdir()
     place = Place(folder)
@@ -76,7 +78,8 @@ def test_the_doctor_sees_a_damaged_store(tmp_path: Path) -> None:
         assert "backups" in found
 
 
-def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp_path: Path) -> None:
+def test_doctor_sees_open_no_server_starts(tmp_path: Path) -> None:
+    """The doctor sees what others may open and what no server starts with."""
     place, backups = Place(tmp_path / "data"), tmp_path / "backups"
     place.folder.mkdir(0o700)
     with running(place, **scheduled(backups)):
@@ -101,7 +104,8 @@ def test_the_doctor_sees_what_others_may_open_and_what_no_server_starts_with(tmp
     assert (wrong.returncode, "UNDERSKIN_BACKUP_EVERY" in wrong.stderr) == (2, True)
 
 
-def test_the_doctor_tells_a_store_that_is_gone_from_one_that_never_was(tmp_path: Path) -> None:
+def test_doctor_tells_store_gone(tmp_path: Path) -> None:
+    """The doctor tells a store that is gone from one that never was."""
     place, backups = Place(tmp_path / "data"), tmp_path / "backups"
     place.folder.mkdir(0o700)
     settings = scheduled(backups)
@@ -119,8 +123,11 @@ def test_the_doctor_tells_a_store_that_is_gone_from_one_that_never_was(tmp_path:
         assert (found["store"]["level"], "put underskin.sqlite3 back" in found["store"]["advice"]) == ("critical", True)
 
 
-def test_what_cannot_be_entered_is_a_finding_of_each_check(tmp_path: Path) -> None:
-    """As a data folder of another user, or a disk that does not answer."""
+def test_cannot_entered_finding_check(tmp_path: Path) -> None:
+    """What cannot be entered is a finding of each check.
+
+    As a data folder of another user, or a disk that does not answer.
+    """
     data, backups = tmp_path / "data", tmp_path / "backups"
     with running(Place(data), **scheduled(backups)):
         wait_for(backups, 1)
@@ -151,7 +158,8 @@ def nobody(*folders: Path) -> Iterator[None]:
             folder.chmod(0o700)
 
 
-def test_the_doctor_names_settings_that_nothing_reads(tmp_path: Path) -> None:
+def test_doctor_names_settings_nothing_reads(tmp_path: Path) -> None:
+    """The doctor names settings that nothing reads."""
     place = Place(tmp_path / "data")
     place.folder.mkdir(0o700)
     _, found = doctor(place, UNDERSKIN_MAX_HAEDER_KB="16", **NO_WORKERS)
@@ -162,7 +170,8 @@ def test_the_doctor_names_settings_that_nothing_reads(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("command", [["backup", "b.pgdump"], ["restore", "b.pgdump"], ["key", "sessions"]])
-def test_a_database_that_is_not_there_is_one_line(tmp_path: Path, command: list[str]) -> None:
+def test_database_not_line(tmp_path: Path, command: list[str]) -> None:
+    """A database that is not there is one line."""
     (tmp_path / "data").mkdir(0o700)
     (tmp_path / "b.pgdump").write_bytes(b"PGDMP")
     place = Place(tmp_path / "data", "postgresql://nobody@127.0.0.1:1/nowhere")

@@ -46,9 +46,8 @@ def new_place(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str],
 
 @pytest.mark.slow
 @pytest.mark.parametrize("version", OLDER)
-def test_a_killed_migration_leaves_the_old_store_or_the_new_one(
-    new_place: Callable[[str], Place], version: str
-) -> None:
+def test_killed_migration_leaves_old_store_new(new_place: Callable[[str], Place], version: str) -> None:
+    """A killed migration leaves the old store or the new one."""
     whole = new_place(version)
     old = content(whole)
     backups = whole.folder / "backups"

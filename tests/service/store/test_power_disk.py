@@ -42,7 +42,8 @@ def test_a_cut_forgets_what_was_not_synced(tmp_path: Path) -> None:
     assert left == {"old": "old content", "half": "a" * 4096, "named": "whole", "empty": ""}
 
 
-def test_a_cut_may_leave_any_sectors_of_what_was_not_synced(tmp_path: Path) -> None:
+def test_cut_leave_sectors_not_synced(tmp_path: Path) -> None:
+    """A cut may leave any sectors of what was not synced."""
     (tmp_path / "old").write_text("old content")
     with powered(tmp_path) as disk:
         write(disk)

@@ -25,7 +25,8 @@ def metric(server: Server, name: str) -> float:
     return float(found[1])
 
 
-def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_path: Path) -> None:
+def test_backup_made_start_restored(place: Place, tmp_path: Path) -> None:
+    """A backup is made at the start and can be restored."""
     folder = tmp_path / "backups"
     with running(place, **NO_WORKERS) as server:
         first = sent(server, campaign("kept"))
@@ -49,7 +50,8 @@ def test_a_backup_is_made_at_the_start_and_can_be_restored(place: Place, tmp_pat
         assert server.http.get(f"/v1/campaigns/{later}").status_code == 404
 
 
-def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path: Path) -> None:
+def test_old_ones_deleted_files(place: Place, tmp_path: Path) -> None:
+    """Old ones are deleted and files of others are not."""
     folder = tmp_path / "backups"
     folder.mkdir()
     names = ("notes.txt", "x.sqlite3", "20200101T000000Z.keep.sqlite3", "20209901T000000Z.sqlite3")
@@ -67,7 +69,8 @@ def test_old_ones_are_deleted_and_files_of_others_are_not(place: Place, tmp_path
     assert not list(folder.glob("*.part*"))
 
 
-def test_a_folder_whose_disk_is_not_mounted_any_more_gets_no_other_in_its_place(place: Place, tmp_path: Path) -> None:
+def test_folder_disk_not_mounted_gets_no_place(place: Place, tmp_path: Path) -> None:
+    """A folder whose disk is not mounted any more gets no other in its place."""
     folder, away = tmp_path / "backups", tmp_path / "away"
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)) as server:
@@ -93,7 +96,8 @@ def test_a_folder_whose_disk_is_not_mounted_any_more_gets_no_other_in_its_place(
         wait_for(folder, before + 1)
 
 
-def test_backups_begin_anew_in_an_emptied_folder_once_its_note_is_deleted(place: Place, tmp_path: Path) -> None:
+def test_backups_begin_anew_emptied_folder_once(place: Place, tmp_path: Path) -> None:
+    """Backups begin anew in an emptied folder once its note is deleted."""
     folder = tmp_path / "backups"
     log = place.folder.parent / f"{place.folder.name}.log"
     with running(place, **scheduled(folder)):
@@ -109,7 +113,8 @@ def test_backups_begin_anew_in_an_emptied_folder_once_its_note_is_deleted(place:
         wait_for(folder, 1)
 
 
-def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_path: Path) -> None:
+def test_backup_fails_counted_logged_made_later(place: Place, tmp_path: Path) -> None:
+    """A backup that fails is counted logged and made later."""
     folder = tmp_path / "not-a-folder"
     folder.write_text("a file")
     log = place.folder.parent / f"{place.folder.name}.log"
@@ -124,7 +129,8 @@ def test_a_backup_that_fails_is_counted_logged_and_made_later(place: Place, tmp_
         wait_for(folder, 1)
 
 
-def test_what_a_wrong_clock_dated_ahead_makes_none_superfluous(place: Place, tmp_path: Path) -> None:
+def test_wrong_clock_dated_ahead_makes_none(place: Place, tmp_path: Path) -> None:
+    """What a wrong clock dated ahead makes none superfluous."""
     folder = tmp_path / "backups"
     folder.mkdir()
     ahead = folder / "underskin-20990101T000000Z.sqlite3"
@@ -137,7 +143,8 @@ def test_what_a_wrong_clock_dated_ahead_makes_none_superfluous(place: Place, tmp
     assert "ahead" in found["backups"]["found"]
 
 
-def test_no_old_one_is_deleted_while_the_newest_is_far_smaller(tmp_path: Path) -> None:
+def test_no_old_deleted_newest_far_smaller(tmp_path: Path) -> None:
+    """No old one is deleted while the newest is far smaller."""
     folder, data = tmp_path / "backups", tmp_path / "data"
     folder.mkdir()
     data.mkdir()
@@ -150,7 +157,8 @@ def test_no_old_one_is_deleted_while_the_newest_is_far_smaller(tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_a_store_that_is_busy_for_long_ends_no_schedule(tmp_path: Path) -> None:
+def test_store_busy_long_ends_no_schedule(tmp_path: Path) -> None:
+    """A store that is busy for long ends no schedule."""
     folder, data = tmp_path / "backups", tmp_path / "data"
     data.mkdir()
     with running(Place(data), **scheduled(folder, UNDERSKIN_BACKUP_EVERY=_SECOND)):
@@ -167,7 +175,8 @@ def test_a_store_that_is_busy_for_long_ends_no_schedule(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_two_servers_make_one_backup_between_them(place: Place, tmp_path: Path) -> None:
+def test_two_servers_make_backup(place: Place, tmp_path: Path) -> None:
+    """Two servers make one backup between them."""
     folder = tmp_path / "backups"
     with running(place, **scheduled(folder)), running(place, **scheduled(folder)):
         wait_for(folder, 1)
@@ -175,7 +184,8 @@ def test_two_servers_make_one_backup_between_them(place: Place, tmp_path: Path) 
         assert len(kept(folder)) == 1
 
 
-def test_a_folder_of_another_store_is_left_alone_and_the_doctor_says_so(place: Place, tmp_path: Path) -> None:
+def test_folder_store_left_alone_doctor_says(place: Place, tmp_path: Path) -> None:
+    """A folder of another store is left alone and the doctor says so."""
     folder, other = tmp_path / "backups", Place(tmp_path / "other")
     other.folder.mkdir()
     with running(place, **scheduled(folder)):
@@ -197,7 +207,8 @@ def test_a_folder_of_another_store_is_left_alone_and_the_doctor_says_so(place: P
     assert own["backups"]["level"] == "ok"
 
 
-def test_a_store_restored_from_a_backup_of_before_it_had_a_schedule_goes_on_with_its_own(tmp_path: Path) -> None:
+def test_store_restored_backup_before_schedule(tmp_path: Path) -> None:
+    """A store restored from a backup of before it had a schedule goes on with its own."""
     folder, place, old = tmp_path / "backups", Place(tmp_path / "data"), tmp_path / "old.sqlite3"
     place.folder.mkdir()
     with running(place, **NO_WORKERS):
@@ -210,8 +221,11 @@ def test_a_store_restored_from_a_backup_of_before_it_had_a_schedule_goes_on_with
         wait_for(folder, 2)
 
 
-def test_an_empty_note_of_whose_folder_it_is_ends_no_schedule(place: Place, tmp_path: Path) -> None:
-    """What an older version left where the disk was full, or the power failed."""
+def test_empty_note_folder_ends_no_schedule(place: Place, tmp_path: Path) -> None:
+    """An empty note of whose folder it is ends no schedule.
+
+    What an older version left where the disk was full, or the power failed.
+    """
     folder = tmp_path / "backups"
     folder.mkdir()
     (folder / OWNER).touch()

@@ -44,9 +44,8 @@ def test_a_backup_brings_back_what_was_there(server: Server, tmp_path: Path) -> 
     assert names(server) == {"before", "after"}
 
 
-def test_what_the_service_writes_is_its_owners_alone_and_nothing_lies_beside_a_backup(
-    server: Server, tmp_path: Path
-) -> None:
+def test_service_writes_owners_alone_nothing(server: Server, tmp_path: Path) -> None:
+    """What the service writes is its owners alone and nothing lies beside a backup."""
     file = tmp_path / "shared" / "kept.backup"
     file.parent.mkdir()
     for suffix in (".part", ".part-journal"):  # of a backup that was killed
@@ -58,9 +57,8 @@ def test_what_the_service_writes_is_its_owners_alone_and_nothing_lies_beside_a_b
     assert {entry.name: entry.stat().st_mode & 0o077 for entry in ours if entry.stat().st_mode & 0o077} == {}
 
 
-def test_a_backup_holds_the_mechanisms_of_the_labs_own(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_backup_holds_mechanisms_labs(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A backup holds the mechanisms of the labs own."""
     monkeypatch.delenv("UNDERSKIN_MECHANISMS", raising=False)
     folder, file = place.folder / "mechanisms", tmp_path / "kept.backup"  # where a server has it by itself
     folder.mkdir()
@@ -94,9 +92,8 @@ def test_a_backup_moves_to_another_machine(server: Server, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
-def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_acknowledged_during_restore_store(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is acknowledged during a restore is in the store or in its backup."""
     store = open_store(place.database_url, place.folder)
     file, undo = (tmp_path / f"{name}" for name in ("file", "undo"))
     undo = place.folder / "backups" / undo.name
@@ -123,9 +120,8 @@ def test_what_is_acknowledged_during_a_restore_is_in_the_store_or_in_its_backup(
 
 
 @pytest.mark.parametrize("place", BACKENDS, indirect=True)
-def test_readers_are_answered_while_a_restore_goes_on(
-    place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_readers_answered_restore_goes(place: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Readers are answered while a restore goes on."""
     monkeypatch.setattr(backup, "STEP_PAGES", 1)  # a small store is copied in several steps, too
     file = tmp_path / "backup"
     with running(place, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
@@ -146,7 +142,8 @@ def test_readers_are_answered_while_a_restore_goes_on(
         assert server.http.post("/v1/campaigns", json=campaign("after it")).status_code == 201
 
 
-def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> None:
+def test_backup_sqlite_file_read(tmp_path: Path) -> None:
+    """A backup of sqlite is one file that is only read."""
     (tmp_path / "data").mkdir()
     store = open_store("", tmp_path / "data")
     file = tmp_path / "alone" / "kept"
@@ -161,7 +158,8 @@ def test_a_backup_of_sqlite_is_one_file_that_is_only_read(tmp_path: Path) -> Non
 
 
 @on_both
-def test_what_is_no_backup_is_refused_and_changes_nothing(server: Server, tmp_path: Path) -> None:
+def test_no_backup_refused_changes_nothing(server: Server, tmp_path: Path) -> None:
+    """What is no backup is refused and changes nothing."""
     send(server, "kept")
     good = tmp_path / "good"
     assert server.place.command("backup", str(good)).returncode == 0

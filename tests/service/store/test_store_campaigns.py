@@ -22,7 +22,8 @@ def listed(server: Server, **query: str | int) -> list[dict[str, Any]]:
     return list(answer.json()["campaigns"])
 
 
-def test_what_was_sent_comes_back_to_the_last_digit(server: Server) -> None:
+def test_sent_comes_back_last_digit(server: Server) -> None:
+    """What was sent comes back to the last digit."""
     sent = campaign("first")
     answer = post(server, sent, skin="palm")
     assert answer["skin_id"] == "palm"
@@ -32,13 +33,15 @@ def test_what_was_sent_comes_back_to_the_last_digit(server: Server) -> None:
     assert document == sent
 
 
-def test_a_campaign_without_a_skin_gets_a_new_one(server: Server) -> None:
+def test_campaign_without_skin_gets_new(server: Server) -> None:
+    """A campaign without a skin gets a new one."""
     skins = {post(server, campaign(name))["skin_id"] for name in ("a", "b")}
     assert len(skins) == 2
     assert {entry["id"] for entry in server.http.get("/v1/skins").json()["skins"]} == skins
 
 
-def test_bad_recordings_are_named_and_the_good_ones_kept(server: Server) -> None:
+def test_bad_recordings_named_good_ones_kept(server: Server) -> None:
+    """Bad recordings are named and the good ones kept."""
     document = campaign("mixed")
     document["recordings"][0]["preload_n"] = -1
     document["recordings"][1]["frf_re_pc_per_n"][3] = None
@@ -56,7 +59,8 @@ def test_bad_recordings_are_named_and_the_good_ones_kept(server: Server) -> None
     assert {entry["id"] for entry in detail["refused"]} == set(refused)
 
 
-def test_all_or_nothing_keeps_nothing_of_a_spoilt_batch(server: Server) -> None:
+def test_nothing_keeps_nothing_spoilt_batch(server: Server) -> None:
+    """All or nothing keeps nothing of a spoilt batch."""
     spoilt = campaign("spoilt")
     spoilt["recordings"][4]["dynamic_force_n"] = 0
     answer = server.http.post("/v1/campaigns?all_or_nothing=true", json=[campaign("good"), spoilt])
@@ -65,7 +69,8 @@ def test_all_or_nothing_keeps_nothing_of_a_spoilt_batch(server: Server) -> None:
     assert listed(server, state="all") == []
 
 
-def test_a_form_of_many_files_is_answered_file_by_file(server: Server) -> None:
+def test_form_many_files_answered_file_file(server: Server) -> None:
+    """A form of many files is answered file by file."""
     import orjson
 
     files = [
@@ -86,7 +91,8 @@ def test_a_form_of_many_files_is_answered_file_by_file(server: Server) -> None:
     assert {entry["name"] for entry in listed(server)} == {"one", "three", "four"}
 
 
-def test_the_same_key_gets_the_same_answer_and_keeps_once(server: Server) -> None:
+def test_key_gets_answer_keeps_once(server: Server) -> None:
+    """The same key gets the same answer and keeps once."""
     headers = {"Idempotency-Key": "run-7"}
     first, second = (server.http.post("/v1/campaigns", json=campaign("run"), headers=headers) for _ in range(2))
     assert first.status_code == 201
@@ -98,7 +104,8 @@ def test_the_same_key_gets_the_same_answer_and_keeps_once(server: Server) -> Non
     assert len(listed(server, state="all")) == 1
 
 
-def test_a_form_is_recognised_although_its_boundary_differs(server: Server) -> None:
+def test_form_recognised_although_boundary(server: Server) -> None:
+    """A form is recognised although its boundary differs."""
     import orjson
 
     file = {"file": ("a.json", orjson.dumps(campaign("form")))}
@@ -108,7 +115,9 @@ def test_a_form_is_recognised_although_its_boundary_differs(server: Server) -> N
     assert len(listed(server)) == 1
 
 
-def test_the_same_key_many_times_at_once_keeps_once(server: Server) -> None:
+def test_key_many_times_once_keeps_once(server: Server) -> None:
+    """The same key many times at once keeps once."""
+
     def send(_: int) -> dict[str, Any]:
         answer = server.http.post("/v1/campaigns", json=campaign("at once"), headers={"Idempotency-Key": "k"})
         assert answer.status_code == 201, answer.text
@@ -120,7 +129,8 @@ def test_the_same_key_many_times_at_once_keeps_once(server: Server) -> None:
     assert len(listed(server, state="all")) == 1
 
 
-def test_a_refused_request_does_not_use_up_its_key(server: Server) -> None:
+def test_refused_request_not_use_up_key(server: Server) -> None:
+    """A refused request does not use up its key."""
     headers = {"Idempotency-Key": "again"}
     assert server.http.post("/v1/campaigns", json={"schema": "campaign/2"}, headers=headers).status_code == 422
     assert server.http.post("/v1/campaigns", json=campaign("again"), headers=headers).status_code == 201
@@ -149,7 +159,8 @@ def test_lists_are_paged_and_filtered(server: Server) -> None:
     assert server.http.get("/v1/campaigns?recorded_from=yesterday").status_code == 422
 
 
-def test_letters_beyond_ascii_are_found_in_either_case(server: Server) -> None:
+def test_letters_beyond_ascii_found_either_case(server: Server) -> None:
+    """Letters beyond ascii are found in either case."""
     post(server, campaign("Übung Eins"), skin="Äußere Haut")
     for text in ("Übung", "übung", "ÜBUNG EINS"):
         assert [entry["name"] for entry in listed(server, name_contains=text)] == ["Übung Eins"], text
@@ -171,7 +182,8 @@ def test_a_withdrawn_campaign_stays_and_says_why(server: Server) -> None:
     assert server.http.post(f"/v1/campaigns/{name}/withdraw", json={"reason": " "}).status_code == 422
 
 
-def test_a_correction_replaces_and_the_original_stays(server: Server) -> None:
+def test_correction_replaces_original_stays(server: Server) -> None:
+    """A correction replaces and the original stays."""
     original = post(server, campaign("thin"), skin="palm")["id"]
     right = campaign("thick", thickness_mm=2.6)
     corrected = post(server, right, corrects=original, reason="thickness was read wrong")
@@ -190,7 +202,8 @@ def test_a_correction_replaces_and_the_original_stays(server: Server) -> None:
     assert server.http.post("/v1/campaigns", json=right, params={"corrects": corrected["id"]}).status_code == 422
 
 
-def test_a_correction_stays_on_its_skin_whatever_its_file_says(server: Server) -> None:
+def test_correction_stays_skin_whatever_file(server: Server) -> None:
+    """A correction stays on its skin whatever its file says."""
     wrong = post(server, campaign("monday"), skin="palm")["id"]
     right = campaign("monday again", id="finger")
     corrected = post(server, right, corrects=wrong, reason="cable")
@@ -206,7 +219,8 @@ def test_a_correction_stays_on_its_skin_whatever_its_file_says(server: Server) -
     assert (same["skin_id"], same["notes"]) == ("finger", [])
 
 
-def test_two_corrections_at_once_leave_one_current(server: Server) -> None:
+def test_two_corrections_once_leave_current(server: Server) -> None:
+    """Two corrections at once leave one current."""
     original = post(server, campaign("first"), skin="palm")["id"]
     query = {"corrects": original, "reason": "both noticed"}
 
@@ -219,7 +233,8 @@ def test_two_corrections_at_once_leave_one_current(server: Server) -> None:
 
 
 @pytest.mark.parametrize("skin", ["a/b", "..", "  "])
-def test_a_skin_that_no_address_can_name_is_refused(server: Server, skin: str) -> None:
+def test_skin_no_address_name_refused(server: Server, skin: str) -> None:
+    """A skin that no address can name is refused."""
     assert server.http.post("/v1/campaigns", json=campaign("x"), params={"skin": skin}).status_code == 422
     assert server.http.post("/v1/campaigns", json=campaign("x", id=skin)).status_code == 422
 

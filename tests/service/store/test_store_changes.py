@@ -44,7 +44,8 @@ def detail(server: Server, campaign_id: str) -> dict[str, Any]:
     return answer
 
 
-def test_a_withdrawal_is_undone_until_something_builds_on_it(server: Server, lab: httpx.Client) -> None:
+def test_withdrawal_undone_until_something(server: Server, lab: httpx.Client) -> None:
+    """A withdrawal is undone until something builds on it."""
     campaign_id = sent(server, "monday")
     place = f"/campaigns/{campaign_id}"
     before = server.http.get("/v1/skins/palm/history").json()["sensors"]
@@ -64,7 +65,8 @@ def test_a_withdrawal_is_undone_until_something_builds_on_it(server: Server, lab
     assert undo(lab, place, "ch-nothing").status_code == 404
 
 
-def test_exclusions_are_undone_one_by_one_and_not_once_diagnosed(server: Server, lab: httpx.Client) -> None:
+def test_exclusions_undone_not_once_diagnosed(server: Server, lab: httpx.Client) -> None:
+    """Exclusions are undone one by one and not once diagnosed."""
     campaign_id = sent(server, "tuesday")
     place = f"/campaigns/{campaign_id}"
     for recording in ("s0-1N", "s1-1N"):
@@ -82,7 +84,8 @@ def test_exclusions_are_undone_one_by_one_and_not_once_diagnosed(server: Server,
     assert "it was diagnosed since" in undo(lab, place, first).text
 
 
-def test_what_is_written_to_a_campaign_is_found_and_taken_back(server: Server, lab: httpx.Client) -> None:
+def test_written_campaign_found_taken_back(server: Server, lab: httpx.Client) -> None:
+    """What is written to a campaign is found and taken back."""
     campaign_id = sent(server, "wednesday")
     place = f"/campaigns/{campaign_id}"
     d33 = server.http.get(f"/v1/campaigns/{campaign_id}/d33").json()
@@ -117,7 +120,8 @@ def test_skins_are_named_joined_and_parted(server: Server, lab: httpx.Client) ->
     assert server.http.get("/v1/skins/hand").json()["id"] == "hand"
 
 
-def test_only_a_skin_without_campaigns_in_use_is_put_away(server: Server, lab: httpx.Client) -> None:
+def test_skin_without_campaigns_use_put_away(server: Server, lab: httpx.Client) -> None:
+    """Only a skin without campaigns in use is put away."""
     campaign_id = sent(server, "trial", "trial")
     sent(server, "kept", "kept")
     assert change(lab, "/skins/trial", "discard", reason="a trial") == 409
@@ -135,7 +139,8 @@ def test_only_a_skin_without_campaigns_in_use_is_put_away(server: Server, lab: h
     assert ">trial</a>" in lab.get("/").text
 
 
-def test_an_export_brings_changes_and_who_made_them(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
+def test_export_brings_changes_made(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
+    """An export brings changes and who made them."""
     campaign_id = sent(server, "moved")
     place = f"/campaigns/{campaign_id}"
     assert change(lab, place, "annotate", name="renamed", remark="as it was", tags="one, two") == 303
@@ -169,7 +174,9 @@ def test_a_withdrawal_says_who(tmp_path: Path) -> None:
 
 
 @pytest.mark.soak
-def test_an_import_into_a_skin_put_away_brings_it_back(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
+def test_import_skin_put_away_brings_back(server: Server, elsewhere: Server, lab: httpx.Client) -> None:
+    """An import into a skin put away brings it back."""
+
     def listed() -> list[str]:
         return [entry["id"] for entry in elsewhere.http.get("/v1/skins").json()["skins"]]
 

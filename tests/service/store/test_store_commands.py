@@ -70,7 +70,8 @@ def test_campaigns_and_skins_are_listed(server: Server) -> None:
     assert refused(server, "campaigns", "--skin", "plam") == "underskin: 404 Not Found: There is no skin 'plam'."
 
 
-def test_a_campaign_is_shown_with_its_recordings_and_diagnoses(server: Server) -> None:
+def test_campaign_shown_recordings_diagnoses(server: Server) -> None:
+    """A campaign is shown with its recordings and diagnoses."""
     spoilt = campaign("spoilt", sensors=2)
     spoilt["recordings"][0]["preload_n"] = -1.0
     campaign_id = server.http.post("/v1/campaigns?skin=palm", json=spoilt).json()["id"]
@@ -84,7 +85,8 @@ def test_a_campaign_is_shown_with_its_recordings_and_diagnoses(server: Server) -
     assert document == server.http.get(f"/v1/campaigns/{campaign_id}").json()
 
 
-def test_the_history_of_a_skin_and_what_it_leaves_out(server: Server) -> None:
+def test_history_skin_leaves(server: Server) -> None:
+    """The history of a skin and what it leaves out."""
     first = sent(server, "first", "palm")
     second = sent(server, "second", "palm", d33=10.0)
     gone = sent(server, "third", "palm")
@@ -104,7 +106,8 @@ def test_the_history_of_a_skin_and_what_it_leaves_out(server: Server) -> None:
     assert "no adopted model" in refused(server, "history", "palm", "--model", "adopted")
 
 
-def test_a_campaign_is_withdrawn_and_a_recording_excluded_with_the_reason(server: Server) -> None:
+def test_campaign_withdrawn_recording_excluded(server: Server) -> None:
+    """A campaign is withdrawn and a recording excluded with the reason."""
     campaign_id = sent(server, "first", "palm")
     words = told(server, "exclude", campaign_id, "s0-1N", "--reason", "cable loose")
     assert words == f"recording s0-1N is excluded; 1 of 2 recordings are now, of campaign {campaign_id}\n"
@@ -118,7 +121,8 @@ def test_a_campaign_is_withdrawn_and_a_recording_excluded_with_the_reason(server
     assert "--reason" in refused(server, "withdraw", campaign_id)
 
 
-def test_a_campaign_is_corrected_once_however_often_it_is_sent(server: Server, tmp_path: Path) -> None:
+def test_campaign_corrected_once_however_often(server: Server, tmp_path: Path) -> None:
+    """A campaign is corrected once however often it is sent."""
     first = sent(server, "first", "palm")
     file, other = tmp_path / "right.json", tmp_path / "other.json"
     file.write_bytes(orjson.dumps(campaign("right", sensors=1)))
@@ -136,7 +140,8 @@ def test_a_campaign_is_corrected_once_however_often_it_is_sent(server: Server, t
     assert "cannot be opened" in refused(server, "correct", first, str(tmp_path / "none"), "--reason", "x")
 
 
-def test_moduli_of_an_import_say_of_which_recording(server: Server, tmp_path: Path) -> None:
+def test_moduli_import_say_recording(server: Server, tmp_path: Path) -> None:
+    """Moduli of an import say of which recording."""
     travel = [0.05 * step for step in range(20)]
     blocks = [
         {"id": name, "kind": "compression", "sample_height_mm": 10.0, "sample_diameter_mm": 10.0,
@@ -170,7 +175,8 @@ def test_the_model_of_a_diagnosis_is_adopted(server: Server) -> None:
     assert refused(server, "adopt", "palm", "d-none").endswith("There is no diagnosis 'd-none'.")
 
 
-def test_a_key_that_is_missing_or_wrong_and_a_server_that_is_not_there_are_said(tmp_path: Path) -> None:
+def test_key_missing_wrong_server_not_said(tmp_path: Path) -> None:
+    """A key that is missing or wrong and a server that is not there are said."""
     place = Place(tmp_path / "data")
     place.folder.mkdir()
     keys = {

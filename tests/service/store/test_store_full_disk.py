@@ -49,7 +49,8 @@ def cramped(request: pytest.FixtureRequest, small_disk: Path, tmp_path: Path) ->
     cluster.drop(url)
 
 
-def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place, small_disk: Path) -> None:
+def test_full_disk_refuses_keeps_acknowledged(cramped: Place, small_disk: Path) -> None:
+    """A full disk refuses and keeps what it acknowledged."""
     acknowledged: dict[str, dict[str, Any]] = {}
     with running(cramped) as server:
         statuses: list[int] = []
@@ -73,7 +74,8 @@ def test_a_full_disk_refuses_and_keeps_what_it_acknowledged(cramped: Place, smal
         require_kept(server, acknowledged)
 
 
-def test_an_upload_that_does_not_fit_is_refused_as_it_streams(small_disk: Path) -> None:
+def test_upload_not_fit_refused_streams(small_disk: Path) -> None:
+    """An upload that does not fit is refused as it streams."""
     with running(Place(small_disk)) as server:
         document = orjson.dumps(campaign("one")) + b" " * 10_000_000
         answer = server.http.post("/v1/campaigns", files={"file": ("big.json", document)})
@@ -132,7 +134,8 @@ def fill(disk: Path) -> None:
             file.write(bytes(4096))
 
 
-def test_a_key_that_finds_no_room_leaves_no_digest_behind(small_disk: Path) -> None:
+def test_key_finds_no_room_leaves_no_digest(small_disk: Path) -> None:
+    """A key that finds no room leaves no digest behind."""
     fill(small_disk)
     with pytest.raises(OSError, match="No space"):
         KeyStore(small_disk).create("lab", "read")

@@ -39,7 +39,8 @@ def derive(store: Database, row: AnyRow) -> None:
         inversions.keep(connection, row, TABLE, {"campaign_id": row.id}, {}, {"s0": (14.0, 0.1)})
 
 
-def test_a_history_shows_nothing_of_an_earlier_revision(store: Database) -> None:
+def test_history_shows_nothing_earlier_revision(store: Database) -> None:
+    """A history shows nothing of an earlier revision."""
     row = kept(store, "one")
     derive(store, row)
     with store.reading() as connection:
@@ -51,9 +52,11 @@ def test_a_history_shows_nothing_of_an_earlier_revision(store: Database) -> None
 
 
 @pytest.mark.parametrize("error", [OverflowError("too large"), ValueError("no zone"), IndexError("none left")])
-def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
+def test_figures_cannot_computed_answer_tried(
     store: Database, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, error: Exception
 ) -> None:
+    """Figures that cannot be computed are an answer and tried again."""
+
     def fail(*_: object) -> None:
         raise error
 
@@ -70,7 +73,8 @@ def test_figures_that_cannot_be_computed_are_an_answer_and_tried_again(
         assert len(inversions.history(connection, "palm", table.sha256)) == 3
 
 
-def test_values_that_leave_nothing_to_invert_are_answered(server: Server) -> None:
+def test_values_leave_nothing_invert_answered(server: Server) -> None:
+    """Values that leave nothing to invert are answered."""
     silent, huge, wide = (campaign(name) for name in ("silent", "huge", "wide"))
     for recording in silent["recordings"]:
         recording["frf_re_pc_per_n"] = recording["frf_im_pc_per_n"] = [0.0] * 20
@@ -86,7 +90,8 @@ def test_values_that_leave_nothing_to_invert_are_answered(server: Server) -> Non
     assert server.http.get("/v1/skins/palm/history").status_code == 200
 
 
-def test_what_was_derived_before_a_restore_is_not_kept_for_another_campaign(store: Database, tmp_path: Path) -> None:
+def test_derived_before_restore_not_kept(store: Database, tmp_path: Path) -> None:
+    """What was derived before a restore is not kept for another campaign."""
     empty = tmp_path / "empty"
     backup.make(store, empty)
     lost = kept(store, "lost")

@@ -55,7 +55,8 @@ def require_whole(shown: str, step: str, size: int) -> None:
     assert float(of) * UNITS[unit] == pytest.approx(size, abs=0.051 * UNITS[unit])
 
 
-def test_an_import_counts_the_bytes_that_it_sends(server: Server, tmp_path: Path) -> None:
+def test_import_counts_bytes_sends(server: Server, tmp_path: Path) -> None:
+    """An import counts the bytes that it sends."""
     files = [tmp_path / f"{name}.json" for name in ("one", "two")]
     for file in files:
         file.write_bytes(orjson.dumps(campaign(file.stem, lines=400)))
@@ -70,7 +71,8 @@ def test_an_import_counts_the_bytes_that_it_sends(server: Server, tmp_path: Path
         assert sum(told) == size
 
 
-def test_a_backup_and_a_restore_count_the_bytes_that_they_copy(server: Server, tmp_path: Path) -> None:
+def test_backup_restore_count_bytes_copy(server: Server, tmp_path: Path) -> None:
+    """A backup and a restore count the bytes that they copy."""
     server.http.post("/v1/campaigns", json=campaign("kept"))
     file = tmp_path / "kept.backup"
     shown = on_a_terminal(server.place, "backup", str(file))
@@ -105,9 +107,8 @@ def assert_rising(told: Sequence[tuple[str, int, int | None]], step: str) -> Non
     assert done[-1] > 0
 
 
-def test_a_copy_of_sqlite_in_steps_holds_one_state_and_never_begins_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_copy_sqlite_steps_holds_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A copy of sqlite in steps holds one state and never begins anew."""
     monkeypatch.setattr(backup, "STEP_PAGES", 5)
     folder = tmp_path / "data"
     folder.mkdir()

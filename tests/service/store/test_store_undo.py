@@ -70,7 +70,8 @@ def listed(store: Database) -> set[str]:
     return {row.id for row in store.read(skins.listed, None, None, 9)}
 
 
-def test_a_join_below_another_is_undone_only_after_that(store: Database) -> None:
+def test_join_below_undone(store: Database) -> None:
+    """A join below another is undone only after that."""
     for name in "abcd":
         store.write(skins.require, name)
     lower, upper = joined(store, "a", "b"), joined(store, "c", "a")
@@ -85,7 +86,8 @@ def test_a_join_below_another_is_undone_only_after_that(store: Database) -> None
     assert roots(store, "abcd") == {"a": "a", "b": "d", "c": "c", "d": "d"}
 
 
-def test_a_join_that_is_no_longer_so_cannot_be_undone(store: Database) -> None:
+def test_join_no_longer_cannot_undone(store: Database) -> None:
+    """A join that is no longer so cannot be undone."""
     for name in "abc":
         store.write(skins.require, name)
     joined(store, "c", "b")
@@ -96,7 +98,8 @@ def test_a_join_that_is_no_longer_so_cannot_be_undone(store: Database) -> None:
     assert roots(store, "abc") == {"a": "a", "b": "c", "c": "c"}
 
 
-def test_a_skin_put_away_comes_back_with_campaigns_in_use(store: Database) -> None:
+def test_skin_put_away_comes_back_campaigns_use(store: Database) -> None:
+    """A skin put away comes back with campaigns in use."""
     campaign_id = store.write(keep, "palm")
     store.write(campaigns.withdraw, campaign_id, "wrong sphere", None)
     withdrawal = last(store)
@@ -106,7 +109,8 @@ def test_a_skin_put_away_comes_back_with_campaigns_in_use(store: Database) -> No
     assert listed(store) == {"palm"}
 
 
-def test_a_join_undone_since_is_exported_and_imported(store: Database, tmp_path: Path) -> None:
+def test_join_undone_since_exported_imported(store: Database, tmp_path: Path) -> None:
+    """A join undone since is exported and imported."""
     for name in "ab":
         store.write(skins.require, name)
     store.write(undo.undo, joined(store, "a", "b"), None)
@@ -117,7 +121,8 @@ def test_a_join_undone_since_is_exported_and_imported(store: Database, tmp_path:
 
 
 @pytest.mark.parametrize("away", ["palm", "hand"])
-def test_neither_of_two_joined_skins_stays_put_away(store: Database, away: str) -> None:
+def test_neither_two_joined_skins_stays_put_away(store: Database, away: str) -> None:
+    """Neither of two joined skins stays put away."""
     for name in ("palm", "hand"):
         store.write(skins.require, name)
     store.write(annotations.discard, away, "empty", None)
@@ -129,7 +134,8 @@ def test_neither_of_two_joined_skins_stays_put_away(store: Database, away: str) 
     assert listed(store) == {"palm", "hand"}
 
 
-def test_a_page_asks_no_more_of_the_store_for_many_changes(store: Database) -> None:
+def test_page_asks_no_store_many_changes(store: Database) -> None:
+    """A page asks no more of the store for many changes."""
     campaign_id = store.write(keep, "palm")
 
     def statements() -> int:
@@ -147,7 +153,8 @@ def test_a_page_asks_no_more_of_the_store_for_many_changes(store: Database) -> N
     assert statements() == few
 
 
-def test_arrivals_of_one_skin_do_not_wait_for_each_other(on_postgresql: Database) -> None:
+def test_arrivals_skin_not_wait(on_postgresql: Database) -> None:
+    """Arrivals of one skin do not wait for each other."""
     on_postgresql.write(skins.require, "palm")
     with on_postgresql.writing() as connection:
         keep(connection, "palm")
@@ -157,7 +164,8 @@ def test_arrivals_of_one_skin_do_not_wait_for_each_other(on_postgresql: Database
         assert not other.is_alive()
 
 
-def test_an_arrival_brings_back_a_skin_that_is_being_put_away(on_postgresql: Database) -> None:
+def test_arrival_brings_back_skin_being_put_away(on_postgresql: Database) -> None:
+    """An arrival brings back a skin that is being put away."""
     on_postgresql.write(skins.require, "palm")
     other = threading.Thread(target=on_postgresql.write, args=(keep, "palm"))
     with on_postgresql.writing() as connection:
@@ -169,7 +177,8 @@ def test_an_arrival_brings_back_a_skin_that_is_being_put_away(on_postgresql: Dat
     assert listed(on_postgresql) == {"palm"}
 
 
-def test_an_undo_and_a_change_of_one_campaign_wait_for_each_other(on_postgresql: Database) -> None:
+def test_undo_change_campaign_wait(on_postgresql: Database) -> None:
+    """An undo and a change of one campaign wait for each other."""
     campaign_id = on_postgresql.write(keep, "palm")
     on_postgresql.write(annotations.of_campaign, campaign_id, {"remark": "wet"}, None)
     other = threading.Thread(target=on_postgresql.write, args=(undo.undo, last(on_postgresql), None))
@@ -183,7 +192,8 @@ def test_an_undo_and_a_change_of_one_campaign_wait_for_each_other(on_postgresql:
     assert on_postgresql.read(campaigns.find, campaign_id).remark is None
 
 
-def test_the_undo_of_a_correction_waits_for_a_model_of_the_skin_that_it_left(on_postgresql: Database) -> None:
+def test_undo_correction_waits_model_skin_left(on_postgresql: Database) -> None:
+    """The undo of a correction waits for a model of the skin that it left."""
     older, another = on_postgresql.write(keep, "palm"), on_postgresql.write(keep, "palm")
     asked = on_postgresql.write(diagnoses.ask, another, diagnoses.Basis("0" * 64, "1.0"), None)
     diagnosis = on_postgresql.read(diagnoses.find, asked.id)

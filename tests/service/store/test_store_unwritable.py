@@ -41,7 +41,8 @@ def kept_d33(place: Place) -> int:
         return int(connection.execute(select(func.count()).select_from(inversions)).scalar_one())
 
 
-def test_d33_that_is_not_kept_is_told_during_a_restore(server: Server) -> None:
+def test_d33_not_kept_told_during_restore(server: Server) -> None:
+    """D33 that is not kept is told during a restore."""
     arrivals = [server.http.post("/v1/campaigns?skin=palm", json=campaign(f"run {n}")) for n in range(CAMPAIGNS)]
     paths = [f"/v1/campaigns/{arrivals[0].json()['id']}/d33", "/v1/skins/palm/history", "/skins/palm/history.csv"]
     before = {path: answered(server, path).text for path in paths}
@@ -55,7 +56,8 @@ def test_d33_that_is_not_kept_is_told_during_a_restore(server: Server) -> None:
     assert kept_d33(server.place) == CAMPAIGNS + 1
 
 
-def test_d33_by_an_adopted_model_is_told_during_a_restore(server: Server) -> None:
+def test_d33_adopted_model_told_during_restore(server: Server) -> None:
+    """D33 by an adopted model is told during a restore."""
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     assert server.http.post("/v1/skins/palm/model", json={"diagnosis_id": diagnosis_id}).is_success
     paths = [f"/v1/campaigns/{campaign_id}/d33?model=adopted", "/v1/skins/palm/history?model=adopted"]
@@ -77,7 +79,8 @@ def read_only(folder: Path) -> Iterator[None]:
         subprocess.run(["umount", "--lazy", folder], check=True)
 
 
-def test_a_disk_that_is_read_only_refuses_and_what_is_kept_is_told(tmp_path: Path) -> None:
+def test_disk_read_refuses_kept_told(tmp_path: Path) -> None:
+    """A disk that is read only refuses and what is kept is told."""
     folder = tmp_path / "data"
     folder.mkdir()
     with running(Place(folder)) as server:

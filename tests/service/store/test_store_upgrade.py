@@ -81,7 +81,8 @@ def count_on(connection: Any, table: Table) -> None:
 
 
 @pytest.mark.parametrize("older", OLDER, indirect=True)
-def test_an_older_store_is_taken_up_with_all_that_it_holds(older: Place, rows: Rows) -> None:
+def test_older_store_taken_up_holds(older: Place, rows: Rows) -> None:
+    """An older store is taken up with all that it holds."""
     store = database(older.database_url, older.folder)
     held = migrate.version(store)
     store.close()

@@ -56,7 +56,8 @@ def least_dip(offset: Floats, response: Floats, pitch: float, distance: float) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("resolution_mm", first(2, [1.2, 6.0, 2.0]))
-def test_every_design_that_is_offered_meets_the_demand_by_the_forward_calculation(resolution_mm: float) -> None:
+def test_every_design_offered_meets_demand(resolution_mm: float) -> None:
+    """Every design that is offered meets the demand by the forward calculation."""
     answer = found(resolution_mm=resolution_mm)
     assert answer.offers
     assert not answer.binding
@@ -77,8 +78,11 @@ def test_every_design_that_is_offered_meets_the_demand_by_the_forward_calculatio
 
 @pytest.mark.slow
 @pytest.mark.parametrize("changed", first(2, [{}, {"preload_n": 0.05}, {"resolution_mm": 5.0}]))
-def test_every_pair_that_is_counted_meets_the_demand_at_its_pitch(changed: dict[str, float]) -> None:
-    """Also near the edge, where few placements of the row take for resolved what the full calculation does not."""
+def test_every_pair_counted_meets_demand_pitch(changed: dict[str, float]) -> None:
+    """Every pair that is counted meets the demand at its pitch.
+
+    Also near the edge, where few placements of the row take for resolved what the full calculation does not.
+    """
     answer, region = found(**changed), found(**changed).region
     pairs = list(zip(*np.nonzero(answer.feasible), strict=True))[:: 1 if SOAK else 3]
     asked = {name: value for name, value in {**ASKED, **changed}.items() if name in DesignRequest.model_fields}
@@ -94,7 +98,8 @@ def test_every_pair_that_is_counted_meets_the_demand_at_its_pitch(changed: dict[
         assert apart <= {**ASKED, **changed}["resolution_mm"]
 
 
-def test_a_coarser_array_than_the_best_that_is_offered_misses_the_demand() -> None:
+def test_coarser_array_best_offered_misses() -> None:
+    """A coarser array than the best that is offered misses the demand."""
     best = found().offers[0]
     coarser = best.request.model_copy(update={"pitch_mm": 1.08 * best.request.pitch_mm})
     apart = design_answer(load_table(), coarser, design_of(load_table(), coarser)).two_point_separation_mm
@@ -120,9 +125,8 @@ def test_more_is_met_where_less_is_asked() -> None:
         ("least_frf_pc_per_n", 12.0, "gives more than"),
     ],
 )
-def test_the_limit_that_keeps_all_out_is_named_with_the_number_that_would_do(
-    field: str, asked: float, words: str
-) -> None:
+def test_limit_keeps_out_named_number(field: str, asked: float, words: str) -> None:
+    """The limit that keeps all out is named with the number that would do."""
     answer = found(**{field: asked})
     assert not answer.offers
     assert len(answer.binding) == 1
@@ -132,7 +136,8 @@ def test_the_limit_that_keeps_all_out_is_named_with_the_number_that_would_do(
     assert not found(**{field: 1.03 * float(told[1])}).feasible.any()
 
 
-def test_two_contacts_that_touch_are_the_limit_of_every_skin() -> None:
+def test_two_contacts_touch_limit_every_skin() -> None:
+    """Two contacts that touch are the limit of every skin."""
     touching = 2 * float(found().region.contact_radius_mm.min())
     assert touching < 2e3 * (3 * 1.0 * 4e-3 * 0.75 / (4 * 16e6)) ** (1 / 3)  # Hertz, ν = 1/2: a thin layer is stiffer
     answer = found(resolution_mm=0.99 * touching)
@@ -141,7 +146,8 @@ def test_two_contacts_that_touch_are_the_limit_of_every_skin() -> None:
     assert not answer.feasible.any()
 
 
-def test_a_force_beyond_the_table_is_told_with_the_highest_one() -> None:
+def test_force_beyond_table_told_highest() -> None:
+    """A force beyond the table is told with the highest one."""
     answer = found(preload_n=100.0, resolution_mm=10.0)
     assert answer.binding[0].startswith("The table of σ")
     highest = float(answer.binding[0].split("at most ")[1].removesuffix(" N"))
@@ -150,20 +156,23 @@ def test_a_force_beyond_the_table_is_told_with_the_highest_one() -> None:
 
 
 @pytest.mark.parametrize("preload_n", [2.7, 3.0])
-def test_the_thinnest_layer_of_the_search_is_inside_the_table(preload_n: float) -> None:
+def test_thinnest_layer_search_inside_table(preload_n: float) -> None:
+    """The thinnest layer of the search is inside the table."""
     region = found(preload_n=preload_n, indenter_radius_mm=10.0, youngs_modulus_mpa=1.0, resolution_mm=1.0).region
     assert region.contact_radius_mm[0] / region.thickness_mm[0] == pytest.approx(3.0, rel=5e-3)
     assert np.isfinite(region.frf_pc_per_n[0]).all()
 
 
-def test_where_even_the_finest_skin_spreads_too_far_its_own_resolution_is_told() -> None:
+def test_even_finest_skin_spreads_too_far() -> None:
+    """Where even the finest skin spreads too far its own resolution is told."""
     answer = found(preload_n=0.05, resolution_mm=0.4, least_frf_pc_per_n=0.0, dip_percent=50.0)
     assert answer.binding[0].startswith("The spread of the stress: even the finest skin")
     told = float(answer.binding[0].split("apart from ")[1].split()[0])
     assert told > 0.4
 
 
-def test_the_largest_pitch_of_a_bell_is_where_sensor_by_sensor_the_dip_is_just_seen() -> None:
+def test_largest_pitch_bell_sensor_sensor_dip() -> None:
+    """The largest pitch of a bell is where sensor by sensor the dip is just seen."""
     spread, distance = 0.4e-3, 2.4e-3
     offset = np.linspace(0, 12 * spread, 600)
     bell = np.exp(-((offset / spread) ** 2) / 2)
@@ -177,8 +186,11 @@ def test_the_largest_pitch_of_a_bell_is_where_sensor_by_sensor_the_dip_is_just_s
     assert np.isnan(largest_pitch(offset, bell, 2 * spread, 0.1e-3, 0.1))  # the sum of two bells has one top there
 
 
-def test_no_array_resolves_less_than_twice_its_pitch() -> None:
-    """Where the middle between the contacts lies midway between two sensors, each reads more than the one beyond it."""
+def test_no_array_resolves_less_twice_pitch() -> None:
+    """No array resolves less than twice its pitch.
+
+    Where the middle between the contacts lies midway between two sensors, each reads more than the one beyond it.
+    """
     for width in (0.3, 0.8, 2.0):
         offset = np.linspace(0, 20, 2000)
         bell = np.exp(-((offset / width) ** 2))

@@ -13,9 +13,8 @@ from tests.support.store_server import Server
 from underskin.surrogate.sigma_table import load_table
 
 
-def test_a_file_that_is_removed_while_the_catalogue_is_read_is_not_shown(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_file_removed_catalogue_read_not_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file that is removed while the catalogue is read is not shown."""
     file = tmp_path / "warm_amplifier.yaml"
     monkeypatch.setenv("UNDERSKIN_MECHANISMS", str(tmp_path))
     file.write_text(WARM)
@@ -38,8 +37,11 @@ def test_a_file_that_is_removed_while_the_catalogue_is_read_is_not_shown(
         mechanisms.catalogue()  # as it was for other tests
 
 
-def test_what_a_restored_store_holds_under_the_same_numbers_is_read(server: Server) -> None:
-    """Another diagnosis may have the number of one that was looked at before."""
+def test_restored_store_holds_under_numbers_read(server: Server) -> None:
+    """What a restored store holds under the same numbers is read.
+
+    Another diagnosis may have the number of one that was looked at before.
+    """
     store = database(server.place.database_url, server.place.folder)
     try:
         for mechanism in ("contact_resonance", "modulus_error"):

@@ -42,7 +42,8 @@ def test_skins_are_paged_and_found(server: Server) -> None:
     assert server.http.get("/v1/skins/none").status_code == 404
 
 
-def test_joined_skins_are_one_and_keep_their_names(server: Server) -> None:
+def test_joined_skins_keep_names(server: Server) -> None:
+    """Joined skins are one and keep their names."""
     a, b, c = (post(server, skin, skin, year=year) for skin, year in (("a", 2017), ("b", 2018), ("c", 2019)))
     join = {"skin_id": "b", "reason": "the label fell off"}
     assert server.http.post("/v1/skins/a/join", json=join).status_code == 200
@@ -58,7 +59,8 @@ def test_joined_skins_are_one_and_keep_their_names(server: Server) -> None:
     assert points(server, "c") == [a, b, c, d]
 
 
-def test_what_joined_skins_declare_differently_is_said(server: Server) -> None:
+def test_joined_skins_declare_differently_said(server: Server) -> None:
+    """What joined skins declare differently is said."""
     post(server, "a", "a")
     document = campaign("b")
     document["skin"] |= {"youngs_modulus_mpa": 9.0}
@@ -85,7 +87,8 @@ def test_a_joined_skin_is_not_joined_again(server: Server) -> None:
     assert (answer.status_code, "'a'" in answer.json()["detail"]) == (409, True)
 
 
-def test_a_sensor_that_ages_shows_and_the_others_do_not(server: Server) -> None:
+def test_sensor_ages_shows(server: Server) -> None:
+    """A sensor that ages shows and the others do not."""
     for year in range(2017, 2023):
         document = campaign(f"{year}")
         for recording in document["recordings"]:
@@ -114,7 +117,8 @@ def test_a_sensor_that_ages_shows_and_the_others_do_not(server: Server) -> None:
         (("2017-05-03T09:00:00", "2017-05-03T12:00:00", "2017-05-04T08:59:00"), "less than a day"),
     ],
 )
-def test_no_trend_is_told_from_times_that_tell_none(server: Server, times: tuple[str | None, ...], why: str) -> None:
+def test_no_trend_told_times_tell_none(server: Server, times: tuple[str | None, ...], why: str) -> None:
+    """No trend is told from times that tell none."""
     for number, time in enumerate(times):
         document = campaign(f"{number}")
         for recording in document["recordings"]:
@@ -152,7 +156,8 @@ def test_figures_say_what_they_leave_out(server: Server) -> None:
     assert absent.status_code == 404
 
 
-def test_d33_shows_what_looks_wrong_and_the_elastomers_modulus(server: Server) -> None:
+def test_d33_shows_looks_wrong_elastomers(server: Server) -> None:
+    """D33 shows what looks wrong and the elastomers modulus."""
     document = campaign("in C/N", d33=14e-12)
     strain = np.linspace(0, 0.1, 30)
     block = {
@@ -183,7 +188,8 @@ def sent(server: Server, document: dict[str, Any]) -> str:
     return str(answer.json()["id"])
 
 
-def test_the_page_describes_the_skin_by_its_latest_campaign_with_frfs(server: Server) -> None:
+def test_page_describes_skin_latest_campaign(server: Server) -> None:
+    """The page describes the skin by its latest campaign with frfs."""
     for name, day in (("later", "2024-09-02"), ("earlier", "2024-05-02")):
         document = campaign(name, thickness_mm=3.0 if name == "later" else 2.5)
         for recording in document["recordings"]:
@@ -195,8 +201,11 @@ def test_the_page_describes_the_skin_by_its_latest_campaign_with_frfs(server: Se
     assert '>3</span>&nbsp;<span class="unit">mm</span>' in page
 
 
-def test_an_array_that_ages_is_told_before_its_sensors(server: Server) -> None:
-    """All sensors fall by 3 % from date to date, which no sensor alone tells; the page and the command say it."""
+def test_array_ages_told_before_sensors(server: Server) -> None:
+    """An array that ages is told before its sensors.
+
+    All sensors fall by 3 % from date to date, which no sensor alone tells; the page and the command say it.
+    """
     for number in range(4):
         document = campaign(f"{number}", sensors=6)
         for recording in document["recordings"]:

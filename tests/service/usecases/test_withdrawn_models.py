@@ -45,7 +45,8 @@ def point_ids(client: Client) -> set[str]:
     return {point["model_id"] for entry in history["sensors"] for point in entry["points"]}
 
 
-def test_without_it_the_skin_answers_as_one_that_never_had_a_model(server: Server, client: Client) -> None:
+def test_without_skin_answers_never_model(server: Server, client: Client) -> None:
+    """Without it the skin answers as one that never had a model."""
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     never = by_the_adopted_model(server, campaign_id)
     assert {status for status, _ in never} == {404}
@@ -89,7 +90,8 @@ def test_versions_before_it_do_not_come_back(server: Server, client: Client) -> 
     assert client.skins.adopt("palm", adopted[0]["diagnosis_id"])["version"] == 3
 
 
-def test_of_joined_skins_the_last_adoption_is_withdrawn(server: Server, client: Client) -> None:
+def test_joined_skins_last_adoption_withdrawn(server: Server, client: Client) -> None:
+    """Of joined skins the last adoption is withdrawn."""
     for skin in ("a", "b"):
         _, diagnosis_id = diagnosed(server, resonant(skin), report(), skin)
         client.skins.adopt(skin, diagnosis_id)
@@ -100,7 +102,8 @@ def test_of_joined_skins_the_last_adoption_is_withdrawn(server: Server, client: 
             client.skins.model(skin)
 
 
-def test_a_model_that_serves_nothing_can_be_withdrawn(server: Server, client: Client) -> None:
+def test_model_serves_nothing_withdrawn(server: Server, client: Client) -> None:
+    """A model that serves nothing can be withdrawn."""
     campaign_id, diagnosis_id = diagnosed(server, resonant("array"), report())
     client.skins.adopt("palm", diagnosis_id)
     client.campaigns.withdraw(campaign_id, "fell down")
@@ -138,7 +141,8 @@ def test_it_is_withdrawn_once(server: Server, client: Client) -> None:
     assert client.skins.model("palm") == newest
 
 
-def test_who_withdrew_it_is_kept_and_who_may_read_only_cannot(tmp_path: Path) -> None:
+def test_withdrew_kept_read(tmp_path: Path) -> None:
+    """Who withdrew it is kept and who may read only cannot."""
     folder = tmp_path / "data"
     reading, writing = (KeyStore(folder).create(f"the {scope}er", scope) for scope in ("read", "write"))
     with running(Place(folder), key=writing, UNDERSKIN_DIAGNOSIS_WORKERS="0") as server:
@@ -152,9 +156,8 @@ def test_who_withdrew_it_is_kept_and_who_may_read_only_cannot(tmp_path: Path) ->
             assert writer.skins.withdraw_model("palm", "yes")["withdrawn_from"] == "the writeer"
 
 
-def test_it_is_elsewhere_and_after_a_restore_as_it_was_here(
-    server: Server, elsewhere: Server, client: Client, tmp_path: Path
-) -> None:
+def test_elsewhere_after_restore_here(server: Server, elsewhere: Server, client: Client, tmp_path: Path) -> None:
+    """It is elsewhere and after a restore as it was here."""
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     client.skins.adopt("palm", diagnosis_id)
     in_force, withdrawn = tmp_path / "in-force.h5", tmp_path / "withdrawn.h5"
@@ -181,9 +184,10 @@ def test_it_is_elsewhere_and_after_a_restore_as_it_was_here(
         client.skins.model("palm")
 
 
-def test_files_of_an_older_underskin_come_in_and_spoilt_ones_do_not(
+def test_files_older_underskin_come_spoilt_ones(
     server: Server, elsewhere: Server, client: Client, tmp_path: Path
 ) -> None:
+    """Files of an older underskin come in and spoilt ones do not."""
     _, diagnosis_id = diagnosed(server, resonant("array"), report())
     adopted = client.skins.adopt("palm", diagnosis_id)
     file = tmp_path / "palm.h5"
