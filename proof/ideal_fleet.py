@@ -9,7 +9,7 @@ import numpy as np
 
 from rig.joint_campaign import Joint, JointDocument
 from rig.joint_hypotheses import skin_covariance
-from underskin.diagnosis.inference.hypothesis import Gaussian
+from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.several.fleet import SPREADS
 from underskin.diagnosis.several.population import FAR, QUANTITIES, REGULAR, Batch, State, populations
 from underskin.units import Floats
@@ -30,7 +30,7 @@ def departures(joint: Joint) -> dict[str, float]:
 def _states(document: JointDocument) -> list[State]:
     truth = np.log([document.true_modulus_mpa, document.true_thickness_mm, document.experiment.skin.d33_pc_per_n])
     precision: Floats = np.linalg.inv(skin_covariance(document)).astype(np.float64)
-    said = Gaussian(precision, precision @ truth, float(-0.5 * truth @ precision @ truth))
+    said = Gaussian.of(truth, precision, 0.0)
     further = np.diag(np.square(FAR))
     return [
         State(REGULAR, said, np.zeros(len(FAR))),

@@ -40,6 +40,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from underskin.diagnosis.inference.fit import GAIN, POSITION, Fitter
+from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, FitPoint, Hypothesis, Likelihoods, Points, cell_response
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.mechanisms.models.composed import Prediction
@@ -590,31 +591,7 @@ def _traded(evidence: Evidence, place: int) -> int | None:
 _PLACES = 24
 
 
-@dataclass(frozen=True)
-class Normals:
-    """A mixture of normal distributions of one fit coordinate; `share` (normals,) need not sum to 1."""
-
-    share: Floats
-    mean: Floats
-    deviation: Floats
-
-    def times(self, factor: float) -> "Normals":
-        """With every share so many times as large."""
-        return Normals(factor * self.share, self.mean, self.deviation)
-
-    def moved(self, by: float) -> "Normals":
-        """With every mean so much larger."""
-        return Normals(self.share, self.mean + by, self.deviation)
-
-
-def together(several: Sequence[Normals]) -> Normals:
-    """All normals of several mixtures."""
-    return Normals(
-        *(np.concatenate([getattr(one, name) for one in several]) for name in ("share", "mean", "deviation"))
-    )
-
-
-def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, place: int) -> list[Normals] | None:
+def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, place: int) -> list[NormalMixture] | None:
     """The parameter at a place among the model's, around each of several points of one hypothesis; None where that has
     no free spread.
 
@@ -639,7 +616,7 @@ def marginalise_sensor_spread(fitter: Fitter, at: Evaluated, place: int) -> list
     mean = moved.points.fit[:, place] + step
     deviation = np.sqrt([covariance[index, index] for covariance in covariances])
     return [
-        Normals(_shares(values[own]), mean[own], deviation[own])
+        NormalMixture(_shares(values[own]), mean[own], deviation[own])
         for own in (slice(first, first + _PLACES) for first in range(0, len(values), _PLACES))
     ]
 

@@ -21,11 +21,11 @@ from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence, around
 from underskin.diagnosis.inference.evidence import integrated as over_all_values
 from underskin.diagnosis.inference.fit import POSITION, Fitter, softer, with_contact_points
+from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import (
     Curvature,
     Evaluated,
     FitPoint,
-    Gaussian,
     Hypothesis,
     Points,
     alone,

@@ -16,20 +16,19 @@ with H of the base model.
 
 What the cell of each curve adds under a prediction: its zero and drift, and the gain of the recording. How σ bends
 around each contact's commanded place, in the base model: positioning scatter in second order. Points of several
-hypotheses, one after another, and what was worked out there. What other recordings say of a model's parameters:
-Laplace's approximation of their likelihood, a quadratic. One hypothesis: a model, the lines it is to explain, and the
-coordinates in which it is fitted.
+hypotheses, one after another, and what was worked out there. One hypothesis: a model, the lines it is to explain, and
+the coordinates in which it is fitted.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Self
 
 import numpy as np
 
 from underskin.autodiff import contiguous
 from underskin.diagnosis.data.dataset import Lines
+from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.products import (
     CurveLines,
     CurveProducts,
@@ -338,30 +337,6 @@ class Evaluated:
         order = np.lexsort((self.cost, self.points.owner))
         owner = self.points.owner[order]
         return order[np.append(True, owner[1:] != owner[:-1])] if len(order) else order
-
-
-@dataclass(frozen=True, eq=False)
-class Gaussian:
-    """ln L(x) = height + linear·x − ½ xᵀ precision x, in a model's fit coordinates x (parameters,)."""
-
-    precision: Floats  # (parameters, parameters)
-    linear: Floats  # (parameters,)
-    height: float
-
-    @classmethod
-    def of(cls, matrix: Floats, offset: Floats, mean: Floats, precision: Floats, height: float) -> Self:
-        """From a normal likelihood of quantities q = matrix x + offset: height − ½ (q − mean)ᵀ precision (q − mean)."""
-        away = offset - mean
-        return cls(
-            matrix.T @ precision @ matrix, -matrix.T @ precision @ away, float(height - 0.5 * away @ precision @ away)
-        )
-
-    def __add__(self, other: "Gaussian") -> "Gaussian":
-        return Gaussian(self.precision + other.precision, self.linear + other.linear, self.height + other.height)
-
-    def log_density(self, fit: Floats) -> float:
-        """ln L at one point (parameters,)."""
-        return float(self.height + self.linear @ fit - 0.5 * fit @ self.precision @ fit)
 
 
 class GaussianBatch:

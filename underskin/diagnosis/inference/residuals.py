@@ -23,14 +23,13 @@ import numpy as np
 from scipy.stats import qmc
 
 from underskin.diagnosis.inference.evidence import (
-    Normals,
     around_levels,
     around_mean,
     marginalise_sensor_spread,
-    together,
 )
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.fit import Fitter
+from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import Evaluated, Hypothesis, Likelihoods, Points, own_places
 from underskin.diagnosis.inference.products import CurveProducts
 from underskin.errors import InvalidInput
@@ -132,7 +131,7 @@ _MOST = 600.0  # nats that shares tell: e to the power of 710 is more than a flo
 _COUNTS = 6.0  # nats behind the fit without the mechanism within which a place counts
 
 
-def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> Normals | None:
+def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, parameter: str) -> NormalMixture | None:
     """A parameter of the model with one more mechanism, each share relative to the explanation without it, e^600 at
     most.
 
@@ -170,10 +169,12 @@ def with_unseen(problem: FittingProblem, explanation: Explanation, name: str, pa
     place = [entry.name for entry in hypothesis.model.parameters].index(parameter)
     spread = marginalise_sensor_spread(held, at, place)
     if spread is not None:
-        return together([normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)])
+        return NormalMixture.joined(
+            [normals.times(share) for normals, share in zip(spread, shares.tolist(), strict=True)]
+        )
     index = int(np.searchsorted(np.flatnonzero(held.free[0]), place))
     deviation = np.sqrt([covariance[index, index] for covariance in covariances])
-    return Normals(shares, at.points.fit[:, place], deviation)
+    return NormalMixture(shares, at.points.fit[:, place], deviation)
 
 
 def _evenly(parameters: int) -> Floats:

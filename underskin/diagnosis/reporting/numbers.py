@@ -27,13 +27,12 @@ from scipy.special import ndtr, ndtri
 
 from underskin.diagnosis.data.names import EXPLAINED
 from underskin.diagnosis.inference.evidence import (
-    Normals,
     levels_covariance,
     marginalise_sensor_spread,
     profile_end,
-    together,
 )
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
+from underskin.diagnosis.inference.gaussian import NormalMixture
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.inference.residuals import declared_d33, residuals, whole_prediction, with_unseen
 from underskin.diagnosis.selection.answers import Answer, Search
@@ -331,7 +330,7 @@ def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[st
     if total < 0.5:
         return None
     parts = [_d33_under(search, problem, entry, probability).times(probability) for probability, entry in each]
-    mixture = together(parts)
+    mixture = NormalMixture.joined(parts)
     declared = np.concatenate(
         [np.full(len(part.share), declared_d33(problem, entry)) for part, (_, entry) in zip(parts, each, strict=True)]
     )
@@ -353,7 +352,7 @@ def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[st
     }
 
 
-def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:
+def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> NormalMixture:
     """ln d33 under an answer, at each level that a law of it may refer to, and with one more mechanism that does not
     show; the shares sum to 1."""
     place = place_of(explanation, "d33")
@@ -362,7 +361,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
     if spread is None:
         index = best.hypothesis.mean_places.index(place)
         deviation = np.sqrt(best.covariance[index, index])
-        spread = [Normals(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))]
+        spread = [NormalMixture(np.ones(1), explanation.point.fit[place : place + 1], np.array([deviation]))]
     several = list(spread)
     if probability > _WORTH_MORE:
         known = {frozenset(one.explanation.names) for one in search.answers if one.explanation is not None}
@@ -372,13 +371,13 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
             found = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
             if found is not None:  # what declared facts say is as probable as its absence, and counts as it fits
                 several.append(found if name in declared_laws(problem.lines) else found.times(odds * _as_unseen(found)))
-    mixture = together(several)
+    mixture = NormalMixture.joined(several)
     mixture = mixture.times(1 / float(mixture.share.sum()))
     levels = law_levels(problem, explanation)
-    return together([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
+    return NormalMixture.joined([mixture.moved(level).times(1 / len(levels)) for level in levels.tolist()])
 
 
-def _as_unseen(found: Normals) -> float:
+def _as_unseen(found: NormalMixture) -> float:
     """The factor that takes from a mechanism's shares what it would show by: no set of the answers holds it."""
     return min(1.0, float(np.exp(SHOWS) / found.share.sum()))
 

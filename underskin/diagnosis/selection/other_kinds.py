@@ -27,7 +27,8 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.data.dataset import Lines, curve_lines
 from underskin.diagnosis.inference.evidence import parts
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import Gaussian, own_places, quadratic_of_prior
+from underskin.diagnosis.inference.gaussian import Gaussian, moments
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence, log_prior
 from underskin.mechanisms.base import Kind, Unsupported, Values
 from underskin.mechanisms.laws.layered_contact import LayeredContact
@@ -221,14 +222,7 @@ def _mixture(
     weights = np.array([weight for _, weight in each])
     shares = np.exp(weights - np.logaddexp.reduce(weights))
     posteriors = [_posterior(entry, both) for entry, _ in each]
-    return posteriors[0][0], *_mixed(shares, [mean for _, mean, _ in posteriors], [one for _, _, one in posteriors])
-
-
-def _mixed(shares: Floats, means: Sequence[Floats], covariances: Sequence[Floats]) -> tuple[Floats, Floats]:
-    """Mean and covariance of a mixture of distributions with these."""
-    mean = np.asarray(shares @ np.array(means))
-    away = np.array(means) - mean
-    return mean, np.tensordot(shares, np.array(covariances), 1) + (shares[:, None] * away).T @ away
+    return posteriors[0][0], *moments(shares, [mean for _, mean, _ in posteriors], [one for _, _, one in posteriors])
 
 
 def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Quantity, ...], Floats, Floats]:
@@ -239,7 +233,7 @@ def _posterior(explanation: Explanation, both: frozenset[str]) -> tuple[tuple[Qu
     mean_places = explanation.best.hypothesis.mean_places
     slopes = [rows[:, mean_places] for _, _, rows in known]
     covariances = [one @ part.covariance @ one.T for one, part in zip(slopes, each, strict=True)]
-    return known[0][0], *_mixed(np.array([part.share for part in each]), [mean for _, mean, _ in known], covariances)
+    return known[0][0], *moments(np.array([part.share for part in each]), [mean for _, mean, _ in known], covariances)
 
 
 def _quantities(
@@ -455,12 +449,8 @@ def _likelihood(told: OfCurves, matrix: Floats, offset: Floats, priors: Sequence
     volume = np.linalg.slogdet(np.eye(len(mean)) + precision @ prior)[1]
     height = told.log_weight + 0.5 * volume - float(higher[known].sum())
     height += 0.5 * away @ np.linalg.solve(np.linalg.inv(precision) + prior, np.where(flat, 0.0, away))
-    matrix, offset = matrix[known], offset[known]
-    batch = np.diag([told.tolerance**2 if told.quantities[row] == MODULUS else 0.0 for row in np.flatnonzero(known)])
-    loose = np.eye(len(mean)) + precision @ batch
-    height -= 0.5 * np.linalg.slogdet(loose)[1]
-    tolerant: Floats = np.linalg.solve(loose, precision).astype(np.float64)
-    return Gaussian.of(matrix, offset, mean, tolerant, float(height))
+    tolerance = np.array([told.tolerance**2 * (told.quantities[row] == MODULUS) for row in np.flatnonzero(known)])
+    return Gaussian.of(mean, precision, float(height)).of_mean(tolerance).over(matrix[known], offset[known])
 
 
 def _inverse(covariance: Floats) -> Floats:

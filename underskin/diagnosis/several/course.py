@@ -23,6 +23,7 @@ from scipy.special import expit, logit
 
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
 from underskin.diagnosis.inference.fit import GAIN
+from underskin.diagnosis.inference.gaussian import Gaussian
 from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.noise import Plateau
 from underskin.diagnosis.selection.answers import P_NOT_IN_MODEL_SPACE, Search
@@ -75,6 +76,11 @@ class Shared:
         values, vectors = np.linalg.eigh(np.linalg.inv(self.covariance) - prior)
         return np.asarray(prior + (vectors * np.maximum(values, 0.0)) @ vectors.T)
 
+    def likelihood(self, prior_precision: Floats) -> Gaussian:
+        """That by which a normal prior of this precision (parameters,) becomes the posterior."""
+        prior = np.diag(prior_precision)
+        return Gaussian(self.precision - prior, self.precision @ self.mean - prior @ self.prior_mean, 0.0)
+
 
 def _prior(entry: Parameter, fit: float) -> tuple[float, float]:
     precision, centre = quadratic_of_prior(entry, fit)
@@ -87,29 +93,22 @@ def log_agreement(one: Shared, two: Shared) -> float:
     if not len(one.mean):
         return 0.0
     prior = _least_prior([one, two])
-    first, second = one.precision, two.precision
-    both = first + second - prior
-    towards = first @ one.mean + second @ two.mean - prior @ one.prior_mean
-    squares = one.mean @ first @ one.mean + two.mean @ second @ two.mean - one.prior_mean @ prior @ one.prior_mean
-    volumes = sum(
-        sign * np.linalg.slogdet(part)[1] for sign, part in ((1, first), (1, second), (-1, prior), (-1, both))
-    )
-    return float(0.5 * volumes - 0.5 * (squares - towards @ np.linalg.solve(both, towards)))
+    first, second = (shared.likelihood(prior) for shared in (one, two))
+    both, *each = (likelihood.log_integral(one.prior_mean, prior) for likelihood in (first + second, first, second))
+    return float(both - sum(each))
 
 
 def _least_prior(each: Sequence[Shared]) -> Floats:
     """The precision of the prior that is in all: in heavy tails the quadratics of one prior differ."""
-    return np.diag(np.min([one.prior_precision for one in each], axis=0))
+    return np.min([shared.prior_precision for shared in each], axis=0)
 
 
 def combined(each: Sequence[Shared]) -> tuple[Floats, Floats]:
     """Mean and standard deviations of parameters that several fits share: their precisions add, the prior's once."""
     prior = _least_prior(each)
-    precisions = [one.precision for one in each]
-    covariance = np.linalg.inv(sum(precisions[1:], precisions[0]) - (len(each) - 1) * prior)
-    towards = sum((precision @ one.mean for precision, one in zip(precisions, each, strict=True)), np.zeros(len(prior)))
-    mean = covariance @ (towards - (len(each) - 1) * prior @ each[0].prior_mean)
-    low, high = (np.array([entry.bounds[end] for entry in each[0].parameters]) for end in (0, 1))
+    likelihoods = [shared.likelihood(prior) for shared in each]
+    mean, covariance = sum(likelihoods[1:], likelihoods[0]).posterior(each[0].prior_mean, prior)
+    low, high = (np.array([parameter.bounds[end] for parameter in each[0].parameters]) for end in (0, 1))
     return np.clip(mean, low, high), np.sqrt(np.diag(covariance))
 
 

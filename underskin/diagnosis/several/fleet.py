@@ -24,7 +24,8 @@ import numpy as np
 
 from underskin.diagnosis.data.names import EXPLAINED, NOTHING_MISSING, in_words, quantity_in_words
 from underskin.diagnosis.inference.explanation import Explanation
-from underskin.diagnosis.inference.hypothesis import Gaussian, own_places, quadratic_of_prior
+from underskin.diagnosis.inference.gaussian import Gaussian
+from underskin.diagnosis.inference.hypothesis import own_places, quadratic_of_prior
 from underskin.diagnosis.pipeline import diagnose
 from underskin.diagnosis.reporting.law_statement import of_clauses
 from underskin.diagnosis.reporting.numbers import rounded

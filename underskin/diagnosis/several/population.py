@@ -1,7 +1,5 @@
 """Skins as members of a population.
 
-Normal likelihoods of a few quantities: ln L(q) = height + linear·q − ½ qᵀ precision q, and integrals over them.
-
 Quantities of skins of one make as populations: what the skins say together, which of them departs, and in what.
 
 A skin's logarithms q (of E, thickness and d33) are normal about the make's μ: q_i ~ N(μ, diag τ²). One that departs has
@@ -27,72 +25,13 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines
 from underskin.diagnosis.inference.evidence import Evidence
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem, Request
-from underskin.diagnosis.inference.hypothesis import Gaussian, curvature_of_prior, own_places
+from underskin.diagnosis.inference.gaussian import Gaussian
+from underskin.diagnosis.inference.hypothesis import curvature_of_prior, own_places
 from underskin.diagnosis.reporting.numbers import mixture_quantile
 from underskin.diagnosis.several.course import Bench, Candidate
 from underskin.mechanisms.models.composed import Model
 from underskin.mechanisms.registry import CATALOGUE
 from underskin.units import Floats, Indices
-
-_INFORMS = 0.2  # of a prior's precision: what recordings add at least to say anything
-
-
-def of_posterior(log_evidence: float, mean: Floats, covariance: Floats, centre: Floats, precision: Floats) -> Gaussian:
-    """The likelihood that turns independent normal priors, of this centre and precision (quantities,), into a normal
-    posterior of this mean and covariance, with this evidence.
-
-    In directions in which that adds next to nothing to the priors the likelihood is flat: the quotient of both would
-    otherwise grow without end.
-    """
-    root = np.sqrt(precision)
-    values, vectors = np.linalg.eigh(np.linalg.inv(root[:, None] * covariance * root))
-    informing = vectors[:, values > 1 + _INFORMS]
-    added = values[values > 1 + _INFORMS]
-    own = (informing * (added - 1)) @ informing.T * np.outer(root, root)
-    linear = own @ centre + root * (informing @ (added * (informing.T @ (root * (mean - centre)))))
-    return Gaussian(own, linear, log_evidence - log_integral(Gaussian(own, linear, 0.0), centre, precision).item())
-
-
-def posterior(likelihood: Gaussian, centre: Floats, precision: Floats) -> tuple[Floats, Floats]:
-    """Mean and covariance under independent normal priors of this centre and precision (quantities,); of a stack of
-    likelihoods one each."""
-    covariance = np.linalg.inv(likelihood.precision + np.diag(precision))
-    mean = np.einsum("...pq,...q->...p", covariance, likelihood.linear + precision * centre)
-    return np.asarray(mean), np.asarray(covariance, float)
-
-
-def log_integral(likelihood: Gaussian, centre: Floats, precision: Floats) -> Floats:
-    """ln ∫ L(q) N(q; centre, 1/precision) dq; of a stack of likelihoods one each."""
-    towards = likelihood.linear + precision * centre
-    mean, covariance = posterior(likelihood, centre, precision)
-    volume = np.log(precision).sum() + np.linalg.slogdet(covariance)[1]
-    square = (towards * mean).sum(axis=-1) - (precision * centre**2).sum()
-    return np.asarray(likelihood.height + 0.5 * (volume + square))
-
-
-def of_mean(likelihood: Gaussian, variance: Floats) -> Gaussian:
-    """∫ L(q) N(q; μ, variance) dq, as a likelihood of μ; of variances (…, quantities) a stack (…)."""
-    loose = np.eye(len(likelihood.linear)) + likelihood.precision * variance[..., None, :]
-    shrunk = np.linalg.inv(loose)
-    linear = shrunk @ likelihood.linear
-    square = (likelihood.linear * variance * linear).sum(axis=-1)
-    height = likelihood.height + 0.5 * (square - np.linalg.slogdet(loose)[1])
-    return Gaussian(shrunk @ likelihood.precision, linear, height)
-
-
-def mixed(each: Sequence[tuple[float, Gaussian]], centre: Floats, precision: Floats) -> Gaussian:
-    """A mixture of likelihoods, with log weights, as one: that of the evidence, mean and covariance which the mixture
-    has under independent normal priors."""
-    log_weights = np.array([share + log_integral(one, centre, precision).item() for share, one in each])
-    total = float(np.logaddexp.reduce(log_weights))
-    weights = np.exp(log_weights - total)
-    found = [posterior(one, centre, precision) for _, one in each]
-    means, covariances = np.array([mean for mean, _ in found]), np.array([covariance for _, covariance in found])
-    mean = weights @ means
-    away = means - mean
-    covariance = np.einsum("n,npq->pq", weights, covariances + away[:, :, None] * away[:, None, :])
-    return of_posterior(total, mean, covariance, centre, precision)
-
 
 _SOME_DEPARTS = 0.5  # prior probability that any skin of a fleet departs: as likely as not
 _NODES, _STRIDES = 12, 2.7  # of the grid of ln τ, and to how many of its standard deviations it reaches
@@ -193,7 +132,7 @@ class _Fleet:
         shares = np.array([sum(share for _, share in node) for node in nodes])
         self.log_shares = shares - np.logaddexp.reduce(shares)
         # What each skin in each state says of μ, (spreads,) each
-        self.said = [[of_mean(one.likelihood, self.spreads**2 + one.further) for one in own] for own in skins]
+        self.said = [[one.likelihood.of_mean(self.spreads**2 + one.further) for one in own] for own in skins]
 
     def together(self, states: Sequence[int], without: int | None = None) -> Gaussian:
         """What the skins in these states say of μ, but for one."""
@@ -206,7 +145,7 @@ class _Fleet:
         odds = log_odds_of_departure(len(self.skins))
         prior = sum(odds - np.log(len(own) - 1) for own, state in zip(self.skins, states, strict=True) if state)
         said = self.together(states)
-        each = [one.log_prior + log_integral(said, one.centre, one.precision) for one in self.batches]
+        each = [one.log_prior + said.log_integral(one.centre, one.precision) for one in self.batches]
         return np.asarray(np.array(each) + self.log_shares + prior)
 
     @cached_property
@@ -266,7 +205,7 @@ class _Fleet:
         )
 
     def _mean(self, part: _Part) -> Floats:
-        return posterior(self.together(part.states), part.batch.centre, part.batch.precision)[0][part.kept]
+        return self.together(part.states).posterior(part.batch.centre, part.batch.precision)[0][part.kept]
 
     def _of_skin(self, number: int, parts: Sequence[_Part], weights: Floats) -> Floats:
         """Median and ends of the 95 % interval of its quantities (3, quantities)."""
@@ -275,7 +214,7 @@ class _Fleet:
             state = self.skins[number][part.states[number]]
             other_specimens = self.together(part.states, number)
             mean, covariance = (
-                one[part.kept] for one in posterior(other_specimens, part.batch.centre, part.batch.precision)
+                one[part.kept] for one in other_specimens.posterior(part.batch.centre, part.batch.precision)
             )
             own = self.spreads[part.kept] ** 2 + state.further
             before = np.linalg.inv(covariance + own[:, None] * np.eye(own.shape[1]))
@@ -341,7 +280,7 @@ class FleetSkin:
         if likelihood is None:
             return None
         row = ERRORS.index(error)
-        mean, covariance = posterior(likelihood, *self._prior(error))
+        mean, covariance = likelihood.posterior(*self._prior(error))
         return float(mean[row]), float(covariance[row, row])
 
     def states(self, log_shares: Mapping[frozenset[str], float]) -> list[State]:
@@ -354,7 +293,7 @@ class FleetSkin:
                 if np.isfinite(share) and ((own := self.candidate.supported(names)), departs) in self._fitted
             ]
             if each:
-                found.append(State(departs, mixed(each, *self._prior(departs)), self._further(departs)))
+                found.append(State(departs, Gaussian.mixture(each, *self._prior(departs)), self._further(departs)))
         return found
 
     def _further(self, departs: str) -> Floats:
@@ -366,7 +305,7 @@ class FleetSkin:
         return centre, 1 / (np.array([*_ABOUT_BATCH, D33_PRIOR[1]]) ** 2 + self._further(departs))
 
     def _log_integral(self, likelihood: Gaussian, departs: str) -> float:
-        return log_integral(likelihood, *self._prior(departs)).item()
+        return likelihood.log_integral(*self._prior(departs)).item()
 
     def _fits(self, sets: Sequence[frozenset[str]], bench: Bench) -> Likelihoods:
         """Of those that can be fitted."""
@@ -382,7 +321,7 @@ class FleetSkin:
             for names, fit in zip(sets, _explained(problem, [{*names, *self.errors} for names in sets]), strict=True):
                 if fit is not None:
                     each = [(_log_share(fit, one, bench), self._said(fit, one, held)) for _, one in fit.each]
-                    found[names, departs] = mixed(each, *self._prior(departs))
+                    found[names, departs] = Gaussian.mixture(each, *self._prior(departs))
         for names in sets:
             self._where_far(found, names)
             if (names, REGULAR) in found:
@@ -398,7 +337,7 @@ class FleetSkin:
         if (names, REGULAR) not in found or not others:
             return
         centre, precision = self._prior(REGULAR)
-        mean, _ = posterior(found[names, REGULAR], centre, precision)
+        mean, _ = found[names, REGULAR].posterior(centre, precision)
         if (np.abs(mean - centre) * np.sqrt(precision))[: len(ERRORS)].max() > _BEYOND:
             nearest = max(others, key=lambda name: self._log_integral(found[names, name], name))
             found[names, REGULAR] = found[names, nearest]
@@ -410,7 +349,7 @@ class FleetSkin:
         rows = [ERRORS.index(name) for name in held]
         matrix = np.eye(len(model.parameters))[[places[name].start for name in held]]
         centre, precision = np.array(self._centre)[rows], np.diag(np.array(_ABOUT_BATCH)[rows] ** -2.0)
-        about = Gaussian.of(matrix, np.zeros(len(rows)), centre, precision, 0.0)
+        about = Gaussian.of(centre, precision, 0.0).over(matrix, np.zeros(len(rows)))
         known = None if other is None else other(model, lines)
         return about if known is None else known + about
 
@@ -434,7 +373,7 @@ class FleetSkin:
                 variance[row] += 1 / precision
         by_fit = matrix[:, best.hypothesis.mean_places]
         mean = matrix @ best.point.fit
-        return of_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
+        return Gaussian.from_posterior(log_evidence, mean, by_fit @ best.covariance @ by_fit.T, centre, 1 / variance)
 
 
 def _log_share(fit: Explanation, one: Evidence, bench: Bench) -> float:
