@@ -3,7 +3,6 @@
 import json
 import os
 import re
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from bench.soak import SOAK
 from proof.real import recorded
 from rig.description import parse as experiment
 from rig.draw_curves import drawn_curves
@@ -20,7 +18,6 @@ from rig.effects import INDENTATION
 from rig.elastomer import campaign_of_curves, record_curves
 from tests.support.cases import first
 from tests.support.lean_reports import beside, lean_report, whole_report
-from tests.support.pressed_curves import pressed
 from tests.support.slip_campaigns import looked_at
 from underskin import Conditions, SkinDescription, load_table, predict
 from underskin.physics.sphere_law import SphereLaw
@@ -305,29 +302,6 @@ def test_seating_platen_no_stiffening_stiffening(seed: int, table: SigmaTable) -
     assert "seating" not in {entry["code"] for entry in stiff["findings"]}
 
 
-@pytest.mark.slow
-def test_laws_look_like_explanation_take(table: SigmaTable) -> None:
-    """Laws that would look like an explanation take from its probability and are said.
-
-    Fewer of them, the stronger the effect and the more spheres show it.
-    """
-
-    def reported(stiffness: float, radii: Sequence[float]) -> dict[str, Any]:
-        report = lean_report(pressed(stiffness, radii), table, *beside("instrument_compliance"))
-        assert names(report) == ["instrument_compliance"]
-        return report
-
-    weak, strong = reported(30.0, (20.0,)), reported(3.0, (5.0,))
-    assert weak["probability"] < strong["probability"]
-    if SOAK:
-        assert weak["probability"] < reported(30.0, (2.0, 20.0))["probability"]
-    (finding,) = [entry for entry in weak["findings"] if entry["code"] == "imitated"]
-    assert "would look like instrument compliance in these recordings" in finding["statement"]
-    assert finding["statement"][1:] in weak["statement"]
-    other = [entry for entry in weak["alternatives"] if entry["mechanisms"] == ["none_of_these"]]
-    assert other[0]["probability"] <= weak["probability"]
-
-
 @pytest.mark.soak
 def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
     """Two mechanisms that share a bend are both found.
@@ -340,20 +314,6 @@ def test_two_mechanisms_share_bend_found(table: SigmaTable) -> None:
     assert set(found) == {"instrument_compliance", "strain_stiffening"}
     (stage,) = found["instrument_compliance"]
     assert stage["low"] < 57.8 < stage["high"] < 70  # alone it would have 124
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("bend", [0.0, 0.012])
-def test_bend_below_noise_samples_show(bend: float, table: SigmaTable) -> None:
-    """A bend below the noise that all samples show contradicts hertz.
-
-    Noise and bend in shares of the largest force.
-    """
-    travel = ways(-0.1, 0.3, -0.1, samples=1500)
-    force = np.maximum(travel / 0.3, 0.0) ** 1.5 * (1 + bend * np.sin(40 * travel))
-    force += 0.01 * np.random.default_rng(8).normal(size=len(travel))
-    report = lean_report(of_curve(travel, force, time_s=np.arange(float(len(travel)))), table, *STAGE)
-    assert report["verdict"] == ("unexplained" if bend else "no_mismatch")
 
 
 @pytest.mark.soak

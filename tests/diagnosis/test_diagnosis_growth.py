@@ -9,7 +9,7 @@ import pytest
 from tests.support.store_server import campaign
 from underskin.diagnosis.data.dataset import lines as measured_lines
 from underskin.diagnosis.inference.explanation import FittingProblem, Request
-from underskin.diagnosis.selection.gaussian_processes import GainResidual
+from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.recordings.campaign import parse
 from underskin.surrogate.sigma_table import SigmaTable
 

@@ -341,11 +341,12 @@ def test_constant_phase_beside_weak_sensors_told(table: SigmaTable) -> None:
     phase = np.exp(-1j * np.radians(1.2))
     turned = changed(made, lambda entry, _, __: complex(phase * kept.get(entry.sensor, 1.0)))
     report = lean_report(turned, table, *beside("sensor_spread", "sensor_relaxation", "timing_delay", "ageing"))
-    statement = report["statement"]
-    assert "What is missing beside sensor spread turns the frequency response by the same angle at all" in statement
-    assert "the phase by -1.2" in statement
+    law, statement = report["unnamed"], report["statement"]
+    laws = {(entry["acts_on"], entry["axis"]) for entry in (law, *law["rivals"])}
+    assert ("frequency_response", "frequency_hz") in laws
+    assert "What is missing beside sensor spread" in statement
+    assert "the phase by -1." in statement
     assert "with it and sensor spread, recordings held out are predicted to" in statement
-    assert ("the reference phase of a lock-in amplifier" in statement) == is_settled(report)
     assert report["location"]["region"]["sensor"] == ["s4"]
     assert "it is largest at sensor s4, where the response is 4" in report["location"]["statement"]
 
@@ -374,8 +375,10 @@ def test_rig_hides_order_recordings_found(
 
 
 def test_scatter_ordinary_rig_nothing_missing(table: SigmaTable) -> None:
-    """The scatter of an ordinary rig is nothing missing and a larger one is."""
+    """The scatter of an ordinary rig is nothing missing; a far larger one is reported, and d33 is not quoted."""
     if SOAK:
         assert rig_report(table, {}, *FEW, gain=0.02, position_mm=0.28)["verdict"] == "no_mismatch"
         assert rig_report(table, {}, *FEW, gain=0.05)["verdict"] == "no_mismatch"
-    assert rig_report(table, {}, *FEW, gain=0.25)["verdict"] == "unexplained"
+    scattering = rig_report(table, {}, *FEW, gain=0.25)
+    assert [entry["statement"] for entry in scattering["findings"] if entry["code"] == "unusual_scatter"]
+    assert not scattering["d33"]["quotable"]

@@ -1,14 +1,14 @@
-"""Compiled: sums over the lines of FRFs, and likelihoods of processes along them.
+"""Compiled sums over the lines of FRFs.
 
-Compiled: how probable the roughness of lines is under their noise, and what each line's variance does to it. Compiled:
-products of what a dynamic factor is on each line with its derivatives, for the sums of `products`.
+How probable the roughness of lines is under their noise, and what each line's variance does to it.
+Products of what a dynamic factor is on each line with its derivatives, for the sums of `products`.
 
-Compiled: what sums over rows lose to mains pick-up, at many sets of noise levels.
+What sums over rows lose to mains pick-up, at many sets of noise levels.
 
 A row of variance κ² d² has κ² d² + q² with pick-up, so that its weight 1/d² in the sums (over κ²) becomes
 1/d² · 1/(1 + x), x = (q/κ)²/d², and log|C| grows by 2 log(1 + x).
 
-Compiled: what Gaussian processes of several amplitudes gain, from their features' moments.
+What laws of several amplitudes gain, from their features' moments.
 """
 
 import numpy as np
@@ -265,7 +265,7 @@ _SECTION = 0.6180339887498949  # golden
 
 @compiled("void(float64[:, :, ::1], float64[:, ::1], float64[::1], float64[:, ::1])")
 def gained(grams: Floats, moments: Floats, amplitudes: Floats, gains: Floats) -> None:
-    """ln p(y) with a process less that without, ½ (a² mᵀ (I + a² G)⁻¹ m − ln |I + a² G|), by Cholesky's factors.
+    """ln p(y) with a law less that without, ½ (a² mᵀ (I + a² G)⁻¹ m − ln |I + a² G|), by Cholesky's factors.
 
     Parameters
     ----------
@@ -330,66 +330,3 @@ def less_shared(weights: Floats, rows: Indices, first: Indices, columns: Floats,
                 for i in range(size):
                     for j in range(size):
                         grams[number, scatter, i, j] -= sums[number * size + i] * sums[number * size + j]
-
-
-@compiled()
-def _log_density(
-    log_level: float, chi2: float, freedom: float, prior: Floats, eigenvalues: Floats, squares: Floats, a2: float
-) -> float:
-    """See `at_best_level`."""
-    inverse = np.exp(-2 * log_level)
-    below = max((prior[0] - log_level) / prior[2], 0.0)
-    above = max((log_level - prior[1]) / prior[3], 0.0)
-    total = -0.5 * (below + above) ** 2 - prior[4] - 0.5 * chi2 * inverse - freedom * log_level
-    determinant = 1.0
-    for number in range(len(eigenvalues)):
-        inner = 1 + a2 * eigenvalues[number] * inverse
-        total += 0.5 * a2 * squares[number] / inner * inverse * inverse
-        determinant *= inner
-        if number % _PIVOTS_TOGETHER == 0:
-            total -= np.log(determinant)
-            determinant = 1.0
-    return total - np.log(determinant)
-
-
-@compiled("void(float64, float64, float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
-def at_best_level(
-    chi2: float,
-    freedom: float,
-    prior: Floats,
-    eigenvalues: Floats,
-    squares: Floats,
-    amplitudes: Floats,
-    log_densities: Floats,
-) -> None:
-    """ln p(r, κ) of complex lines with a process, at the level κ of their noise that is most probable.
-
-    −½ (χ²/κ² − Σ a² sₙ/(κ⁴ (1 + a² λₙ/κ²))) − ν ln κ − Σ ln(1 + a² λₙ/κ²) + ln p(κ), by golden sections.
-
-    Parameters
-    ----------
-    chi2, freedom
-        χ² of the lines at κ = 1 without a process, and ν.
-    prior
-        Of ln κ, see `Plateau.row`.
-    eigenvalues, squares
-        λₙ of the features' products AᵀWA, and sₙ = |vₙᵀAᵀW r|² along its eigenvectors vₙ.
-    amplitudes, log_densities
-        a, and the result for each, to be filled.
-    """
-    for which in range(len(amplitudes)):
-        a2 = amplitudes[which] ** 2
-        low, high = _LOWEST, _HIGHEST
-        left, right = high - _SECTION * (high - low), low + _SECTION * (high - low)
-        at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
-        at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
-        while high - low > _TOLERANCE:
-            if at_left > at_right:
-                high, right, at_right = right, left, at_left
-                left = high - _SECTION * (high - low)
-                at_left = _log_density(left, chi2, freedom, prior, eigenvalues, squares, a2)
-            else:
-                low, left, at_left = left, right, at_right
-                right = low + _SECTION * (high - low)
-                at_right = _log_density(right, chi2, freedom, prior, eigenvalues, squares, a2)
-        log_densities[which] = max(at_left, at_right)

@@ -35,11 +35,22 @@ import numpy as np
 from underskin.diagnosis.data.dataset import Lines, recording_axes
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.residuals import Residuals, residuals, whole_prediction
-from underskin.diagnosis.selection.gaussian_processes import frequency_bins
 from underskin.units import Array, Floats, Indices, Mask
 
 _ONE_SIGN = 0.8
+_MOST_LINES = 160  # distinct frequencies, beyond which they are binned
 _DRAWS, _SEED = 1000, 20180207
+
+
+def frequency_bins(frequency: Floats) -> tuple[Indices, Floats]:
+    """Of each row its distinct frequency, or its bin where there are too many, and the frequencies."""
+    distinct, line = np.unique(np.round(frequency, 6), return_inverse=True)
+    if len(distinct) <= _MOST_LINES:
+        return line, distinct
+    edges = np.geomspace(distinct[0], distinct[-1] * (1 + 1e-9), _MOST_LINES + 1)
+    line = np.clip(np.searchsorted(edges, frequency, side="right") - 1, 0, _MOST_LINES - 1)
+    used, line = np.unique(line, return_inverse=True)
+    return line, np.sqrt(edges[used] * edges[used + 1])
 
 
 @dataclass(frozen=True)

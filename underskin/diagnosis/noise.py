@@ -26,7 +26,7 @@ and 0.2 of the largest), x the place along the curve from 0 to 1 and η the size
 
 k the mean of Matérn-3/2 kernels of length 0.025 and 0.1 (the beginning of a contact, a grip that seats) and 0.4 (the
 idealisation of a law). η is a parameter of every hypothesis: log-uniform from 0.1 to 1 %, falling off outside, slowly
-downwards. An unmodelled discrepancy is the same process with η from 2 to 50 %.
+downwards.
 
 The noise of single lines, from how rough the lines are along frequency.
 
@@ -104,8 +104,6 @@ START_GAIN = 0.03  # scatter of gains while nothing was fitted yet
 GAIN_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 POSITION_PRIOR = Plateau.of(POSITION_RANGE, POSITION_FALL)
 # No rig's: something that nobody named moves the recordings
-UNUSUAL_GAIN = Plateau.of((0.12, 0.5), (0.12, 0.12))
-UNUSUAL_POSITION = Plateau.of((0.6e-3, 2e-3), (0.15, 0.15))
 
 
 def level_prior(log_level_sd: float) -> Plateau:
@@ -155,7 +153,6 @@ class SeveralLevels:
 
 
 USUAL = Plateau.of((1e-3, 1e-2), (1.0, 0.25))
-UNNAMED = Plateau.of((2e-2, 0.5), (0.05, 0.05))
 TYPICAL = 3e-3
 _LENGTHS = (0.025, 0.1, 0.4)
 USUAL_DRIFT = 0.02  # of the largest force, over the curve

@@ -24,10 +24,8 @@ from underskin.diagnosis.selection.answers import Search, inside_tables_under_po
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood
 from underskin.diagnosis.selection.search import KindsTogether, OtherKinds, frf_problem, search, telling_modulus
 from underskin.diagnosis.selection.unlisted_search import with_laws
-from underskin.diagnosis.validation import cross_validation
 from underskin.diagnosis.validation.cross_validation import (
     above_noise,
-    has_structured_residual,
     held_out,
     largest_floor_percent,
     of_nearest_law,
@@ -36,10 +34,8 @@ from underskin.diagnosis.validation.signatures import (
     Signatures,
     confounding,
     hidden_shifts,
-    imitation,
     left_open,
     power,
-    unseen,
     without_seating,
 )
 from underskin.findings.codes import Reason
@@ -50,12 +46,12 @@ from underskin.mechanisms.registry import CATALOGUE, ActiveCatalogue
 from underskin.recordings.campaign import Campaign, FrfRecording, RecordingProblem
 from underskin.recordings.curve_preparation import prepared
 from underskin.recordings.plausibility import implausible
+from underskin.recordings.usual_scatter import GAIN_RANGE
 from underskin.surrogate.sigma_table import SigmaTable
 
 _KINDS: tuple[Kind, ...] = ("frf", "indentation", "compression")  # the first that there is gives the verdict
-_FAR_ABOVE = 3.0  # times what noise and parameters leave, beyond which an error held out contradicts an explanation
-_WORTH_SAYING = 0.01  # odds of an unlisted law
 _LEAST_TO_AGREE = 3  # FRFs: d33 takes up what two have in common, and their gain scatters by what they differ
+_UNUSUAL_SCATTER = 2.0  # times the gain scatter of a poor rig
 _LARGEST_FLOOR = 100.0  # % of what is predicted: beyond it the recordings are noise
 
 Progress = Callable[[float], None]
@@ -207,20 +203,7 @@ def _work_out(
     showing = [entry for entry in ranked if result.is_supported(entry)]
     groups = held_out(problem, result, showing, nothing)
     progress(0.95)
-    doubted = (nothing, *(ranked if problem.kind == "indentation" else ranked[:1]))
-    contradicted = {entry.names for entry in doubted if has_structured_residual(problem, entry, nothing)}
-    before, after = cross_validation.total(groups)
-    misled = after.is_missed(_FAR_ABOVE) or after.misleads(before)
-    if problem.kind == "indentation" and after.recordings and misled and leader.explanation is not None:
-        contradicted |= {entry.names for entry in ranked[:1] if entry.names}
-    if contradicted:
-        result = replace(result, contradicted=frozenset(contradicted))
-        leader = result.answers[0]
-        shown = result.fit_behind(leader)
-    if leader.explanation is not None and result.answers[0].explanation is None and result.law is not None:
-        groups = held_out(problem, result, showing, nothing)
-    begun, result = _beside_unlisted(begun, problem, result, nothing)
-    result = _beside_other_tip(begun, problem, result)
+    result = replace(result, other_tip=_other_tips(begun, problem))
     leader = result.answers[0]
     shown = result.fit_behind(leader)
     floor = largest_floor_percent(problem, nothing, groups)
@@ -230,6 +213,7 @@ def _work_out(
         few = {"recordings": problem.lines.recordings, "least": _LEAST_TO_AGREE}
         return replace(begun, lacking=Lacking(Lack.FEW_TO_AGREE, few), few=result, problem=problem)
     undescribed = leader.explanation is None and result.law is None
+    begun = begun.with_findings(*_scatter(problem, shown))
     shape = describe(problem, shown) if undescribed else None
     begun = begun.with_findings(*(of_nearest_law(problem, result, nothing) if undescribed else ()))
     return replace(
@@ -260,35 +244,18 @@ def _located(
     return axes, ranges, effect(problem.lines, prediction, in_region(problem.lines, ranges), gain, levels.level)
 
 
-def _beside_unlisted(
-    begun: DiagnosisResult, problem: FittingProblem, result: Search, nothing: Explanation
-) -> tuple[DiagnosisResult, Search]:
-    """Of indentations, with the unlisted laws that the leading set of mechanisms imitates, and a finding on them; where
-    nothing is missing, with those that would not show."""
-    leader = result.answers[0].explanation
-    if problem.kind != "indentation" or leader is None:
-        return begun, result
-    if not leader.names:
-        return begun, replace(result, imitating={(): unseen(leader, result.supported).odds})
-    found = imitation(leader, nothing, result.supported)
-    if found is None or found.odds < _WORTH_SAYING:
-        return begun, result
-    if found.imitated:
-        arguments = {"laws": found.laws, "imitated": found.imitated, "mechanisms": leader.names}
-        begun = begun.with_findings(Finding(Reason.IMITATED, "", "force_n", arguments))
-    return begun, replace(result, imitating={leader.names: found.odds})
+def _scatter(problem: FittingProblem, shown: Explanation) -> list[Finding]:
+    """Of FRFs: a gain that scatters from recording to recording by far more than that of rigs."""
+    gain, usual = shown.best.levels.gain, GAIN_RANGE[1]
+    if problem.kind != "frf" or gain <= _UNUSUAL_SCATTER * usual:
+        return []
+    return [Finding(Reason.UNUSUAL_SCATTER, "", "frf", {"percent": 100 * gain, "usual": 100 * usual})]
 
 
-def _beside_other_tip(begun: DiagnosisResult, problem: FittingProblem, result: Search) -> Search:
-    """Where tips look like a cone: beside the leading set, by the share of such curves, that it is one is as probable,
-    which no mechanism lists."""
-    leader = result.answers[0].explanation
+def _other_tips(begun: DiagnosisResult, problem: FittingProblem) -> float:
+    """The share of curves whose tip looks like a cone, which no mechanism lists."""
     tips = {finding.recording for finding in begun.findings if finding.reason is Reason.TIP_SHAPE}
-    if leader is None or not tips:
-        return result
-    share = min(len(tips) / problem.lines.recordings, 1.0)
-    odds = max(result.imitating.get(leader.names, 0.0), share)
-    return replace(result, imitating={**result.imitating, leader.names: odds})
+    return min(len(tips) / problem.lines.recordings, 1.0)
 
 
 def refused(problems: Sequence[RecordingProblem]) -> list[Finding]:

@@ -209,7 +209,8 @@ ENGLISH: Mapping[Reason, Words] = {
     "noise, is left that no mechanism here describes",
     Reason.HELD_OUT_NO_BETTER: sentences.held_out,
     Reason.NO_SIMPLE_LAW: sentences.no_simple_law,
-    Reason.IMITATED: sentences.imitated,
+    Reason.UNUSUAL_SCATTER: "the gain of the recordings scatters by {percent:.2g} %, and by {usual:.2g} % on a poor "
+    "rig: something that no recording states changes from one to the next",
     Reason.SEATING: "only the first {percent:.0f} % of the displacement speaks for {mechanisms}: a platen that is "
     "tilted, or an uneven end, seats like that. It was left out; a small preload before zeroing avoids it",
     Reason.LOAD_NOT_LINEAR: sentences.load_not_linear,

@@ -377,15 +377,6 @@ def no_simple_law(
     )
 
 
-def imitated(laws: int, imitated: int, mechanisms: Sequence[str]) -> str:
-    """Unlisted laws that the leading set looks like."""
-    named = " and ".join(mechanisms).replace("_", " ")
-    return (
-        f"of {laws} simple laws that no catalogue lists, {imitated} would look like {named} in these recordings at the "
-        "strength that is seen; spheres of other radii, other speeds or a hold may tell them apart"
-    )
-
-
 def load_not_linear(load_parameter: float, more: int) -> str:
     """A load beyond the linear layer."""
     return (

@@ -451,7 +451,7 @@ _SLIPS = (
 )
 _RESERVES = (
     *(FindingCode.TIP_SHAPE, FindingCode.THICKNESS_UNKNOWN, FindingCode.IMPLAUSIBLE_D33, FindingCode.REMAINDER),
-    *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.IMITATED),
+    *(FindingCode.HELD_OUT_NO_BETTER, FindingCode.UNUSUAL_SCATTER),
 )
 _MOST = 2  # findings that are quoted; the others are counted
 
@@ -508,13 +508,11 @@ def statement(
     floor: float,
     around: StatementContext,
     left: str,
-    *,
-    outweighed: bool,
 ) -> str:
     """Three sentences at most: that no known mechanism describes this, after what decides how far that can be trusted;
     what is missing, with its numbers and what it is worth; its rivals, what usually does this, and what to quote.
 
-    `left` says how far the base model goes on curves; the law may be `outweighed` by a course of no form.
+    `left` says how far the base model goes on curves.
     """
     law = leading.law
     acts_on = law.description.acts_on
@@ -530,9 +528,7 @@ def statement(
         for entry in document["rivals"][:2]
     ]
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
-    if outweighed:
-        also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
-    certain = probability * _same_place(document) >= EXPLAINED and not outweighed
+    certain = probability * _same_place(document) >= EXPLAINED
     told = ""
     if certain and not (altered or leading.is_constant):
         told = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)

@@ -269,7 +269,7 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
 
 
 def present(search: Search, problem: FittingProblem) -> dict[str, float]:
-    """The posterior that each mechanism is there, also beside a law or a process that nobody listed."""
+    """The posterior that each mechanism is there, also beside an unlisted law."""
     found: dict[str, float] = {}
     for answer in search.answers:
         if answer.explanation is not None:
@@ -277,9 +277,8 @@ def present(search: Search, problem: FittingProblem) -> dict[str, float]:
                 found[name] = found.get(name, 0.0) + answer.probability
             continue
         laws = [(entry, search.log_weight(entry)) for entry in search.laws if search.is_supported(entry)]
-        beside = [*laws, *search.processes_showing]
-        total = np.logaddexp.reduce([weight for _, weight in beside]) if beside else 0.0
-        for entry, weight in beside:
+        total = np.logaddexp.reduce([weight for _, weight in laws]) if laws else 0.0
+        for entry, weight in laws:
             for name in entry.names:
                 if name in problem.lines.mechanisms.named:
                     share = answer.probability * float(np.exp(weight - total))

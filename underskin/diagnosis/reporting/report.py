@@ -37,7 +37,7 @@ from underskin.diagnosis.reporting.numbers import (
     without_effect,
 )
 from underskin.diagnosis.reporting.statements import BY_NUISANCES, StatedD33, stated_d33
-from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, outweighed, unnamed
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, unnamed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
@@ -228,8 +228,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         floor = float(fit["noise_floor_percent"] or float("nan"))
         beside = [entry["name"] for entry in mechanisms]
         left = left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else ""
-        ahead = outweighed(search)
-        statement = law_statement(leader.probability, leading, law, floor, around, left, outweighed=ahead)
+        statement = law_statement(leader.probability, leading, law, floor, around, left)
     else:
         of_answer = AnswerFacts(
             groups=present,
@@ -337,7 +336,7 @@ def _alternatives(search: Search) -> list[dict[str, Any]]:
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
         said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
-        alternatives.append({**said, "why_not": statements.why_not(answer, leader, search.imitating)})
+        alternatives.append({**said, "why_not": statements.why_not(answer, leader)})
     return alternatives
 
 

@@ -5,7 +5,7 @@ planned recordings as the report's `next_experiment`, with a statement in words.
 be quoted, and what would change it that these recordings do not show.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,7 +34,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.prediction import plausibility
 
-_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
+_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no law shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -71,18 +71,14 @@ def _form_axis(form: ShapeForm) -> str:
     return words if form.component is None else f"{words} ({'xy'[form.component]})"
 
 
-def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...]] = ()) -> str:
-    """Why an answer is less probable than the leading one; `imitating`: sets that look like an unlisted law."""
+def why_not(answer: Answer, leader: Answer) -> str:
+    """Why an answer is less probable than the leading one."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
     if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
         return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
-    if answer.explanation is None and () in imitating:
-        return "few laws without a name would not show in these recordings"
-    if answer.explanation is None and imitating:
-        return "few laws without a name would look like the leading explanation in these recordings"
     if answer.explanation is None:
-        return "a smooth deviation of no known cause explains the recordings less well, or no better though it is freer"
+        return "unlisted laws explain the recordings less well, or no better though they are freer"
     if leader.explanation is None:
         return "what it leaves of the misfit is not noise"
     less = leader.explanation.log_evidence - answer.explanation.log_evidence

@@ -39,7 +39,6 @@ _PLACES = 41  # along the axis, at which a course is looked at
 _STATED = 21  # of these, at which a smooth one is stated
 _LEVEL = 0.1  # of a phase, that it may change along the band and still be called constant
 _STEP = 1e-4  # of fit coordinates, for a course's band
-_OUTWEIGHED = 3.0  # nats
 SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
 
 
@@ -255,15 +254,6 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
     low, high = levels[levels < at].max(), levels[levels > at].min()
     ends = {"value": rounded(at), "low": rounded(float(low)), "high": rounded(float(high))}
     return {"name": "at", "unit": law.axis.unit, **ends}
-
-
-def outweighed(search: Search) -> bool:
-    """Whether a smooth course of no form is much more probable than all laws together."""
-    laws = [search.log_weight(entry) for entry in search.laws if search.is_supported(entry)]
-    processes = [weight for _, weight in search.processes_showing]
-    if not laws or not processes:
-        return False
-    return bool(np.logaddexp.reduce(processes) > np.logaddexp.reduce(laws) + _OUTWEIGHED)
 
 
 _MOST = 4  # recordings at each end

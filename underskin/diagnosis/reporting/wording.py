@@ -28,7 +28,7 @@ _FINDINGS = {
     "force_contradicts_preload": "force and preload disagree",
     "gain_steps": "amplitude off by a factor",
     "held_out_no_better": "no better on other recordings",
-    "imitated": "another cause looks the same",
+    "unusual_scatter": "recordings scatter",
     "line_noise_level": "noise differs from line to line",
     "lines_not_finite": "lines without a number",
     "behind_filter": "band behind a filter",

@@ -19,7 +19,7 @@ _DECLARED, _DECLARED_SHOWS = 0.5, 3.0  # prior of a law that follows from declar
 
 
 def least_evidence(explanation: Explanation) -> float:
-    """Nats of evidence that a mechanism, or a process, must bring on recordings of this kind."""
+    """Nats of evidence that a mechanism or an unlisted law must bring on recordings of this kind."""
     return _SHOWS_ON_CURVES if explanation.best.hypothesis.lines.curves else SHOWS
 
 

@@ -45,7 +45,6 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.inference.fit import LEVEL, SMOOTH, Fitter
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.gaussian_processes import discrepancy
 from underskin.diagnosis.selection.other_kinds import CurveLikelihood, OtherKind, of_curves
 from underskin.diagnosis.selection.priors import LARGEST, least_evidence
 from underskin.mechanisms.base import Kind, Stage, Unsupported
@@ -124,7 +123,7 @@ def smooth_error_gain(explanation: Explanation) -> float:
 
 
 _PARENTS, _LARGEST = 3, 3
-_BEST = 3  # nothing and two more: processes are tried on top of the best two
+_BEST = 3  # sets whose evidence is integrated anyhow
 _WITHIN = 6.0  # nats behind the best within which evidence is worth integrating: that moves it by less than 2
 _OF_CONTACTS = (Stage.DECLARED, Stage.MATERIAL, Stage.CONTACT)  # that change contacts' stiffness
 _PAIRED = (*_OF_CONTACTS, Stage.LOAD_INCREMENT)  # of which two may cancel, so that neither shows alone
@@ -155,10 +154,7 @@ def search(
     if sets.refit_smaller() and not problem.lines.curves:  # of which all pairs were fitted
         sets.grow(largest)
     sets.integrate(_BEST)
-    result = sets.search
-    best = sorted((entry for entry in result.explanations if entry.names), key=result.log_weight, reverse=True)[:2]
-    processes = tuple((entry, discrepancy(problem, entry)) for entry in (sets.explanations[frozenset()], *best))
-    return replace(result, discrepancies=processes)
+    return sets.search
 
 
 def _unsupported(problem: FittingProblem) -> dict[str, str]:
@@ -192,7 +188,7 @@ class _Sets:
     @property
     def search(self) -> Search:
         """All of them as rivals."""
-        return Search(tuple(self.explanations.values()), (), self.unsupported, tried=len(self.tried))
+        return Search(tuple(self.explanations.values()), self.unsupported, tried=len(self.tried))
 
     def explain(self, requests: Sequence[Request]) -> None:
         """Add the explanations of sets that have none yet, from the first parent in whose company the last one

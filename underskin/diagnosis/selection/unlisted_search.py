@@ -4,7 +4,7 @@ A score test of several hundred laws that nobody listed: what each would gain on
 
 What an explanation leaves is projected onto the change that a law would make, over a small grid of what bends it:
 linear algebra under the noise, no fit. A law that acts on whole recordings is weighed on its gains
-(`gaussian_processes`), one that acts along frequency on what lines lie off their own recording's best real multiple
+(`gain_residual`), one that acts along frequency on what lines lie off their own recording's best real multiple
 (`residuals`).
 
 A score test of the laws that nobody listed on indentation curves: what each would gain on top of an explanation.
@@ -31,7 +31,7 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.explanation import integrated as integrate
 from underskin.diagnosis.inference.residuals import beside, force_and_slopes, information, line_residuals, precision_of
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.gaussian_processes import GainResidual
+from underskin.diagnosis.selection.gain_residual import GainResidual
 from underskin.mechanisms.models.curve_state import Samples
 from underskin.mechanisms.models.curves import CurveModel, times_of
 from underskin.mechanisms.parameter import Normal, Parameter

@@ -10,7 +10,7 @@ floor is its expectation from the noise alone, for a new recording: gain, positi
 sensors' gains where the sensor was not seen.
 
 What groups held out say of the answers, and of laws that nobody listed, which predict within their range only. Whether
-what an explanation leaves is noise: the check of the residual that decides between named and unexplained.
+what an explanation leaves is noise.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,6 @@ from underskin.diagnosis.inference.explanation import Explanation, FittingProble
 from underskin.diagnosis.inference.hypothesis import cell_response
 from underskin.diagnosis.noise import NoiseLevels
 from underskin.diagnosis.selection.answers import Search
-from underskin.diagnosis.selection.search import smooth_error_gain
 from underskin.diagnosis.selection.unlisted_search import law_of, nearest_law
 from underskin.findings.codes import Reason
 from underskin.findings.finding import Finding
@@ -38,7 +37,6 @@ _FURTHEST = 0.6  # of a curve's highest force
 _LOADED, _RETURN = 0.02, 0.02  # of the highest force and of the travel: a way back under load
 _LEAST_AFTER = 6  # samples beyond the highest force that make a hold or a way back
 _LEAST_KEPT = 3  # recordings that must remain
-_WORSE = 1.5  # times the error before, or the noise
 _BEST = 10  # sets among which the choice is repeated
 _BEHIND = 15.0  # nats
 
@@ -62,14 +60,6 @@ class PredictionScore:
     def rmse_percent(self) -> float:
         """100 √(Σ|y − m|²/Σ|m|²)."""
         return 100 * float(np.sqrt(self.square / self.size)) if self.size > 0 else float("nan")
-
-    def is_missed(self, times: float) -> bool:
-        """Whether rows are missed by more than so many times what noise and the parameters' uncertainty give."""
-        return self.square > times**2 * (self.noise + self.unsure)
-
-    def misleads(self, before: "PredictionScore") -> bool:
-        """Whether rows are missed by clearly more than before, and than noise and the parameters' uncertainty give."""
-        return self.square > _WORSE**2 * max(before.square, self.noise + self.unsure)
 
     @property
     def floor_percent(self) -> float:
@@ -318,13 +308,6 @@ def of_nearest_law(problem: FittingProblem, result: Search, nothing: Explanation
 
 _ABOVE_NOISE, _LEAST_REMAINDER = 2.0, 3e-3  # times the noise, and of the largest force
 NOISY = 2.0  # times what the lines' own roughness says
-_GRANTED = 4.0  # times as much remainder of a compression as the null hypothesis is allowed
-_GRANTED_TO_LAWS = 0.05  # of what least squares leave under the null hypothesis of an indentation
-_STRUCTURED = 2.0**0.5  # times the noise: what is added is as large
-_LEAST_STRUCTURE = 5e-4  # of the largest force
-_SLOW = 3.0  # times the slow noise that the air shows
-_PLAIN_STRUCTURE = 40.0  # nats of a smooth error; a law that is right leaves 5 to 20, very seldom more than 30
-_LEAST_LEVEL = 0.6  # of the noise that samples show: below, how few of them bend, or steps of a converter, made that
 REACHES_NOISE = 1.5  # times the noise floor: an error that noise explains
 
 
@@ -346,30 +329,6 @@ def above_noise(problem: FittingProblem, explanation: Explanation, groups: Seque
         }
         findings.append(Finding(Reason.HELD_OUT_NO_BETTER, "", "force_n", arguments))
     return findings
-
-
-def has_structured_residual(problem: FittingProblem, explanation: Explanation, null: Explanation) -> bool:
-    """Whether structure in the residual contradicts an explanation, however improbable its rivals are.
-
-    Of indentations structure is a smooth part above the noise of a sample, or one that all samples together show
-    plainly; a law is granted it where plain least squares leave less than a twentieth of what
-    they leave under the null hypothesis, since every law of contact idealises. Of a law of compressions more is
-    granted. Of the null hypothesis on FRFs structure is lines that scatter about the model more than about their
-    neighbours by as much as those do.
-    """
-    if problem.lines.smooth is None:
-        return not explanation.names and explanation.best.levels.level > _STRUCTURED
-    smooth, noise = _smooth_part(problem, explanation)
-    if problem.kind != "indentation":
-        return _is_above_noise(smooth / _GRANTED if explanation.names else smooth, noise)
-    assert problem.lines.smooth is not None
-    slow = float(problem.lines.smooth.slow.max() / np.median(problem.lines.smooth.scale))
-    if smooth <= max(_LEAST_STRUCTURE, _SLOW * slow):
-        return False
-    known = explanation.best.levels.level > _LEAST_LEVEL
-    if smooth <= _STRUCTURED * noise and not (known and smooth_error_gain(explanation) > _PLAIN_STRUCTURE):
-        return False
-    return explanation.least_squares[1] >= _GRANTED_TO_LAWS * null.least_squares[1]
 
 
 def largest_floor_percent(problem: FittingProblem, null: Explanation, groups: Sequence[HeldOut]) -> float:
