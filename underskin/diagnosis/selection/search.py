@@ -363,7 +363,7 @@ class KindsTogether:
 
     def shows_on_curves(self, name: str, names: Sequence[str]) -> bool:
         """Whether a mechanism of a set shows on the recordings of another kind."""
-        beside = self.search.beside
+        beside = self.search.other_kinds
         if beside is None:
             return False
         others = [other for other in names if other != name]
@@ -401,7 +401,7 @@ class OtherKinds:
         explained_alone = KindsTogether(alone, apart, beside, apart, contradictory)
         if explained_alone.apart_is_likelier:
             return explained_alone
-        return KindsTogether(problem, replace(together, beside=beside), beside, apart, contradictory)
+        return KindsTogether(problem, replace(together, other_kinds=beside), beside, apart, contradictory)
 
 
 def telling_modulus(joined: KindsTogether | None, names: Sequence[str]) -> frozenset[Kind]:
