@@ -221,7 +221,7 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
     """Within which each axis' recordings may be exchanged: sensors, where each has several values of it; else days."""
     none = np.zeros(lines.recordings, dtype=np.intp)
     days = none
-    times = [entry.recorded_at for entry in lines.campaign.recordings]
+    times = [recording.recorded_at for recording in lines.campaign.recordings]
     if None not in times:
         days = np.unique([str(time)[:10] for time in times], return_inverse=True)[1].reshape(-1)
     axes = recording_axes(lines.campaign)
@@ -255,8 +255,8 @@ def _determined(basis: Floats, others: Sequence[Floats]) -> bool:
     design = np.column_stack([np.ones(len(basis)), *others])
     fitted = design @ np.linalg.lstsq(design, basis, rcond=None)[0]
     centred = basis - basis.mean(axis=0)
-    left = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
-    return bool(left.max() < 1 - _ALIASED)
+    unexplained = ((basis - fitted) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
+    return bool(unexplained.max() < 1 - _ALIASED)
 
 
 def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) -> tuple[str, ...]:
@@ -265,9 +265,9 @@ def _determining(name: str, bases: Mapping[str, Floats], reason: Undecidable) ->
         return ()
     others = {key: basis for key, basis in bases.items() if key != name}
     return tuple(
-        left_out
-        for left_out in others
-        if not _determined(bases[name], [basis for key, basis in others.items() if key != left_out])
+        removed
+        for removed in others
+        if not _determined(bases[name], [basis for key, basis in others.items() if key != removed])
     )
 
 
@@ -276,11 +276,11 @@ def _freedman_lane(
 ) -> Floats:
     """The weighted square explained beyond the other axes: as observed, then under each permutation."""
     reduced = np.column_stack([np.ones(len(gain)), *others]) * weight[:, None]
-    left, _, _ = np.linalg.svd(reduced, full_matrices=False)
-    left = left[:, : np.linalg.matrix_rank(reduced)]
+    reduced_basis, _, _ = np.linalg.svd(reduced, full_matrices=False)
+    reduced_basis = reduced_basis[:, : np.linalg.matrix_rank(reduced)]
 
     def beyond(rows: Floats) -> Floats:
-        return rows - left @ (left.T @ rows)
+        return rows - reduced_basis @ (reduced_basis.T @ rows)
 
     residual = beyond((gain * weight)[:, None])
     direction, size, _ = np.linalg.svd(beyond(basis * weight[:, None]), full_matrices=False)
@@ -342,7 +342,7 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
     dict
         By axis the two ends of its range in the units of the campaign, or one text; empty where no axis tells.
     """
-    telling = sorted((entry for entry in results if entry.telling), key=lambda entry: -entry.share)[:2]
+    telling = sorted((result for result in results if result.telling), key=lambda result: -result.share)[:2]
     if not telling:
         return {}
     by_line = telling[0].axis in lines.row_axes
@@ -351,8 +351,8 @@ def region(lines: Lines, residuals: Residuals, results: list[AxisResult]) -> dic
         gain_misfit = (gain_misfit / np.bincount(lines.recording))[lines.recording]
     line_misfit = residuals.line_weight * np.abs(residuals.line) ** 2
     columns = {}
-    for entry in telling:
-        name = "frequency_hz" if entry.axis == "phase" else entry.axis
+    for result in telling:
+        name = "frequency_hz" if result.axis == "phase" else result.axis
         column = axis_values(lines, name, by_line)
         if column is not None:
             columns[name] = column
@@ -393,18 +393,18 @@ def axis_values(lines: Lines, name: str, by_line: bool) -> Array | None:
     """A field's values in lab units, of each row or of each recording; the distance in mm stands for a position."""
     if name == "frequency_hz":
         return lines.frequency if by_line else None
-    entries = lines.campaign.recordings
+    recordings = lines.campaign.recordings
     if name == "displacement_mm":
-        curves = [np.asarray(getattr(entry, name)) for entry in entries]
+        curves = [np.asarray(getattr(recording, name)) for recording in recordings]
         return np.concatenate(curves) if by_line else None
     column: Array
     if name == "position_mm":
         x, y = recording_axes(lines.campaign)[name].T
         column = np.round(np.hypot(x, y), 6)
     elif name == "recorded_at":
-        column = np.array([str(entry.recorded_at)[:10] for entry in entries])
+        column = np.array([str(recording.recorded_at)[:10] for recording in recordings])
     else:
-        column = np.array([getattr(entry, name) for entry in entries])
+        column = np.array([getattr(recording, name) for recording in recordings])
     return column[lines.recording] if by_line else column
 
 
@@ -488,7 +488,7 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
     weight = (lines.smooth.scale / lines.deviation) ** 2
     forms = []
     for name in ALONG_CURVES:
-        columns = [getattr(entry, name) for entry in lines.campaign.recordings]
+        columns = [getattr(recording, name) for recording in lines.campaign.recordings]
         if all(column is not None for column in columns):
             forms += _best_form(np.concatenate(columns), relative[:, None], weight, name)
     return forms
@@ -497,19 +497,19 @@ def _along_curves(problem: FittingProblem, explanation: Explanation) -> list[Sha
 def _over_axes(problem: FittingProblem, explanation: Explanation) -> list[ShapeForm]:
     """The best forms over each of the recordings' axes, and over the lines'."""
     levels = explanation.best.levels
-    left = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
+    remaining = residuals(problem, explanation, float(np.clip(levels.gain, 0.005, 0.05)), levels.position)
     forms: list[ShapeForm] = []
     for name, column in recording_axes(problem.lines.campaign).items():
         for index in range(column.shape[1]):
             component = None if column.shape[1] == 1 else index
-            best = _best_form(column[:, index], left.gain[:, None], left.gain_deviation**-2, name)
+            best = _best_form(column[:, index], remaining.gain[:, None], remaining.gain_deviation**-2, name)
             forms += [replace(form, component=component) for form in best]
     line, centres = frequency_bins(problem.lines.frequency)
     if len(centres) >= 6:
-        total = np.bincount(line, left.line_weight, len(centres)).astype(float)
+        total = np.bincount(line, remaining.line_weight, len(centres)).astype(float)
         parts = [
-            np.bincount(line, left.line_weight * part, len(centres)) / total
-            for part in (left.line.real, left.line.imag)
+            np.bincount(line, remaining.line_weight * part, len(centres)) / total
+            for part in (remaining.line.real, remaining.line.imag)
         ]
         forms += _best_form(np.log(centres), np.stack(parts, axis=1), total, "frequency_hz")
     return forms

@@ -123,20 +123,21 @@ def _by_block(problem: FittingProblem, surviving: Sequence[Answer]) -> float | N
 
 def _log_modulus(explanation: Explanation) -> tuple[float, float]:
     """ln E under an explanation, the declared one times what it makes of it, and its standard deviation."""
-    names = [entry.name for entry in explanation.model.parameters]
-    places = [names.index(name) for name in _MODULUS if name in names]
-    rows = [explanation.best.hypothesis.mean_places.index(place) for place in places]
+    names = [parameter.name for parameter in explanation.model.parameters]
+    indices = [names.index(name) for name in _MODULUS if name in names]
+    rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
     variance = float(explanation.best.covariance[np.ix_(rows, rows)].sum())
-    return float(explanation.point.fit[places].sum()), float(np.sqrt(max(variance, 0.0)))
+    return float(explanation.point.fit[indices].sum()), float(np.sqrt(max(variance, 0.0)))
 
 
 def _nothing_to_plan(surviving: Sequence[Answer], varied: Collection[str]) -> NextRecordings:
     """No recordings, and on which of the axes that can be `varied` the rivals would differ."""
     names = [answer.names for answer in surviving]
-    known = [own for own in names if set(own) <= set(CATALOGUE)]
-    axes = [{axis for name in own for axis in CATALOGUE[name].axes if axis in varied} for own in known]
+    listed = [mechanisms for mechanisms in names if set(mechanisms) <= set(CATALOGUE)]
+    axes = [{axis for name in mechanisms for axis in CATALOGUE[name].axes if axis in varied} for mechanisms in listed]
     return NextRecordings(
-        names, differ_on={axis for own in axes for axis in own if any(axis not in other for other in axes)}
+        names,
+        differ_on={axis for rival_axes in axes for axis in rival_axes if any(axis not in other for other in axes)},
     )
 
 
@@ -147,7 +148,7 @@ def _outlook(
     # The campaign's own recordings go along, so that each model has the parameters that it was fitted with.
     campaign = problem.collapsed.campaign
     together = Conditions(campaign.name, campaign.skin, (*campaign.recordings, *allowed))
-    own = len(campaign.recordings)
+    count = len(campaign.recordings)
     inside = np.ones(len(allowed), dtype=bool)
     rivals, predictions = [], []
     for answer in surviving:
@@ -160,26 +161,26 @@ def _outlook(
         if len(model.parameters) != len(answer.explanation.point.fit):
             continue
         prediction = model.predict(answer.explanation.point.fit)
-        inside &= prediction.inside[own:] & (np.abs(prediction.value[own:]) > 0)
+        inside &= prediction.inside[count:] & (np.abs(prediction.value[count:]) > 0)
         rivals.append(answer)
         predictions.append(prediction)
-    kept = own + np.flatnonzero(inside)
+    rows = count + np.flatnonzero(inside)
     line = float(np.median(np.add.reduceat(problem.lines.deviation**-2.0, problem.lines.first)) ** -0.5)
     responses, unknown, scatter = [], [], []
     for answer, prediction in zip(rivals, predictions, strict=True):
         explanation = answer.explanation
         assert explanation is not None
-        levels, value = explanation.best.levels, prediction.value[kept]
-        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, kept] / value).real
+        levels, value = explanation.best.levels, prediction.value[rows]
+        slopes = (prediction.slopes[explanation.best.hypothesis.mean_places][:, rows] / value).real
         responses.append(np.log(np.abs(value)))
         unknown.append(slopes.T @ np.linalg.cholesky(explanation.best.covariance))
         variance = levels.gain**2 + (levels.level * line / np.abs(value)) ** 2
         if prediction.position_slopes is not None:
-            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, kept] / value) ** 2).sum(axis=0)
+            variance += levels.position**2 * (np.abs(prediction.position_slopes[:, rows] / value) ** 2).sum(axis=0)
         scatter.append(variance)
     prior = np.array([answer.probability for answer in rivals])
     outlook = _Outlook(np.array(responses), unknown, np.array(scatter), prior / prior.sum())
-    return rivals, outlook, [entry for entry, good in zip(allowed, inside, strict=True) if good]
+    return rivals, outlook, [candidate for candidate, good in zip(allowed, inside, strict=True) if good]
 
 
 @dataclass(frozen=True)

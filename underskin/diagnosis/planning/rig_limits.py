@@ -58,16 +58,17 @@ class RigLimits:
 def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
     """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
     sensor, its preloads and a quarter beyond the highest."""
-    entries = frf_of(conditions)
-    preloads = [entry.preload_n for entry in entries]
+    recordings = frf_of(conditions)
+    preloads = [recording.preload_n for recording in recordings]
     distances = np.round(1e3 * np.hypot(*offsets(conditions).T), 1)
-    dwells = [entry.dwell_s for entry in entries if entry.dwell_s is not None]
+    dwells = [recording.dwell_s for recording in recordings if recording.dwell_s is not None]
     return replace(
         limits,
         preload_n=limits.preload_n or (min(preloads), _FURTHER * max(preloads)),
-        indenter_radius_mm=limits.indenter_radius_mm or sorted({entry.indenter_radius_mm for entry in entries}),
-        dynamic_force_n=limits.dynamic_force_n or _ends([entry.dynamic_force_n for entry in entries]),
-        dwell_s=limits.dwell_s or (_ends(dwells) if len(dwells) == len(entries) else ()),
+        indenter_radius_mm=limits.indenter_radius_mm
+        or sorted({recording.indenter_radius_mm for recording in recordings}),
+        dynamic_force_n=limits.dynamic_force_n or _ends([recording.dynamic_force_n for recording in recordings]),
+        dwell_s=limits.dwell_s or (_ends(dwells) if len(dwells) == len(recordings) else ()),
         offset_mm=_ends(distances.tolist()) if limits.offset_mm is None else limits.offset_mm,
     )
 
@@ -94,11 +95,11 @@ def _ends(values: Sequence[float]) -> list[float]:
 
 def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]:
     """A recording for every combination within the limits, at the sensor that was recorded most, after all others."""
-    entries = frf_of(conditions)
-    sensors = [entry.sensor for entry in entries]
+    recordings = frf_of(conditions)
+    sensors = [recording.sensor for recording in recordings]
     sensor = max(dict.fromkeys(sensors), key=sensors.count)
-    place = next((known.x_mm, known.y_mm) for known in conditions.skin.sensors if known.id == sensor)
-    cycles = [entry.load_cycles for entry in entries if entry.load_cycles is not None]
+    position = next((declared.x_mm, declared.y_mm) for declared in conditions.skin.sensors if declared.id == sensor)
+    cycles = [recording.load_cycles for recording in recordings if recording.load_cycles is not None]
     return [
         FrfConditions(
             id=f"candidate {number}",
@@ -106,10 +107,10 @@ def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]
             indenter_radius_mm=sphere,
             preload_n=force,
             dynamic_force_n=amplitude,
-            recorded_at=entries[0].recorded_at,
+            recorded_at=recordings[0].recorded_at,
             dwell_s=dwell,
-            load_cycles=max(cycles) if len(cycles) == len(entries) else None,
-            position_mm=(place[0] + round(offset, 3), place[1]),
+            load_cycles=max(cycles) if len(cycles) == len(recordings) else None,
+            position_mm=(position[0] + round(offset, 3), position[1]),
             frequency_hz=np.array([COLLAPSED_HZ]),
         )
         for number, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))

@@ -29,7 +29,7 @@ from underskin.diagnosis.inference.hypothesis import CellResponse, cell_response
 from underskin.diagnosis.inference.least_squares import least_squares_reading
 from underskin.diagnosis.inference.residuals import whole_prediction
 from underskin.diagnosis.localisation import axis_values
-from underskin.diagnosis.reporting.numbers import place_of
+from underskin.diagnosis.reporting.numbers import parameter_index
 from underskin.diagnosis.reporting.report import DiagnosisResult
 from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording, frf_recordings
 from underskin.recordings.curve_course import course
@@ -37,7 +37,7 @@ from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
 MOST_SAMPLES = 600  # of a curve
 _MORE = 1.1  # times what plain least squares leave
-_BESIDE_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
+_SAMPLES_NEAR_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class ShownCurve:
     pull_off: Mark | None
 
     @property
-    def left_percent(self) -> float:
+    def misfit_percent(self) -> float:
         """100 √(Σ|y − m|²/Σ|y|²) of the explanation after."""
         size = float(np.linalg.norm(self.force_n))
         return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
@@ -89,17 +89,17 @@ def shown_curves(
 ) -> list[ShownCurve]:
     """Every curve that was fitted, the worst explained one first; `recorded` holds them with all their samples."""
     raw = {
-        entry.id: entry
-        for entry in recorded.recordings
-        if isinstance(entry, CurveRecording) and entry.kind == problem.kind
+        recording.id: recording
+        for recording in recorded.recordings
+        if isinstance(recording, CurveRecording) and recording.kind == problem.kind
     }
     lines = problem.lines
     predicted = zip(_predictions(problem, before), _predictions(problem, after), strict=True)
     curves = []
-    for entry, own, both in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
-        assert isinstance(entry, CurveRecording)
-        curves.append(_shown(raw[entry.id], entry.displacement_mm, lines.value.real[own], *both))
-    return sorted(curves, key=lambda curve: -curve.left_percent)
+    for recording, span, predictions in zip(lines.campaign.recordings, lines.spans, predicted, strict=True):
+        assert isinstance(recording, CurveRecording)
+        curves.append(_shown(raw[recording.id], recording.displacement_mm, lines.value.real[span], *predictions))
+    return sorted(curves, key=lambda curve: -curve.misfit_percent)
 
 
 def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
@@ -110,8 +110,8 @@ def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Fl
     fit, _ = explanation.least_squares
     plain = least_squares_reading(problem.lines, explanation.model.predict(fit).value.real)
     measured = problem.lines.value.real
-    left, least = (float(np.linalg.norm(measured - one)) for one in (reading, plain))
-    return (fit, plain) if left > _MORE * least else None
+    misfit, least_misfit = (float(np.linalg.norm(measured - prediction)) for prediction in (reading, plain))
+    return (fit, plain) if misfit > _MORE * least_misfit else None
 
 
 def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
@@ -125,13 +125,13 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
         fit, reading = plain
     deviation = _deviation(problem, explanation, cell)
     predicted = []
-    for entry, own in zip(lines.campaign.recordings, lines.spans, strict=True):
-        assert isinstance(entry, CurveRecording)
-        contact = float(fit[place_of(explanation, f"contact_point {entry.id}")])
+    for recording, span in zip(lines.campaign.recordings, lines.spans, strict=True):
+        assert isinstance(recording, CurveRecording)
+        contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
         # What the cell shows in the air just before, a drift included, whatever describes it
-        in_air = np.flatnonzero(entry.displacement_mm[: int(entry.displacement_mm.argmax()) + 1] <= contact)
-        shown = reading[own][in_air[-1]] if len(in_air) else cell.offset[own][0]
-        predicted.append(CurvePrediction(reading[own], deviation[own], Mark(contact, float(shown))))
+        in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
+        shown = reading[span][in_air[-1]] if len(in_air) else cell.offset[span][0]
+        predicted.append(CurvePrediction(reading[span], deviation[span], Mark(contact, float(shown))))
     return predicted
 
 
@@ -140,7 +140,7 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
     shared = [
-        np.diag(lines.smooth.part(np.arange(own.start, own.stop)).covariance(levels.smooth)) for own in lines.spans
+        np.diag(lines.smooth.part(np.arange(span.start, span.stop)).covariance(levels.smooth)) for span in lines.spans
     ]
     variance = (levels.level * lines.deviation) ** 2 + np.concatenate(shared) - cell.variance
     return np.sqrt(np.maximum(variance, 0.0))
@@ -149,18 +149,20 @@ def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResp
 def _shown(
     raw: CurveRecording, displacement: Floats, force: Floats, before: CurvePrediction, after: CurvePrediction
 ) -> ShownCurve:
-    place, measured, *times = finite_samples(raw)
-    seen = course(place, measured, *times)
+    sample_mm, measured, *times = finite_samples(raw)
+    landmarks = course(sample_mm, measured, *times)
     jumps: list[int | None] = [None, None]
     if raw.kind == "indentation":
-        measured = measured - seen.zero
-        jumps = [seen.snap_in, None if seen.pull_off is None else seen.pull_off - 1]
-    snap_in, pull_off = (None if at is None else Mark(float(place[at]), float(measured[at])) for at in jumps)
-    shown = _thinned(way_along(place, measured, seen.noise), [seen.turn, *(at for at in jumps if at is not None)])
+        measured = measured - landmarks.zero
+        jumps = [landmarks.snap_in, None if landmarks.pull_off is None else landmarks.pull_off - 1]
+    snap_in, pull_off = (None if at is None else Mark(float(sample_mm[at]), float(measured[at])) for at in jumps)
+    shown = _thinned(
+        way_along(sample_mm, measured, landmarks.noise), [landmarks.turn, *(at for at in jumps if at is not None)]
+    )
     return ShownCurve(
         name=raw.id,
         count=len(measured),
-        sample_mm=place[shown],
+        sample_mm=sample_mm[shown],
         sample_n=measured[shown],
         displacement_mm=displacement,
         force_n=force,
@@ -178,8 +180,10 @@ def _thinned(way: Floats, corners: list[int]) -> Indices:
     if count <= MOST_SAMPLES:
         return np.arange(count)
     even = np.minimum(np.searchsorted(way, np.linspace(0.0, 1.0, MOST_SAMPLES)), count - 1)
-    beside = [np.arange(max(at - _BESIDE_CORNER, 0), min(at + _BESIDE_CORNER + 1, count)) for at in corners]
-    return np.unique(np.concatenate([even, *beside]))
+    near_corners = [
+        np.arange(max(at - _SAMPLES_NEAR_CORNER, 0), min(at + _SAMPLES_NEAR_CORNER + 1, count)) for at in corners
+    ]
+    return np.unique(np.concatenate([even, *near_corners]))
 
 
 MOST_RECORDINGS = 120
@@ -193,7 +197,7 @@ class ShownFrf:
     """One recording: those of its `count` lines that are shown (shown,); responses in pC/N.
 
     `deviation` (2, shown): the noise's standard deviation about the explanation after, of real and imaginary part.
-    `left_before`, `left_after`: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
+    `misfit_before`, `misfit_after`: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
     """
 
     name: str
@@ -206,40 +210,44 @@ class ShownFrf:
     before: Complexes
     after: Complexes
     deviation: Floats
-    left_before: float
-    left_after: float
+    misfit_before: float
+    misfit_after: float
 
 
 def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
     """The recordings that were fitted, the one that is explained worst after first; of very many those explained worst,
     of each sensor as many as of another."""
     lines = problem.lines
-    measured, was, now = (
-        _PC_PER_C * rows for rows in (lines.value, *(_predicted(problem, e) for e in (before, after)))
+    measured, predicted_before, predicted_after = (
+        _PC_PER_C * rows
+        for rows in (lines.value, *(_predicted(problem, explanation) for explanation in (before, after)))
     )
     deviation = _PC_PER_C * _frf_deviation(problem, after)
-    left = [[_left_percent(measured[own], rows[own]) for own in lines.spans] for rows in (was, now)]
-    chosen = _worst([entry.sensor for entry in frf_recordings(lines.campaign)], left[1])
+    misfits = [
+        [_misfit_percent(measured[span], rows[span]) for span in lines.spans]
+        for rows in (predicted_before, predicted_after)
+    ]
+    chosen = _worst([recording.sensor for recording in frf_recordings(lines.campaign)], misfits[1])
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
     shown = []
     for number in chosen:
-        entry, own = lines.campaign.recordings[number], lines.spans[number]
-        assert isinstance(entry, FrfRecording)
-        some = own.start + _thinned_lines(lines.frequency[own], most)
+        recording, span = lines.campaign.recordings[number], lines.spans[number]
+        assert isinstance(recording, FrfRecording)
+        shown_rows = span.start + _thinned_lines(lines.frequency[span], most)
         shown.append(
             ShownFrf(
-                name=entry.id,
-                sensor=entry.sensor,
-                indenter_radius_mm=entry.indenter_radius_mm,
-                preload_n=entry.preload_n,
-                count=own.stop - own.start,
-                frequency_hz=lines.frequency[some],
-                measured=measured[some],
-                before=was[some],
-                after=now[some],
-                deviation=deviation[:, some],
-                left_before=left[0][number],
-                left_after=left[1][number],
+                name=recording.id,
+                sensor=recording.sensor,
+                indenter_radius_mm=recording.indenter_radius_mm,
+                preload_n=recording.preload_n,
+                count=span.stop - span.start,
+                frequency_hz=lines.frequency[shown_rows],
+                measured=measured[shown_rows],
+                before=predicted_before[shown_rows],
+                after=predicted_after[shown_rows],
+                deviation=deviation[:, shown_rows],
+                misfit_before=misfits[0][number],
+                misfit_after=misfits[1][number],
             )
         )
     return shown
@@ -268,22 +276,22 @@ def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
     return np.sqrt(of_line + relative[lines.recording] * parts**2)
 
 
-def _left_percent(measured: Complexes, predicted: Complexes) -> float:
+def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
     size = float(np.linalg.norm(predicted))
     return 100 * float(np.linalg.norm(measured - predicted)) / size if size else 100.0
 
 
-def _worst(sensors: Sequence[str], left: Sequence[float]) -> list[int]:
+def _worst(sensors: Sequence[str], misfits: Sequence[float]) -> list[int]:
     """Which recordings are shown, in order."""
-    order = sorted(range(len(left)), key=lambda number: -left[number])
+    order = sorted(range(len(misfits)), key=lambda number: -misfits[number])
     if len(order) <= MOST_RECORDINGS:
         return order
     seen: dict[str, int] = {}
     ranks = {}
     for number in order:
         ranks[number] = seen[sensors[number]] = seen.get(sensors[number], -1) + 1
-    kept = set(sorted(order, key=lambda number: ranks[number])[:MOST_RECORDINGS])
-    return [number for number in order if number in kept]
+    chosen = set(sorted(order, key=lambda number: ranks[number])[:MOST_RECORDINGS])
+    return [number for number in order if number in chosen]
 
 
 def _thinned_lines(frequency: Floats, most: int) -> Indices:
@@ -291,9 +299,9 @@ def _thinned_lines(frequency: Floats, most: int) -> Indices:
     count = len(frequency)
     if count <= most:
         return np.arange(count)
-    place = np.log(np.maximum(frequency, np.min(frequency[frequency > 0], initial=np.inf)))
-    wanted = np.linspace(place[0], place[-1], most)
-    return np.unique(np.minimum(np.searchsorted(place, wanted), count - 1))
+    log_frequency = np.log(np.maximum(frequency, np.min(frequency[frequency > 0], initial=np.inf)))
+    targets = np.linspace(log_frequency[0], log_frequency[-1], most)
+    return np.unique(np.minimum(np.searchsorted(log_frequency, targets), count - 1))
 
 
 AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in WORDS.items()}
@@ -365,10 +373,10 @@ class Thinned:
         along = any(axis in diagnosis.region for axis in lines.row_axes)
         by_line = lines.curves or along or any(lines.mechanisms[name].needs_lines for name in shown.names)
         most = max(_MOST_POINTS // lines.recordings, _LEAST_BINS) if by_line else 1
-        place = _steps_of_samples(lines.frequency, most) if lines.curves else _steps_of_lines(lines, most)
-        bins = int(place.max()) + 1
+        step = _steps_of_samples(lines.frequency, most) if lines.curves else _steps_of_lines(lines, most)
+        bins = int(step.max()) + 1
         self.by_line = by_line
-        self._used, self._point = np.unique(lines.recording * bins + place, return_inverse=True)
+        self._used, self._point = np.unique(lines.recording * bins + step, return_inverse=True)
         self.recording = self._used // bins
         self._bin = self._used % bins
         self._weight = lines.deviation**-2.0
@@ -383,7 +391,7 @@ class Thinned:
         plain = plain_reading(self.problem, explanation, predicted.real)
         if plain is not None:
             predicted = plain[1].astype(complex)
-        variance = (levels.level**2 / self._total) + self._mean(self._placed(explanation))
+        variance = (levels.level**2 / self._total) + self._mean(self._row_variance(explanation))
         unit = 1.0 if lines.curves else 1e12
         return Points(
             recording=self.recording,
@@ -423,7 +431,7 @@ class Thinned:
         """The axes that the points can be laid out along, those of the rows first."""
         return [*self.lines.row_axes[: int(self.by_line)], *recording_axes(self.lines.campaign)]
 
-    def _placed(self, explanation: Explanation) -> Floats:
+    def _row_variance(self, explanation: Explanation) -> Floats:
         """The variance from positioning and mains pick-up, of each row."""
         prediction, levels = explanation.best.prediction, explanation.best.levels
         variance = np.zeros(len(prediction.value))
@@ -443,9 +451,9 @@ class Thinned:
         return self._mean(column.real) + 1j * self._mean(column.imag)
 
 
-def _steps_of_samples(place: Floats, most: int) -> Indices:
+def _steps_of_samples(coordinate: Floats, most: int) -> Indices:
     """Steps of like counts of distinct places, of each sample (rows,)."""
-    distinct, number = np.unique(np.round(place, 6), return_inverse=True)
+    distinct, number = np.unique(np.round(coordinate, 6), return_inverse=True)
     steps: Indices = number.reshape(-1) * min(len(distinct), most) // len(distinct)
     return steps
 
@@ -459,8 +467,8 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
     same = lines.recording[1:] == lines.recording[:-1]
     widest = float(np.quantile(np.diff(log)[same], _ALMOST_ALL)) if same.any() else np.inf
     count = int(min(most, round((high - low) / widest) + 1)) if 0 < widest < np.inf else 1
-    place = np.minimum((log - low) / ((high - low) or 1.0) * count + _SLACK, count - 1).astype(np.intp)
-    return np.unique(place, return_inverse=True)[1].reshape(-1)
+    step = np.minimum((log - low) / ((high - low) or 1.0) * count + _SLACK, count - 1).astype(np.intp)
+    return np.unique(step, return_inverse=True)[1].reshape(-1)
 
 
 def _stepped(column: Floats, axis: str) -> Levels:

@@ -84,7 +84,7 @@ def page(report: Report, figures: Mapping[str, go.Figure] | None = None) -> str:
     """The whole page; `figures` as `underskin.diagnosis.reporting.figures` makes them: a report alone has but one."""
     given = figures if figures is not None else of_report(report)
     drawn = {name: _plot(figure, name) for name, figure in given.items()}
-    scripts = (get_plotlyjs(), *(one.read_text("utf-8") for one in _SCRIPTS)) if drawn else ()
+    scripts = (get_plotlyjs(), *(script.read_text("utf-8") for script in _SCRIPTS)) if drawn else ()
     return str(_macros("file.html").page(report, drawn, scripts))
 
 
@@ -106,8 +106,8 @@ def provenance(report: Report) -> str:
 
 def of_report(report: Report) -> dict[str, go.Figure]:
     """The figures that a report alone can give."""
-    own = {} if report["fit"] is None else {"explanations": explanations(report)}
-    return {**own, **several_figures(report)}
+    fit_figures = {} if report["fit"] is None else {"explanations": explanations(report)}
+    return {**fit_figures, **several_figures(report)}
 
 
 def _plot(figure: go.Figure, name: str) -> str:

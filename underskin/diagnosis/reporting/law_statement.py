@@ -51,14 +51,14 @@ def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
     """One sentence of each of `sentences` that has a clause that is not empty; within them no full stop stands before
     a space, so that they can be told apart again by these. `names` of campaigns and skins stay whole: "Palm 2. Upper"
     is no end of a sentence."""
-    kept = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
+    protected_names = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
 
-    def told(text: str) -> str:
-        for name, whole in kept.items():
-            text = text.replace(name, whole)
+    def as_clause(text: str) -> str:
+        for name, protected in protected_names.items():
+            text = text.replace(name, protected)
         return clause(text)
 
-    filled = ([told(text) for text in clauses if text] for clauses in sentences)
+    filled = ([as_clause(text) for text in clauses if text] for clauses in sentences)
     return " ".join(f"{capital('; '.join(map(small, clauses)))}." for clauses in filled if clauses)
 
 
@@ -115,17 +115,17 @@ class AnswerFacts:
 
     `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
     `at_bounds` the parameters at an end of their search,
-    `mechanisms` those of the report, and `told` is what their values mean together.
+    `mechanisms` those of the report, and `meanings` is what their values mean together.
     """
 
     groups: Sequence[Mapping[str, Any]] = ()
     idle: Sequence[str] = ()
     at_bounds: Sequence[str] = ()
     mechanisms: Sequence[Mapping[str, Any]] = ()
-    told: Sequence[str] = ()
+    meanings: Sequence[str] = ()
 
 
-_NOTHING_AROUND, _NOTHING_KNOWN = StatementContext(), AnswerFacts()
+_NO_CONTEXT, _NO_FACTS = StatementContext(), AnswerFacts()
 
 
 def answer_statement(
@@ -133,8 +133,8 @@ def answer_statement(
     verdict: str,
     kind: Kind = "frf",
     fit: Mapping[str, Any] | None = None,
-    around: StatementContext = _NOTHING_AROUND,
-    of_answer: AnswerFacts = _NOTHING_KNOWN,
+    around: StatementContext = _NO_CONTEXT,
+    of_answer: AnswerFacts = _NO_FACTS,
     shape: str = "",
     power: Sequence[Power] = (),
 ) -> str:
@@ -156,8 +156,8 @@ def answer_statement(
     first = around.first(stated, reserve)
     if verdict == "no_mismatch":
         return of_clauses(first, [*means, *quoted], [power_clause(power, kind)])
-    left = [left_by(fit, model)] if fit is not None and of_curves and verdict == "unexplained" else []
-    return of_clauses(first, [*means, shape, *left, *of_answer.told], quoted)
+    misfit = [misfit_clause(fit, model)] if fit is not None and of_curves and verdict == "unexplained" else []
+    return of_clauses(first, [*means, shape, *misfit, *of_answer.meanings], quoted)
 
 
 def _answer(
@@ -167,7 +167,7 @@ def _answer(
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
-    listed = _each(rivals)
+    listed = _answers_in_words(rivals)
     mentioned = dict.fromkeys(name for answer in (leader, *rivals) for name in answer.names if name in CATALOGUE)
     if verdict == "no_mismatch":
         agree = f"recordings and {model} agree within the noise (probability {percent})"
@@ -176,7 +176,7 @@ def _answer(
         return f"{agree}, but they do not rule out: {listed}", _law(tuple(mentioned))
     if verdict == "unexplained":
         return (f"something is missing that none of the known mechanisms describes (probability {percent})",)
-    by_sets = f"by sets: {_each([leader, *rivals])}" if rivals else ""
+    by_sets = f"by sets: {_answers_in_words([leader, *rivals])}" if rivals else ""
     if verdict == "explained":
         lacking, by_mechanism = _lacking(leader, of_answer)
         means = _law(leader.names) or _strengths(of_answer.mechanisms)
@@ -194,14 +194,14 @@ def _answer(
     but = but or [f"many rivals remain, each below {in_percent(_WORTH_NAMING)}"]
     doubtful = bool(idle or of_answer.at_bounds) and leader.names != (NOTHING_MISSING,)
     misfit = f"what is certain is that {model} does not describe the recordings" if doubtful else ""
-    begin = f"best explained by {in_words(leader.names)} ({percent})"
+    lead = f"best explained by {in_words(leader.names)} ({percent})"
     if rivals and rivals[0].probability > leader.probability:  # as all sets of known mechanisms together lead
-        known = sum(answer.probability for answer in answers if answer.kind == leader.kind)
-        begin = (
-            f"known mechanisms explain this ({in_percent(known)} together), best {in_words(leader.names)} ({percent})"
+        total = sum(answer.probability for answer in answers if answer.kind == leader.kind)
+        lead = (
+            f"known mechanisms explain this ({in_percent(total)} together), best {in_words(leader.names)} ({percent})"
         )
     return (
-        f"{begin}, but {', and '.join(but)}",
+        f"{lead}, but {', and '.join(but)}",
         misfit,
         _law(tuple(mentioned)),
     )
@@ -216,11 +216,11 @@ def _lacking(leader: Answer, of_answer: AnswerFacts) -> tuple[str, bool]:
     twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
     if group is not None and twins and group["probability"] > least:
         return f"{_group_in_words(group)}, rather {in_words(leader.names)} ({in_percent(leader.probability)})", True
-    present = {entry["name"]: entry["probability"] for entry in of_answer.mechanisms}
+    present = {mechanism["name"]: mechanism["probability"] for mechanism in of_answer.mechanisms}
     if not any(present.get(name, 0.0) > least for name in leader.names):
         return f"{in_words(leader.names)} (probability {in_percent(leader.probability)})", False
-    own = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
-    return " and ".join(map(_group_in_words, own)), True
+    single_groups = [{"mechanisms": [name], "probability": present[name]} for name in leader.names]
+    return " and ".join(map(_group_in_words, single_groups)), True
 
 
 def _group_in_words(group: Mapping[str, Any]) -> str:
@@ -228,7 +228,7 @@ def _group_in_words(group: Mapping[str, Any]) -> str:
     return f"{named} ({in_percent(group['probability'])})"
 
 
-def _each(answers: Sequence[Answer]) -> str:
+def _answers_in_words(answers: Sequence[Answer]) -> str:
     return ", or ".join(f"{in_words(answer.names)} ({in_percent(answer.probability)})" for answer in answers)
 
 
@@ -239,20 +239,20 @@ def _law(names: Sequence[str]) -> str:
 
 def _strengths(mechanisms: Sequence[Mapping[str, Any]]) -> str:
     """The first parameter of each of a few mechanisms."""
-    each = [
-        (in_words([entry["name"]]), parameter_in_words(entry["parameters"][0]))
-        for entry in mechanisms[:_STATED]
-        if entry["parameters"]
+    strengths = [
+        (in_words([mechanism["name"]]), parameter_in_words(mechanism["parameters"][0]))
+        for mechanism in mechanisms[:_STATED]
+        if mechanism["parameters"]
     ]
-    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in each)
+    return ", ".join(f"{name} has {'an' if strength[0] in 'aeiou' else 'a'} {strength}" for name, strength in strengths)
 
 
-def parameter_in_words(entry: Mapping[str, Any]) -> str:
+def parameter_in_words(parameter: Mapping[str, Any]) -> str:
     """Name, value and interval of a parameter: "tip mass of 6.02 g (5.9 to 6.1)"."""
-    value, low, high = (in_digits(entry[key], 3) for key in ("value", "low", "high"))
-    unit = "" if entry["unit"] == "-" else f" {entry['unit']}"
-    interval = "at or beyond the end of its search" if entry.get("at_bound") else f"{low} to {high}"
-    return f"{entry['name'].replace('_', ' ')} of {value}{unit} ({interval})"
+    value, low, high = (in_digits(parameter[key], 3) for key in ("value", "low", "high"))
+    unit = "" if parameter["unit"] == "-" else f" {parameter['unit']}"
+    interval = "at or beyond the end of its search" if parameter.get("at_bound") else f"{low} to {high}"
+    return f"{parameter['name'].replace('_', ' ')} of {value}{unit} ({interval})"
 
 
 def _reserve(fit: Mapping[str, Any]) -> str:
@@ -292,25 +292,25 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
     return f"Young's modulus {how}: {modulus['value']:.3g} {modulus['unit']} ({interval})"
 
 
-def left_by(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
+def misfit_clause(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
     """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
     mechanisms beside it, which `law` holds."""
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before.get("least_squares_modulus_mpa")
-    alone = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
-    said = f"{alone} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
+    base_words = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
+    sentence = f"{base_words} leaves {in_digits(before['rmse_percent'], 2)} % of the force (root mean square)"
     added = in_words(names) if names else ""
     if law is not None:
         added = f"this law and {in_words(law)}" if law else "this law"
-    beside = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
+    addition = f", with {added} {in_digits(after['rmse_percent'], 2)} %" if added else ""
     modulus = _modulus_clause(after, f"with {added}") if added and "youngs_modulus" in after else ""
-    return f"{said}{beside}" + (f"; {modulus}" if modulus else "")
+    return f"{sentence}{addition}" + (f"; {modulus}" if modulus else "")
 
 
 def power_clause(power: Sequence[Power], kind: Kind) -> str:
     """What the recordings would have shown."""
     all_of_them = sum(kind in mechanism.kinds for mechanism in CATALOGUE.values())
-    shown = [entry.mechanism for entry in power if entry.smallest_visible_percent <= _SMALL]
+    shown = [limit.mechanism for limit in power if limit.smallest_visible_percent <= _SMALL]
     if not shown:
         return f"none of the {all_of_them} known mechanisms would have shown with {_SMALL:g} % of the response"
     which = f"these {len(shown)} would each have shown with {_SMALL:g} % of the response"
@@ -468,18 +468,18 @@ def reserves(findings: Sequence[Mapping[str, str]]) -> list[str]:
 
 def _clauses(findings: Sequence[Mapping[str, str]], decisive: Sequence[FindingCode]) -> list[str]:
     chosen = sorted(
-        (entry for entry in findings if entry["code"] in decisive),
-        key=lambda entry: decisive.index(FindingCode(entry["code"])),
+        (finding for finding in findings if finding["code"] in decisive),
+        key=lambda finding: decisive.index(FindingCode(finding["code"])),
     )
-    further = Counter(entry["code"].replace("_", " ") for entry in chosen[_MOST:])
+    further = Counter(finding["code"].replace("_", " ") for finding in chosen[_MOST:])
     counted = [f"{count} of {code}" for code, count in further.items()]
     more = [f"further findings: {', '.join(counted)}"] if counted else []
     return [*map(_quoted, chosen[:_MOST]), *more]
 
 
-def _quoted(entry: Mapping[str, str]) -> str:
-    text = clause(entry["statement"])
-    return f"recording {entry['recording']!r}: {text}" if entry["recording"] else text
+def _quoted(finding: Mapping[str, str]) -> str:
+    text = clause(finding["statement"])
+    return f"recording {finding['recording']!r}: {text}" if finding["recording"] else text
 
 
 def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
@@ -507,7 +507,7 @@ def statement(
     document: Mapping[str, Any],
     floor: float,
     around: StatementContext,
-    left: str,
+    misfit: str,
     *,
     outweighed: bool,
 ) -> str:
@@ -518,32 +518,32 @@ def statement(
     """
     law = leading.law
     acts_on = law.description.acts_on
-    beside = tuple(name for name in leading.explanation.names if name != law.name)
-    known = f" beside {_listed(beside)}" if beside else ""
+    other_names = tuple(name for name in leading.explanation.names if name != law.name)
+    with_others = f" beside {_listed(other_names)}" if other_names else ""
     held = document["heldout_rmse_percent"]
-    worth = _worth(held, floor, _held_out(law), f" and {_listed(beside)}" if beside else "")
+    worth = _worth(held, floor, _held_out(law), f" and {_listed(other_names)}" if other_names else "")
     altered = [*_altered(law, document), *_order(law, document)]
-    missing = [f"what is missing{known} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, *altered]
+    missing = [f"what is missing{with_others} {_does(leading)}{_follows(leading)}: {_size(leading)}", worth, *altered]
     rivals = [
-        f"{acted_on(entry['acts_on'], entry['axis'])} over {followed(entry['axis'])}, {entry['form']} "
-        f"({in_percent(entry['probability'])} of it)"
-        for entry in document["rivals"][:2]
+        f"{acted_on(rival['acts_on'], rival['axis'])} over {followed(rival['axis'])}, {rival['form']} "
+        f"({in_percent(rival['probability'])} of it)"
+        for rival in document["rivals"][:2]
     ]
     also = [f"in these recordings this may also be {', or '.join(rivals)}"] if rivals else []
     if outweighed:
         also.append("more probable still is a course of no listed form: take this law as the nearest that has one")
-    certain = probability * _same_place(document) >= EXPLAINED and not outweighed
-    told = ""
+    certain = probability * _share_of_quantity(document) >= EXPLAINED and not outweighed
+    hint_text = ""
     if certain and not (altered or leading.is_constant):
-        told = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
+        hint_text = hint(acts_on, _hinted(leading), leading.explanation.best.hypothesis.lines.kind)
     verdict = f"no known mechanism describes this (probability {in_percent(probability)})"
-    return of_clauses(around.first(verdict), missing, [*also, told, left, *around.quoted])
+    return of_clauses(around.first(verdict), missing, [*also, hint_text, misfit, *around.quoted])
 
 
-def _same_place(document: Mapping[str, Any]) -> float:
+def _share_of_quantity(document: Mapping[str, Any]) -> float:
     """The share of laws of any form that act on the same and follow the same."""
     same = (document["acts_on"], document["axis"])
-    rivals = (one["probability"] for one in document["rivals"] if (one["acts_on"], one["axis"]) == same)
+    rivals = (rival["probability"] for rival in document["rivals"] if (rival["acts_on"], rival["axis"]) == same)
     return float(document["probability"] + sum(rivals))
 
 
@@ -563,13 +563,13 @@ def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
     """That a power law is one that is known with another exponent."""
     if law.description.form != "power":
         return []
-    stated = {entry["name"]: entry for entry in document["parameters"]}
+    parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
     if isinstance(law, RecordingLaw) and law.description.acts_on == "contact_radius" and law.axis.name in _HERTZ:
-        value, low, high = (1 / 3 + stated["change"][name] for name in ("value", "low", "high"))
+        value, low, high = (1 / 3 + parameters["change"][name] for name in ("value", "low", "high"))
         power = f"{value:.2f} ({low:.2f} to {high:.2f}) in place of 1/3"
         grows = f"the contact radius grows with {followed(law.axis.name)} to the power {power}"
         return [f"this is Hertz's law with another exponent: {grows}"]
-    exponent = stated.get("exponent")
+    exponent = parameters.get("exponent")
     if isinstance(law, FrequencyLaw) and law.variant == "phase" and exponent and exponent["value"] > _DELAY:
         power = f"{exponent['value']:.2f} ({exponent['low']:.2f} to {exponent['high']:.2f}) in place of 1"
         return [f"this is a delay with another exponent: its phase grows with frequency to the power {power}"]
@@ -580,8 +580,8 @@ def _order(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
     """That lines fall off towards low frequencies as behind a high pass, of what order."""
     if not (isinstance(law, FrequencyLaw) and law.variant == "high_pass"):
         return []
-    stated = {entry["name"]: entry for entry in document["parameters"]}
-    value, low, high = (stated["exponent"][name] for name in ("value", "low", "high"))
+    parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
+    value, low, high = (parameters["exponent"][name] for name in ("value", "low", "high"))
     if value < 0:
         return []
     return [f"this is a high pass of order {value:.2f} ({low:.2f} to {high:.2f}), where an amplifier's is of order 1"]
@@ -630,7 +630,7 @@ def _size(leading: LeadingLaw) -> str:
     """−8 % (−10 to −6) at 14:00."""
     at, size, deviation = leading.largest()
     law = leading.law
-    where = f" {place}" if (place := _where(leading, at)) else ""
+    where = f" {location}" if (location := _where(leading, at)) else ""
     half = SDS_OF_95 * deviation
     if law.description.acts_on in ("force", "position"):
         unit = "N" if law.description.acts_on == "force" else "mm"
@@ -666,11 +666,11 @@ def _where(leading: LeadingLaw, at: float) -> str:
     return f"at {in_digits(at, 3)}{'' if axis.unit == '-' else ' ' + axis.unit}"
 
 
-def _worth(held: Mapping[str, float | None], floor: float, what: str, beside: str) -> str:
+def _worth(held: Mapping[str, float | None], floor: float, what: str, others: str) -> str:
     noise = f" (noise {in_digits(floor, 2)} %)" if np.isfinite(floor) else ""
     if held["before"] is None or held["after"] is None:
         return f"too few {what} to hold any out"
     after, before = in_digits(held["after"], 2), in_digits(held["before"], 2)
     if held["after"] >= held["before"]:
         return f"it predicts {what} held out no better: to {after} % instead of {before} %{noise}"
-    return f"with it{beside}, {what} held out are predicted to {after} % instead of {before} %{noise}"
+    return f"with it{others}, {what} held out are predicted to {after} % instead of {before} %{noise}"

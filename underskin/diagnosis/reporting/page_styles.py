@@ -70,14 +70,14 @@ def in_readable_units(sentence: str) -> str:
 def without_powers(sentence: str) -> str:
     """A sentence with those forces and lengths in such a unit that are written as a power of ten, and the interval
     behind each."""
-    return _MEASURED.sub(lambda found: _readable(found) if "e-" in found[1] else found[0], sentence)
+    return _MEASURED.sub(lambda match: _readable(match) if "e-" in match[1] else match[0], sentence)
 
 
-def _readable(found: re.Match[str]) -> str:
-    unit, count = readable_unit(FIELD_OF[found[2]], abs(_value(found[1])))
+def _readable(match: re.Match[str]) -> str:
+    unit, count = readable_unit(FIELD_OF[match[2]], abs(_value(match[1])))
     if count == 1:
-        return found[0]
-    value, *ends = (_scaled(text, count) for text in found.group(1, 3, 4) if text is not None)
+        return match[0]
+    value, *ends = (_scaled(text, count) for text in match.group(1, 3, 4) if text is not None)
     return f"{value} {unit}" + (f" ({ends[0]} to {ends[1]})" if ends else "")
 
 

@@ -22,7 +22,7 @@ from underskin.diagnosis.reporting.law_statement import (
     StatementContext,
     answer_statement,
     insufficient_statement,
-    left_by,
+    misfit_clause,
     not_tried,
     reserves,
     slips,
@@ -31,13 +31,13 @@ from underskin.diagnosis.reporting.law_statement import statement as law_stateme
 from underskin.diagnosis.reporting.numbers import (
     at_bounds,
     idealised,
-    parameter,
+    outlying_sensors,
+    parameter_with_interval,
     rounded,
-    sensors_apart,
     without_effect,
 )
 from underskin.diagnosis.reporting.statements import BY_NUISANCES, StatedD33, stated_d33
-from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, outweighed, unnamed
+from underskin.diagnosis.reporting.unlisted_law import LeadingLaw, confirming, law_document, outweighed
 from underskin.diagnosis.selection.answers import Answer, Search
 from underskin.diagnosis.selection.priors import least_evidence
 from underskin.diagnosis.selection.search import KindsTogether
@@ -122,11 +122,13 @@ def _may_be_the_other(search: Search, explanation: Explanation) -> bool:
     lines = explanation.best.hypothesis.lines
     if lines.kind != "indentation" or lines.campaign.skin.thickness_mm is not None:
         return False
-    evidence = {frozenset(entry.names): entry.log_evidence for entry in search.explanations}
+    evidence = {frozenset(candidate.names): candidate.log_evidence for candidate in search.explanations}
     least = explanation.log_evidence - least_evidence(explanation)
     names = frozenset(explanation.names)
-    own = names & _STIFFER_WITH_DEPTH
-    others = [names - own | {other} for other in _STIFFER_WITH_DEPTH - own] if len(own) == 1 else []
+    stiffening = names & _STIFFER_WITH_DEPTH
+    others = (
+        [names - stiffening | {other} for other in _STIFFER_WITH_DEPTH - stiffening] if len(stiffening) == 1 else []
+    )
     return any(evidence.get(other, -math.inf) > least for other in others)
 
 
@@ -187,10 +189,10 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     stated_set = named if leading is None else leading.explanation
     mechanisms = [] if stated_set is None else _mechanisms(search, problem, stated_set)
     if named is not None:
-        mechanisms += _of_curves_alone(diagnosis, leader)
-    told_by_kind = [] if diagnosis.joined is None else goodness_of_fit.by_kind(diagnosis.joined, shown.names)
+        mechanisms += _mechanisms_of_curves(diagnosis, leader)
+    by_kind = [] if diagnosis.joined is None else goodness_of_fit.by_kind(diagnosis.joined, shown.names)
     contradictory = [] if diagnosis.joined is None else goodness_of_fit.contradictions(diagnosis.joined)
-    law = None if leading is None else unnamed(search, problem, leading, diagnosis.groups)
+    law = None if leading is None else law_document(search, problem, leading, diagnosis.groups)
     stands = (stated in ("explained", "no_mismatch") or leading is not None) and leader.probability >= EXPLAINED
     d33 = stated_d33(
         search,
@@ -199,7 +201,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         diagnosis.shifts,
         stands=stands,
         contradictory=bool(contradictory),
-        at_bounds=[one.words for one in at_bounds(shown)],
+        at_bounds=[bound.words for bound in at_bounds(shown)],
         law=leading,
         unsure=diagnosis.level_unsure,
         skin_pc_per_n=diagnosis.skin_d33_pc_per_n,
@@ -208,14 +210,16 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = numbers.presence(search, numbers.present(search, problem))
     # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
-    unseen = {entry.mechanism for entry in diagnosis.confounded if entry.confounded_with in BY_NUISANCES}
-    unseen |= {entry.mechanism for entry in d33.hidden}
-    plain = [entry for entry in diagnosis.power if entry.mechanism not in unseen]
-    of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, told_by_kind)
+    unseen = {
+        confounding.mechanism for confounding in diagnosis.confounded if confounding.confounded_with in BY_NUISANCES
+    }
+    unseen |= {shift.mechanism for shift in d33.hidden}
+    plain = [limit for limit in diagnosis.power if limit.mechanism not in unseen]
+    of_kinds = "" if diagnosis.joined is None else goodness_of_fit.moduli_clause(diagnosis.joined, by_kind)
     untried = _not_tried(stated, search, problem, findings)
     around = StatementContext(
-        slips=[*slips(findings), *([apart] if (apart := sensors_apart(problem, shown)) else [])],
-        contradictions=[entry["statement"] for entry in contradictory],
+        slips=[*slips(findings), *([outliers] if (outliers := outlying_sensors(problem, shown)) else [])],
+        contradictions=[contradiction["statement"] for contradiction in contradictory],
         reserves=[*reserves(findings), *untried],
         quoted=[
             of_kinds,
@@ -226,22 +230,22 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     )
     if leading is not None and law is not None:
         floor = float(fit["noise_floor_percent"] or float("nan"))
-        beside = [entry["name"] for entry in mechanisms]
-        left = left_by(fit, SIMPLEST[problem.kind], beside) if problem.lines.curves else ""
+        mechanism_names = [mechanism["name"] for mechanism in mechanisms]
+        misfit = misfit_clause(fit, SIMPLEST[problem.kind], mechanism_names) if problem.lines.curves else ""
         ahead = outweighed(search)
-        statement = law_statement(leader.probability, leading, law, floor, around, left, outweighed=ahead)
+        statement = law_statement(leader.probability, leading, law, floor, around, misfit, outweighed=ahead)
     else:
         of_answer = AnswerFacts(
             groups=present,
             idle=_idle(diagnosis, named) if named is not None else (),
-            at_bounds=[one.words for one in at_bounds(named)] if named is not None else (),
+            at_bounds=[bound.words for bound in at_bounds(named)] if named is not None else (),
             mechanisms=mechanisms,
-            told=_told(problem, mechanisms) if named is not None else (),
+            meanings=_meanings(problem, mechanisms) if named is not None else (),
         )
         # What remains tells no form where a mechanism that may explain it was not tried
         shape = "" if untried else statements.shape_clause(diagnosis.shape)
         statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
-    whole = {
+    completed = {
         **document,
         "probability": round(leader.probability, 3),
         "statement": statement,
@@ -255,11 +259,11 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         "findings": findings,
         "fit": fit,
         "power": [
-            {"mechanism": entry.mechanism, "smallest_visible_percent": rounded(entry.smallest_visible_percent, 2)}
-            for entry in diagnosis.power
+            {"mechanism": limit.mechanism, "smallest_visible_percent": rounded(limit.smallest_visible_percent, 2)}
+            for limit in diagnosis.power
         ],
         "d33": d33.document,
-        **({"by_kind": told_by_kind, "contradictions": contradictory} if told_by_kind else {}),
+        **({"by_kind": by_kind, "contradictions": contradictory} if by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
         # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
         "provenance": {
@@ -269,7 +273,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             "sets_of_mechanisms": {"tried": search.tried, "fitted": len(search.explanations)},
         },
     }
-    return Reported(whole, d33)
+    return Reported(completed, d33)
 
 
 def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
@@ -277,15 +281,15 @@ def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
     model, lines = explanation.model, problem.lines
     if lines.kind != "indentation" or not isinstance(model, CurveModel):
         return ""
-    curves = [one for one in lines.campaign.recordings if isinstance(one, IndentationRecording)]
+    curves = [curve for curve in lines.campaign.recordings if isinstance(curve, IndentationRecording)]
     contacts = explanation.point.fit[model.contact_points].tolist()
-    depths = [float(one.displacement_mm.max()) - at for one, at in zip(curves, contacts, strict=True)]
-    over = max(depth / one.indenter_radius_mm for depth, one in zip(depths, curves, strict=True))
-    said = f"pressed to {in_digits(over, 2)} of the radius"
+    depths = [float(curve.displacement_mm.max()) - at for curve, at in zip(curves, contacts, strict=True)]
+    over = max(depth / curve.indenter_radius_mm for depth, curve in zip(depths, curves, strict=True))
+    clause = f"pressed to {in_digits(over, 2)} of the radius"
     if over > PARABOLOID:
-        said += " (by the law of the whole sphere)"
+        clause += " (by the law of the whole sphere)"
     thickness = lines.campaign.skin.thickness_mm
-    return said if thickness is None else f"{said}, {in_digits(max(depths) / thickness, 2)} of the thickness"
+    return clause if thickness is None else f"{clause}, {in_digits(max(depths) / thickness, 2)} of the thickness"
 
 
 def _not_tried(
@@ -293,39 +297,46 @@ def _not_tried(
 ) -> list[str]:
     """What was not tried, where something remains that it could explain."""
     remains = stated in ("unexplained", "ambiguous") or any(
-        entry["code"] == FindingCode.REMAINDER for entry in findings
+        finding["code"] == FindingCode.REMAINDER for finding in findings
     )
     return not_tried(search.unsupported, problem.kind) if remains else []
 
 
 def _mechanisms(search: Search, problem: FittingProblem, explanation: Explanation) -> list[dict[str, Any]]:
-    places = own_places(explanation.names, explanation.best.hypothesis.lines)
-    whole = cross_validation.in_sample(problem, explanation)
+    spans = own_places(explanation.names, explanation.best.hypothesis.lines)
+    score = cross_validation.in_sample(problem, explanation)
     probabilities = numbers.present(search, problem)
     return [
         {
             "name": name,
             "probability": round(probabilities.get(name, 0.0), 3),
-            "parameters": [parameter(explanation, place) for place in range(places[name].start, places[name].stop)],
-            "explains_percent": explains_percent(search, problem, explanation, name, whole),
+            "parameters": [
+                parameter_with_interval(explanation, index) for index in range(spans[name].start, spans[name].stop)
+            ],
+            "explains_percent": explains_percent(search, problem, explanation, name, score),
         }
         for name in explanation.names
         if name in problem.lines.mechanisms.named
     ]
 
 
-def _of_curves_alone(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
+def _mechanisms_of_curves(diagnosis: DiagnosisResult, leader: Answer) -> list[dict[str, Any]]:
     if diagnosis.joined is None or leader.explanation is None or diagnosis.search is None or diagnosis.problem is None:
         return []
     present = numbers.present(diagnosis.search, diagnosis.problem)
-    own = goodness_of_fit.of_curves_alone(diagnosis.joined, leader.alone, leader.explanation.names)
-    return [{**entry, "probability": round(present.get(entry["name"], 0.0), 3)} for entry in own]
+    mechanisms = goodness_of_fit.mechanisms_of_curves(diagnosis.joined, leader.alone, leader.explanation.names)
+    return [{**mechanism, "probability": round(present.get(mechanism["name"], 0.0), 3)} for mechanism in mechanisms]
 
 
-def _told(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
+def _meanings(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the parameters of each mean together, where they do not speak for themselves."""
-    values = {one["name"]: {entry["name"]: entry["value"] for entry in one["parameters"]} for one in mechanisms}
-    return [said for name, own in values.items() if (said := problem.lines.mechanisms[name].told(own))]
+    values = {
+        mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
+        for mechanism in mechanisms
+    }
+    return [
+        meaning for name, parameters in values.items() if (meaning := problem.lines.mechanisms[name].told(parameters))
+    ]
 
 
 def _alternatives(search: Search) -> list[dict[str, Any]]:
@@ -336,27 +347,27 @@ def _alternatives(search: Search) -> list[dict[str, Any]]:
         enough = answer.probability < _LEAST_PROBABILITY and len(alternatives) > 1
         if enough or len(alternatives) >= _ALTERNATIVES:
             break
-        said = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
-        alternatives.append({**said, "why_not": statements.why_not(answer, leader, search.imitating)})
+        document = {"mechanisms": list(answer.names), "probability": round(answer.probability, 3)}
+        alternatives.append({**document, "why_not": statements.why_not(answer, leader, search.imitating)})
     return alternatives
 
 
 def _location(diagnosis: DiagnosisResult, problem: FittingProblem, agrees: bool) -> dict[str, Any]:
     assert diagnosis.effect is not None
     effect, region = diagnosis.effect, diagnosis.region
-    whole = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}
+    reaches_all = {name: reaches_all_along(problem.lines, name, ends) for name, ends in region.items()}
     return {
         "axes": [
             {
-                "axis": entry.axis,
-                "p_value": None if entry.p_value is None else round(entry.p_value, 3),
-                "share_percent": round(100 * float(entry.share), 1),
-                **({"undecidable": why} if (why := statements.undecidable(entry)) else {}),
+                "axis": result.axis,
+                "p_value": None if result.p_value is None else round(result.p_value, 3),
+                "share_percent": round(100 * float(result.share), 1),
+                **({"undecidable": why} if (why := statements.undecidable(result)) else {}),
             }
-            for entry in diagnosis.axes
+            for result in diagnosis.axes
         ],
         "region": {name: [rounded(x) if isinstance(x, float) else x for x in ends] for name, ends in region.items()},
         "effect_percent": rounded(effect.percent, 3),
         "effect_interval_percent": [rounded(effect.low, 3), rounded(effect.high, 3)],
-        "statement": statements.location_statement(diagnosis.axes, region, whole, effect, agrees=agrees),
+        "statement": statements.location_statement(diagnosis.axes, region, reaches_all, effect, agrees=agrees),
     }

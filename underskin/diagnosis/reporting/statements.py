@@ -34,7 +34,7 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.prediction import plausibility
 
-_UNTHOUGHT_AT_MOST = 0.016  # of none_of_these, where no process shows
+_MOST_UNLISTED = 0.016  # of none_of_these, where no process shows
 _IN_PERCENT = 90.0  # beyond it an effect is said as a factor
 
 
@@ -50,10 +50,10 @@ def shape_clause(shape: Shape | None) -> str:
 
 
 def _form(form: ShapeForm, shape: Shape) -> str:
-    called, unit = ALONG_CURVES[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
+    axis_words, unit = ALONG_CURVES[form.axis] if shape.of_curves else (_form_axis(form), WORDS[form.axis][1])
     words = _FORMS[form.kind].format(at=form.at, unit=f" {unit}" if unit else "")
     of = " of the largest force" if shape.of_curves else ""
-    return f"{words}, up to {in_digits(form.size, 2)} %{of} over {called}"
+    return f"{words}, up to {in_digits(form.size, 2)} %{of} over {axis_words}"
 
 
 _FORMS: Mapping[FormKind, str] = {
@@ -75,7 +75,7 @@ def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...
     """Why an answer is less probable than the leading one; `imitating`: sets that look like an unlisted law."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
-    if answer.explanation is None and answer.probability < _UNTHOUGHT_AT_MOST:
+    if answer.explanation is None and answer.probability < _MOST_UNLISTED:
         return "nothing in the recordings asks for it; a small share always stays for what nobody thought of"
     if answer.explanation is None and () in imitating:
         return "few laws without a name would not show in these recordings"
@@ -107,12 +107,12 @@ _UNDECIDABLE: Mapping[Undecidable, str] = {
 _DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # as in `WORDS` else
 
 
-def undecidable(entry: AxisResult) -> str:
+def undecidable(result: AxisResult) -> str:
     """Why it cannot be decided whether the residual depends on an axis; empty where it can."""
-    if not entry.determined_by:
-        return "" if entry.reason is None else _UNDECIDABLE[entry.reason]
-    named = listed([_DETERMINING.get(name, WORDS[name][0]) for name in entry.determined_by])
-    determine = "determines" if len(entry.determined_by) == 1 else "together determine"
+    if not result.determined_by:
+        return "" if result.reason is None else _UNDECIDABLE[result.reason]
+    named = listed([_DETERMINING.get(name, WORDS[name][0]) for name in result.determined_by])
+    determine = "determines" if len(result.determined_by) == 1 else "together determine"
     return f"{named} {determine} it in this design"
 
 
@@ -128,23 +128,23 @@ CONFOUNDED: Mapping[Likeness, str] = {
 def location_statement(
     axes: Sequence[AxisResult],
     region: Mapping[str, Sequence[float | str]],
-    whole: Mapping[str, bool],
+    reaches_all: Mapping[str, bool],
     effect: EffectSize,
     *,
     agrees: bool = False,
 ) -> str:
     """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
     that recordings and model agree within the noise."""
-    unknown = [WORDS[entry.axis][0] for entry in axes if entry.p_value is None]
+    unknown = [WORDS[result.axis][0] for result in axes if result.p_value is None]
     tail = f"; whether it depends on {listed(unknown)}, this design cannot tell" if unknown else ""
     if len(unknown) == len(axes) and unknown:
         return f"Whether the misfit depends on {listed(unknown)}, this design cannot tell."
-    beyond_chance = [entry for entry in axes if entry.significant]
+    beyond_chance = [result for result in axes if result.significant]
     if not beyond_chance:
         return f"The misfit changes with nothing that was varied, beyond chance{tail}."
-    telling = [entry for entry in beyond_chance if entry.telling]
-    named = sorted(telling or beyond_chance, key=lambda entry: entry.p_value or 0.0)
-    names = listed([WORDS[entry.axis][0] for entry in named])
+    telling = [result for result in beyond_chance if result.telling]
+    named = sorted(telling or beyond_chance, key=lambda result: result.p_value or 0.0)
+    names = listed([WORDS[result.axis][0] for result in named])
     if not telling and not agrees:
         return (
             f"The misfit changes with {names} beyond chance, but no more than a trace of it goes along with that{tail}."
@@ -153,15 +153,15 @@ def location_statement(
         return (
             f"What is left is within the noise, though more of it goes along with {names} than chance would give{tail}."
         )
-    return f"The misfit depends on {names}; {_where(region, whole)}, where {_size(effect)}{tail}."
+    return f"The misfit depends on {names}; {_where(region, reaches_all)}, where {_size(effect)}{tail}."
 
 
-def _where(region: Mapping[str, Sequence[float | str]], whole: Mapping[str, bool]) -> str:
+def _where(region: Mapping[str, Sequence[float | str]], reaches_all: Mapping[str, bool]) -> str:
     """Along which ranges most of it lies, and at which sensor or on which day it is largest."""
     ranges: list[str] = []
     levels: list[str] = []
     for name, ends in region.items():
-        if not whole[name]:
+        if not reaches_all[name]:
             (levels if isinstance(ends[0], str) else ranges).append(_range(name, ends))
     parts = [f"most of it lies at {listed(ranges)}"] if ranges else []
     parts += [f"it is largest at {listed(levels)}"] if levels else []
@@ -233,12 +233,12 @@ def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
 
 def _recordings(plan: NextRecordings) -> list[dict[str, Any]]:
     documents = []
-    for entry in dict.fromkeys(plan.recordings):
+    for recording in dict.fromkeys(plan.recordings):
         names = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n")
-        described = {name: getattr(entry, name) for name in names}
-        described |= {"position_mm": list(entry.position_mm or ()), "dwell_s": entry.dwell_s}
-        known = {name: value for name, value in described.items() if value is not None}
-        documents.append({**known, "repeats": plan.recordings.count(entry)})
+        described = {name: getattr(recording, name) for name in names}
+        described |= {"position_mm": list(recording.position_mm or ()), "dwell_s": recording.dwell_s}
+        given = {name: value for name, value in described.items() if value is not None}
+        documents.append({**given, "repeats": plan.recordings.count(recording)})
     return documents
 
 
@@ -246,10 +246,10 @@ def _statement(plan: NextRecordings) -> str:
     first = plan.first
     assert first is not None
     beyond = " It goes beyond what this campaign did: check that the rig can." if plan.beyond else ""
-    one = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
-    several = f"{len(plan.recordings)} recordings, of which that {one} tells most,"
+    contact = f"with the sphere of {first.indenter_radius_mm:g} mm radius at {first.preload_n:g} N"
+    several = f"{len(plan.recordings)} recordings, of which that {contact} tells most,"
     return (
-        f"{several if len(plan.recordings) > 1 else f'One recording {one}'} should tell whether "
+        f"{several if len(plan.recordings) > 1 else f'One recording {contact}'} should tell whether "
         f"it is {_rivals(plan)}, with a probability of {in_percent(plan.probability)}.{beyond}{_block(plan)}"
     )
 
@@ -260,8 +260,8 @@ def _block(plan: NextRecordings) -> str:
         return ""
     stiffens = any(_STIFFENING in names for names in plan.rivals)
     also = "; compressed by a fifth of its height, a block shows strain stiffening too" if stiffens else ""
-    told = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
-    return f" A compressed block or an indentation of the same elastomer would tell E, and so {told}."
+    clause = f"whether it is {in_words([WRONG_MODULUS])}, with a probability of {in_percent(plan.block)}{also}"
+    return f" A compressed block or an indentation of the same elastomer would tell E, and so {clause}."
 
 
 def _why_none(plan: NextRecordings) -> str:
@@ -305,9 +305,9 @@ class StatedD33:
     def deciding(self) -> list[HiddenShift]:
         """What keeps d33 from being quoted: hidden wrong declared numbers, and what would change it as much, the
         largest first; none where no declared number does."""
-        least = min((abs(entry.log_factor) for entry in self.hidden if entry.declared), default=np.inf)
-        chosen = [entry for entry in self.hidden if abs(entry.log_factor) >= least]
-        return sorted(chosen, key=lambda entry: -abs(entry.log_factor))
+        least = min((abs(shift.log_factor) for shift in self.hidden if shift.declared), default=np.inf)
+        chosen = [shift for shift in self.hidden if abs(shift.log_factor) >= least]
+        return sorted(chosen, key=lambda shift: -abs(shift.log_factor))
 
     def clause(self) -> str:
         """The value to quote, or why none is; empty where there is no d33."""
@@ -321,18 +321,19 @@ class StatedD33:
         """The value with its interval, and which physics that would not show would change it most beyond that."""
         assert self.document is not None
         value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
-        largest = sorted(self.hidden, key=lambda entry: -abs(entry.log_factor))[:_MOST_NAMED]
-        named = " or ".join(f"{in_words([one.mechanism])} ({_percent(one)})" for one in largest)
+        largest = sorted(self.hidden, key=lambda shift: -abs(shift.log_factor))[:_MOST_NAMED]
+        named = " or ".join(f"{in_words([shift.mechanism])} ({_percent(shift)})" for shift in largest)
         hides = f", provided that no {named} hides" if named else ""
-        return f"{value} {self.document['unit']} (95 %: {low} to {high}{self._apart()}){self._beside_declared()}{hides}"
+        interval = f"95 %: {low} to {high}{self._relative_interval()}"
+        return f"{value} {self.document['unit']} ({interval}){self._over_declared()}{hides}"
 
-    def _apart(self) -> str:
+    def _relative_interval(self) -> str:
         """The interval without what the declared values may be off by."""
         assert self.document is not None
         low, high = (f"{self.document['relative'][key]:.3g}" for key in ("low", "high"))
         return f" with what declared values may be off, {low} to {high} to compare sensors or dates"
 
-    def _beside_declared(self) -> str:
+    def _over_declared(self) -> str:
         """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
         charge taken for an amplitude halves or doubles every FRF, which nothing else in the recordings tells."""
         assert self.document is not None
@@ -345,8 +346,8 @@ class StatedD33:
         """Where it lies, and why it is not to be quoted."""
         assert self.document is not None
         low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
-        lies = f"it lies from {low} to {high} {self.document['unit']}{self._beside_declared()}"
-        deciding = [f"{in_words([one.mechanism])} by {_percent(one)}" for one in self.deciding[:_MOST_NAMED]]
+        lies = f"it lies from {low} to {high} {self.document['unit']}{self._over_declared()}"
+        deciding = [f"{in_words([shift.mechanism])} by {_percent(shift)}" for shift in self.deciding[:_MOST_NAMED]]
         if deciding:
             return f"{lies}, but what would not show here would change it, {listed(deciding)}"
         over = " over the answers that remain" if _ANSWERS in self.why_not else ""
@@ -358,21 +359,23 @@ class StatedD33:
         """Why it is not to be quoted; none where it is."""
         if self.document is None:
             return list(self.why_not) or ["no answer explains its recordings"]
-        hidden = in_words([one.mechanism for one in self.deciding[:_MOST_NAMED]])
+        hidden = in_words([shift.mechanism for shift in self.deciding[:_MOST_NAMED]])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
         """The report's entries, with what each would do to d33 beyond its interval."""
-        hidden = {entry.mechanism: entry for entry in self.hidden}
-        known = {entry.mechanism for entry in confounded if entry.confounded_with in BY_NUISANCES}
-        further = [Confounding(one.mechanism, "d33", Likeness.TAKEN_UP) for one in self.hidden]
+        hidden = {shift.mechanism: shift for shift in self.hidden}
+        mechanisms = {
+            confounding.mechanism for confounding in confounded if confounding.confounded_with in BY_NUISANCES
+        }
+        further = [Confounding(shift.mechanism, "d33", Likeness.TAKEN_UP) for shift in self.hidden]
         return [
             {
-                "mechanism": entry.mechanism,
-                "confounded_with": entry.confounded_with,
-                "reason": _reason(entry, hidden.get(entry.mechanism)),
+                "mechanism": confounding.mechanism,
+                "confounded_with": confounding.confounded_with,
+                "reason": _reason(confounding, hidden.get(confounding.mechanism)),
             }
-            for entry in (*confounded, *(one for one in further if one.mechanism not in known))
+            for confounding in (*confounded, *(other for other in further if other.mechanism not in mechanisms))
         ]
 
 
@@ -401,7 +404,7 @@ def stated_d33(
     if d33 is None:
         return StatedD33(None)
     half_width = float(np.log(d33["high"] / d33["low"])) / 2
-    hidden = [entry for entry in shifts if abs(entry.log_factor) > half_width]
+    hidden = [shift for shift in shifts if abs(shift.log_factor) > half_width]
     implausible = plausibility.implausibility(d33["value"])
     floor, error = fit["noise_floor_percent"], fit["after"]["rmse_percent"]
     against = {
@@ -430,9 +433,9 @@ def _acts_outside_band(law: LeadingLaw) -> bool:
     return law.law.description.axis == "frequency_hz" and (law.is_phase or law.law.description.form == "peak")
 
 
-def _reason(entry: Confounding, hidden: HiddenShift | None) -> str:
-    reason = CONFOUNDED[entry.why].format(mechanism=entry.mechanism, other=entry.confounded_with)
-    if hidden is None or entry.confounded_with not in BY_NUISANCES:
+def _reason(confounding: Confounding, hidden: HiddenShift | None) -> str:
+    reason = CONFOUNDED[confounding.why].format(mechanism=confounding.mechanism, other=confounding.confounded_with)
+    if hidden is None or confounding.confounded_with not in BY_NUISANCES:
         return reason
     return f"{reason}; d33 would then be {_percent(hidden)} too {'large' if hidden.log_factor > 0 else 'small'}"
 

@@ -20,7 +20,7 @@ from underskin.autodiff import Differentiated
 from underskin.diagnosis.inference.explanation import Explanation, FittingProblem
 from underskin.diagnosis.inference.hypothesis import own_places
 from underskin.diagnosis.planning.rig_limits import RigLimits
-from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter, rounded
+from underskin.diagnosis.reporting.numbers import SDS_OF_95, parameter_with_interval, rounded
 from underskin.diagnosis.selection.answers import Search
 from underskin.diagnosis.selection.unlisted_search import law_of
 from underskin.diagnosis.validation import cross_validation
@@ -35,7 +35,7 @@ from underskin.recordings.campaign import FrfConditions, frf_of
 from underskin.units import Floats
 
 _RIVALS, _LEAST_RIVAL = 5, 0.01
-_PLACES = 41  # along the axis, at which a course is looked at
+_AXIS_POINTS = 41  # along the axis, at which a course is looked at
 _STATED = 21  # of these, at which a smooth one is stated
 _LEVEL = 0.1  # of a phase, that it may change along the band and still be called constant
 _STEP = 1e-4  # of fit coordinates, for a course's band
@@ -58,8 +58,8 @@ class LeadingLaw:
         if law is None:
             return None
         values = {
-            entry.name: entry.from_fit(at)
-            for entry, at in zip(law.parameters_bound, explanation.own(law.name), strict=True)
+            parameter.name: parameter.from_fit(at)
+            for parameter, at in zip(law.parameters_bound, explanation.own(law.name), strict=True)
         }
         return cls(law, values, explanation)
 
@@ -94,10 +94,10 @@ class LeadingLaw:
         Of a place it is the distance, over frequency the magnitude less 1, or where that hardly changes the phase.
         """
         low, high = self.ends
-        x = np.geomspace(low, high, 8 * _PLACES) if self.axis is None else _places(self.axis, _PLACES)
+        x = np.geomspace(low, high, 8 * _AXIS_POINTS) if self.axis is None else _axis_values(self.axis, _AXIS_POINTS)
         sizes = self.change(x, self.values)
-        place = int(np.argmax(np.abs(sizes)))
-        return float(x[place]), float(sizes[place]), float(np.sqrt(self.variance(x[[place]])[0]))
+        index = int(np.argmax(np.abs(sizes)))
+        return float(x[index]), float(sizes[index]), float(np.sqrt(self.variance(x[[index]])[0]))
 
     def change(self, x: Floats, values: Mapping[str, float] | None = None) -> Floats:
         """At values x of the axis, with these parameters or as fitted; see `largest`."""
@@ -126,25 +126,28 @@ class LeadingLaw:
 
     def variance(self, x: Floats) -> Floats:
         """Of the change, from the quadratic of the law's own parameters."""
-        places = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
+        span = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
         mean = self.explanation.best.hypothesis.mean_places
-        rows = [mean.index(place) for place in range(places.start, places.stop)]
+        rows = [mean.index(index) for index in range(span.start, span.stop)]
         covariance = self.explanation.best.covariance[np.ix_(rows, rows)]
         here = self.change(x, self.values)
         slopes = []
-        for entry in self.law.parameters_bound:
-            moved = {**self.values, entry.name: entry.from_fit(entry.to_fit(self.values[entry.name]) + _STEP)}
+        for parameter in self.law.parameters_bound:
+            moved = {
+                **self.values,
+                parameter.name: parameter.from_fit(parameter.to_fit(self.values[parameter.name]) + _STEP),
+            }
             slopes.append((self.change(x, moved) - here) / _STEP)
         jacobian = np.array(slopes)
         return np.maximum(np.einsum("px,pq,qx->x", jacobian, covariance, jacobian), 0.0)
 
 
-def unnamed(
+def law_document(
     search: Search, problem: FittingProblem, leading: LeadingLaw, groups: Sequence[cross_validation.HeldOut]
 ) -> dict[str, Any]:
     """The document."""
     shares = _shares(search, problem)
-    own = _combination(problem, leading.explanation)
+    combination = _combination(problem, leading.explanation)
     before, after = cross_validation.total(groups)
     low, high = leading.ends
     return {
@@ -153,19 +156,19 @@ def unnamed(
         "form": leading.form,
         "expression": expression(leading.law, leading.values),
         "parameters": _parameters(leading),
-        "probability": round(shares[own], 3),
+        "probability": round(shares[combination], 3),
         "rivals": [
             {"acts_on": acts_on, "axis": axis, "form": form, "probability": round(share, 3)}
             for (acts_on, axis, form), share in list(shares.items())[: _RIVALS + 1]
-            if (acts_on, axis, form) != own and share >= _LEAST_RIVAL
+            if (acts_on, axis, form) != combination and share >= _LEAST_RIVAL
         ],
         "heldout_rmse_percent": {"before": rounded(before.rmse_percent), "after": rounded(after.rmse_percent)},
         "range": {_range_name(leading): _range(leading, low, high)},
-        **({"course": _course(leading)} if leading.form == "free" else {}),
+        **({"course": _change_along_axis(leading)} if leading.form == "free" else {}),
     }
 
 
-def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
+def _change_along_axis(leading: LeadingLaw) -> list[dict[str, Any]]:
     """Of a smooth course, or of words, the change at places along the measured axis with its 95 % interval: relative,
     of a force in N, of a place the distance in mm, over frequency the magnitude less 1."""
     low, high = leading.ends
@@ -173,7 +176,7 @@ def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
     if leading.axis is None:
         x = np.geomspace(low, high, _STATED)
     else:
-        words, x = leading.axis.words, _places(leading.axis, _STATED)
+        words, x = leading.axis.words, _axis_values(leading.axis, _STATED)
     change, half = leading.change(x), SDS_OF_95 * np.sqrt(leading.variance(x))
     ends = zip(x.tolist(), change.tolist(), (change - half).tolist(), (change + half).tolist(), strict=True)
     return [
@@ -187,7 +190,7 @@ def _course(leading: LeadingLaw) -> list[dict[str, Any]]:
     ]
 
 
-def _places(axis: Axis, most: int) -> Floats:
+def _axis_values(axis: Axis, most: int) -> Floats:
     """At which a course is looked at: all levels of words, which have nothing between them, or of a few."""
     few = axis.words or len(axis.levels) <= most
     return axis.levels if few else np.linspace(axis.low, axis.high, most)
@@ -215,10 +218,10 @@ def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str
 def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
     """Of each combination in all of them, the largest first."""
     weights: dict[tuple[str, str, str], float] = {}
-    for entry in search.laws:
-        if search.is_supported(entry):
-            key = _combination(problem, entry)
-            weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(entry)))
+    for explanation in search.laws:
+        if search.is_supported(explanation):
+            key = _combination(problem, explanation)
+            weights[key] = float(np.logaddexp(weights.get(key, -np.inf), search.log_weight(explanation)))
     total = np.logaddexp.reduce(list(weights.values()))
     ranked = sorted(weights.items(), key=lambda item: -item[1])
     return {key: float(np.exp(weight - total)) for key, weight in ranked}
@@ -228,13 +231,13 @@ def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
     """Those of the fit, with the names that readers know; of a sine its amplitude, start and period."""
     law, explanation = leading.law, leading.explanation
     first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
-    stated = [parameter(explanation, first + place) for place in range(len(law.parameters_bound))]
+    stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_bound))]
     if isinstance(law, RecordingLaw | LagLaw | CurveLaw):
         if law.shape.form == "periodic" and len(law.amplitudes) == law.shape.count:
             stated = [*_wave(leading, law), *stated[2:]]
         if law.shape.form == "step" and not (law.axis.words or isinstance(law, CurveLaw)):
             stated.append(_edge(law))
-    return [{**entry, "name": entry["name"].removeprefix("law_")} for entry in stated]
+    return [{**parameter, "name": parameter["name"].removeprefix("law_")} for parameter in stated]
 
 
 def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[dict[str, Any]]:
@@ -242,11 +245,18 @@ def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[di
     size, start = wave(law, leading.values, amplitudes)
     quarter = np.array([start + leading.values["law_period"] / 4])
     half_width = SDS_OF_95 * float(np.sqrt(leading.variance(quarter)[0]))
-    ends = {"value": rounded(size), "low": rounded(max(size - half_width, 0.0)), "high": rounded(size + half_width)}
+    amplitude_interval = {
+        "value": rounded(size),
+        "low": rounded(max(size - half_width, 0.0)),
+        "high": rounded(size + half_width),
+    }
     turn = half_width / max(size, 1e-12) * leading.values["law_period"] / (2 * np.pi)
-    begins = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}
+    start_interval = {"value": rounded(start), "low": rounded(start - turn), "high": rounded(start + turn)}
     unit = law.parameters_bound[0].unit
-    return [{"name": "amplitude", "unit": unit, **ends}, {"name": "start", "unit": law.axis.unit, **begins}]
+    return [
+        {"name": "amplitude", "unit": unit, **amplitude_interval},
+        {"name": "start", "unit": law.axis.unit, **start_interval},
+    ]
 
 
 def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
@@ -259,7 +269,7 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
 
 def outweighed(search: Search) -> bool:
     """Whether a smooth course of no form is much more probable than all laws together."""
-    laws = [search.log_weight(entry) for entry in search.laws if search.is_supported(entry)]
+    laws = [search.log_weight(explanation) for explanation in search.laws if search.is_supported(explanation)]
     processes = [weight for _, weight in search.processes_showing]
     if not laws or not processes:
         return False
@@ -269,7 +279,7 @@ def outweighed(search: Search) -> bool:
 _MOST = 4  # recordings at each end
 _SURE = 0.99
 _FIELDS = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s", "load_cycles")
-_PAST = ("order", "recorded_at")  # what no recording can be given again
+_NOT_REPEATABLE = ("order", "recorded_at")  # what no recording can be given again
 _GIVEN_BY_SKIN = ("x_mm", "y_mm", "sensor")  # what the skin gives
 _HOW = {
     "time_of_day": " Take them on another day.",
@@ -304,35 +314,36 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
         return {}
     base = _commonest(problem)
     ends = _ends(leading, law, base)
-    past = law.axis.name in _PAST
-    like = [_nearest(problem, law.axis, at) if past else base for at in ends.both]
-    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, number) for number in like))
-    recordings = [_like(problem, number) for number in like]
-    if not past:
-        for entry, at in zip(recordings, ends.both, strict=True):
-            entry[law.axis.name] = float(f"{at:.4g}")
-    many = "one recording" if count == 1 else f"{count} recordings"
+    is_past = law.axis.name in _NOT_REPEATABLE
+    templates = [_nearest(problem, law.axis, at) if is_past else base for at in ends.both]
+    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, number) for number in templates))
+    recordings = [_conditions_of(problem, number) for number in templates]
+    if not is_past:
+        for recording, at in zip(recordings, ends.both, strict=True):
+            recording[law.axis.name] = float(f"{at:.4g}")
+    count_text = "one recording" if count == 1 else f"{count} recordings"
     differs = f"{100 * abs(np.expm1(ends.difference)):.2g} %"
-    told = f"with a probability of {in_percent(probability)}"
-    if past:
-        first, second = (problem.collapsed.campaign.recordings[number].id for number in like)
+    chance = f"with a probability of {in_percent(probability)}"
+    if is_past:
+        first, second = (problem.collapsed.campaign.recordings[number].id for number in templates)
         statement = (
-            f"Repeating {first} and {second} after one another, {many} of each in turns, should tell whether it is the "
-            f"time, {told}: if it is, the {differs} are gone by which they differ beyond what the known physics says."
+            f"Repeating {first} and {second} after one another, {count_text} of each in turns, should tell whether it "
+            f"is the time, {chance}: if it is, the {differs} are gone by which they differ beyond what the known "
+            f"physics says."
         )
     else:
         words = AXES[law.axis.name][0] if law.axis.name in AXES else law.axis.name
         low, high = (f"{at:.4g}{'' if law.axis.unit == '-' else f' {law.axis.unit}'}" for at in ends.both)
         statement = (
-            f"{many.capitalize()} with {words} at {low} and as many at {high}, in turns and all else equal, should "
-            f"tell whether the law holds, {told}: if it does, the charge differs by {differs} "
+            f"{count_text.capitalize()} with {words} at {low} and as many at {high}, in turns and all else equal, "
+            f"should tell whether the law holds, {chance}: if it does, the charge differs by {differs} "
             f"beyond what the known physics says."
             f"{_HOW.get(law.axis.name, '')}"
         )
-    beside = [name for name in leading.explanation.names if name != law.name]
+    other_names = [name for name in leading.explanation.names if name != law.name]
     return {
-        "recordings": [entry | {"repeats": count} for entry in recordings],
-        "separates": [beside, [*beside, "unnamed"]],
+        "recordings": [recording | {"repeats": count} for recording in recordings],
+        "separates": [other_names, [*other_names, "unnamed"]],
         "probability_of_deciding": round(probability, 3),
         "without_it": 0.5,
         "minutes": round(2 * count * RigLimits().minutes_per_recording, 1),
@@ -343,8 +354,8 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
 def _commonest(problem: FittingProblem) -> int:
     """The first recording of the contact that was recorded most often."""
     keys = [
-        (entry.sensor, entry.indenter_radius_mm, entry.preload_n, entry.dynamic_force_n)
-        for entry in frf_of(problem.collapsed.campaign)
+        (recording.sensor, recording.indenter_radius_mm, recording.preload_n, recording.dynamic_force_n)
+        for recording in frf_of(problem.collapsed.campaign)
     ]
     return keys.index(max(keys, key=keys.count))
 
@@ -370,25 +381,25 @@ def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
     """Of one recording's charge, relative: from its gain, its place and its lines."""
     best, collapsed = leading.explanation.best, problem.collapsed
     line = best.levels.level * collapsed.deviation[base] / max(float(np.abs(collapsed.value[base])), 1e-300)
-    place = best.levels.position * float(np.hypot(*best.relative_place_slopes[:, base]))
-    return float(np.sqrt(best.levels.gain**2 + place**2 + line**2))
+    position = best.levels.position * float(np.hypot(*best.relative_place_slopes[:, base]))
+    return float(np.sqrt(best.levels.gain**2 + position**2 + line**2))
 
 
 def _enough(size: float) -> tuple[int, float]:
     """How many recordings at each end make sure, or the most; and the probability that they tell."""
-    sure = [float(ndtr(0.5 * size * np.sqrt(count / 2))) for count in range(1, _MOST + 1)]
-    count = next((number for number, probability in enumerate(sure, 1) if probability >= _SURE), _MOST)
-    return count, sure[count - 1]
+    probabilities = [float(ndtr(0.5 * size * np.sqrt(count / 2))) for count in range(1, _MOST + 1)]
+    count = next((number for number, probability in enumerate(probabilities, 1) if probability >= _SURE), _MOST)
+    return count, probabilities[count - 1]
 
 
 def _nearest(problem: FittingProblem, axis: Axis, at: float) -> int:
     """The recording that lies nearest on the axis."""
-    values = axis.of([entry.id for entry in problem.collapsed.campaign.recordings])
+    values = axis.of([recording.id for recording in problem.collapsed.campaign.recordings])
     return int(np.argmin(np.abs(values - at)))
 
 
-def _like(problem: FittingProblem, number: int) -> dict[str, Any]:
+def _conditions_of(problem: FittingProblem, number: int) -> dict[str, Any]:
     """What a recording was made with, in lab units."""
-    entry: FrfConditions = frf_of(problem.collapsed.campaign)[number]
-    known = {name: getattr(entry, name) for name in _FIELDS}
-    return {name: value for name, value in known.items() if value is not None}
+    recording: FrfConditions = frf_of(problem.collapsed.campaign)[number]
+    fields = {name: getattr(recording, name) for name in _FIELDS}
+    return {name: value for name, value in fields.items() if value is not None}

@@ -91,8 +91,8 @@ def law_range(name: str, ends: Sequence[Any]) -> str:
     description = followed(field if field in FOLLOWED else field.removesuffix("_h"))
     if all(isinstance(end, str) for end in ends):
         return f"{description}: {', '.join(ends)}"
-    of_own = ", over its own range" if field != name else ""
-    return f"{description} {' to '.join(map(number, ends))} {unit}".rstrip() + of_own
+    relative_words = ", over its own range" if field != name else ""
+    return f"{description} {' to '.join(map(number, ends))} {unit}".rstrip() + relative_words
 
 
 def group(name: str) -> str:
@@ -116,24 +116,24 @@ def error(value: float | None) -> str:
     return "–" if value is None else f"{value:.3g} %"
 
 
-def interval(entry: Mapping[str, Any]) -> str:
+def interval(parameter: Mapping[str, Any]) -> str:
     """From low to high."""
-    return f"{number(entry['low'])} to {number(entry['high'])}"
+    return f"{number(parameter['low'])} to {number(parameter['high'])}"
 
 
-def in_its_unit(entry: Mapping[str, Any]) -> dict[str, Any]:
+def in_its_unit(parameter: Mapping[str, Any]) -> dict[str, Any]:
     """A parameter in the unit in which its value reads well, where that would be a power of ten."""
-    field, ends = FIELD_OF.get(entry["unit"]), {name: entry[name] for name in ("value", "low", "high")}
+    field, ends = FIELD_OF.get(parameter["unit"]), {name: parameter[name] for name in ("value", "low", "high")}
     if field is None or None in ends.values() or (largest := max(map(abs, ends.values()))) >= _POWERS:
-        return dict(entry)
+        return dict(parameter)
     unit, count = readable_unit(field, largest)
-    return {**entry, **{name: count * end for name, end in ends.items()}, "unit": unit}
+    return {**parameter, **{name: count * end for name, end in ends.items()}, "unit": unit}
 
 
 def not_quoted(report: Mapping[str, Any]) -> str:
     """Where its d33 lies and why it is not to be quoted, as the report states it; empty where that is not stated."""
-    said = _NOT_QUOTED.search(report["statement"])
-    return readable(said[1]) if said else ""
+    match = _NOT_QUOTED.search(report["statement"])
+    return readable(match[1]) if match else ""
 
 
 def unit(label: str) -> str:
@@ -146,14 +146,14 @@ def quantity(parameter: str) -> str:
     return capital(quantity_in_words(parameter))
 
 
-def columns(entries: Sequence[Mapping[str, Any]]) -> list[str]:
+def columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """The fields that any of them has, in the order in which they first come."""
-    return list(dict.fromkeys(name for entry in entries for name in entry))
+    return list(dict.fromkeys(name for row in rows for name in row))
 
 
 def planned_columns(recordings: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     """Planned recordings as columns, None where a recording lacks the field; a position, two numbers, is one text."""
-    return {name: [in_a_cell(entry.get(name)) for entry in recordings] for name in columns(recordings)}
+    return {name: [in_a_cell(recording.get(name)) for recording in recordings] for name in columns(recordings)}
 
 
 def in_a_cell(value: Any) -> Any:

@@ -18,7 +18,7 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Mask
 
 _FACTORS = (2.0, 0.5, 2.0**0.5, 0.5**0.5)
-_MEANT = {True: "peak-to-peak", False: "rms"}
+_CONVENTION = {True: "peak-to-peak", False: "rms"}
 _LEAST = 6
 _GAIN, _GAIN_UNSURE, _COST = 7.5, 14.0, 1.0  # of ln evidence, where a chance is likelier, and per ln of choices
 _WELL, _APART = 0.7, 0.85  # of the recordings lie within a third of ln c of their level: at least, and of levels apart
@@ -26,7 +26,7 @@ _MOST, _FEW, _MANY = 0.5, 0.1, 12  # the first two of the recordings
 _EXACT, _EXACT_WITHIN = 3.0, 0.01  # standard deviations, and what is to spare: else the factor is another
 # Where a law along an axis may be at work as well: twice is no law, and √2 is a chance unless it is sharp.
 _PLAIN_SIZE, _PLAIN_WITHIN, _SHARP_WITHIN = 0.5, 0.06, 0.02  # of ln c
-_SEARCHED_SCATTER, _SEARCHED_BEND = (0.04, 0.12), (0.15, 1.0)
+_SEARCHED_SCATTER, _SEARCHED_SMOOTH_SIZES = (0.04, 0.12), (0.15, 1.0)
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,18 @@ def _least_gain(step: Step) -> float:
     return _GAIN_UNSURE if skewed or step.off.sum() == 1 else _GAIN
 
 
-def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
+def without_step(recordings: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
     """The recordings with the factor taken out, those without a level left out, and the finding on it."""
     off = levels.number[step.off].tolist()
     arguments = {
         "factor": step.factor,
-        "meant": _MEANT[abs(log(step.factor)) > 0.5],
-        "of": [entries[number].id for number in off],
-        "recordings": len(entries),
-        "left_out": len(entries) - len(levels.number),
+        "meant": _CONVENTION[abs(log(step.factor)) > 0.5],
+        "of": [recordings[number].id for number in off],
+        "recordings": len(recordings),
+        "left_out": len(recordings) - len(levels.number),
     }
     right = [
-        _times(entries[number], 1 / step.factor) if number in off else entries[number]
+        _times(recordings[number], 1 / step.factor) if number in off else recordings[number]
         for number in levels.number.tolist()
     ]
     return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
@@ -82,23 +82,23 @@ def without_step(entries: Sequence[FrfRecording], levels: Levels, step: Step) ->
 def _step(levels: Levels, factor: float, base: float) -> Step | None:
     """The recordings that are off by a factor; None where there are none, or most, or the factor is another."""
     size = log(factor)
-    found: list[Step] = []
-    for scatter, bend in product(_SEARCHED_SCATTER, _SEARCHED_BEND):
-        off = _chosen(levels.value, levels.precision(scatter, bend), size)
-        if not off.any() or any((off == one.off).all() for one in found):
+    steps: list[Step] = []
+    for scatter, smooth_size in product(_SEARCHED_SCATTER, _SEARCHED_SMOOTH_SIZES):
+        off = _chosen(levels.value, levels.precision(scatter, smooth_size), size)
+        if not off.any() or any((off == step.off).all() for step in steps):
             continue
         value = levels.value - size * off
         fit = levels.fit(value)
-        away, deviation = fit.amplitude(value, off.astype(float))
-        exact = abs(away) < _EXACT * deviation + _EXACT_WITHIN
+        error, deviation = fit.amplitude(value, off.astype(float))
+        exact = abs(error) < _EXACT * deviation + _EXACT_WITHIN
         if exact and follows_an_axis(off, levels.axes):
             within = _PLAIN_WITHIN if abs(size) > _PLAIN_SIZE else _SHARP_WITHIN
-            exact = abs(away) + deviation < within
+            exact = abs(error) + deviation < within
         near = float((np.abs(fit.residual(value)) < 0.35 * abs(size)).mean())
         if exact and near > _WELL:
             cost = _COST * log(comb(len(off), int(off.sum())))
-            found.append(Step(factor, off, fit.evidence - base - cost, near))
-    return max(found, key=lambda step: step.gain, default=None)
+            steps.append(Step(factor, off, fit.evidence - base - cost, near))
+    return max(steps, key=lambda step: step.gain, default=None)
 
 
 def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
@@ -114,8 +114,8 @@ def _chosen(value: Floats, precision: Floats, size: float) -> Mask:
     return ~off if off.mean() > _MOST else off
 
 
-def _times(entry: FrfRecording, factor: float) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    real, imaginary = factor * entry.frf_re_pc_per_n, factor * entry.frf_im_pc_per_n
-    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+def _times(recording: FrfRecording, factor: float) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)

@@ -40,10 +40,15 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
     """The plainest exchange, None where none is plain."""
     numbers = np.unique(levels.sensor).tolist()
     base = levels.fit(levels.value)
-    tried = sorted((one for spread in _SPREADS for one in _tried(levels, base, spread)), key=lambda one: -one.gain)
+    tried = sorted(
+        (exchange for spread in _SPREADS for exchange in _tried(levels, base, spread)),
+        key=lambda exchange: -exchange.gain,
+    )
     cost = log(max(len(tried) / len(_SPREADS), 1))
-    fitted = [replace(one, gain=_fit(levels, one).evidence - base.evidence - cost) for one in tried[:_FITTED]]
-    best = max(fitted, key=lambda one: one.gain, default=None)
+    fitted = [
+        replace(exchange, gain=_fit(levels, exchange).evidence - base.evidence - cost) for exchange in tried[:_FITTED]
+    ]
+    best = max(fitted, key=lambda exchange: exchange.gain, default=None)
     if best is None or best.gain < _GAIN:
         return None
     cost_of_step = log(max(len(levels.value) - len(numbers), 1))
@@ -52,36 +57,40 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
 
 
 def with_right_sensors(
-    entries: Sequence[FrfRecording], levels: Levels, found: Exchange, places: Mapping[str, tuple[float, float]]
+    recordings: Sequence[FrfRecording], levels: Levels, exchange: Exchange, positions: Mapping[str, tuple[float, float]]
 ) -> tuple[list[FrfRecording], Finding]:
     """The recordings with the sensors that they are of, and the finding on it; contacts move with the sensors, whose
     `places` [mm] are given."""
-    since = levels.number[found.since]
-    names = dict(zip(levels.sensor.tolist(), (entries[number].sensor for number in levels.number), strict=True))
-    first, second = (names[number] for number in found.sensors)
+    since = levels.number[exchange.since]
+    names = dict(zip(levels.sensor.tolist(), (recordings[number].sensor for number in levels.number), strict=True))
+    first, second = (names[number] for number in exchange.sensors)
     order = dict(zip(levels.number.tolist(), levels.order.tolist(), strict=True))
     start = min(since.tolist(), key=lambda number: order[number])
-    arguments = {"first": first, "second": second, "since": entries[start].id, "recordings": len(since)}
-    right = list(entries)
+    arguments = {"first": first, "second": second, "since": recordings[start].id, "recordings": len(since)}
+    right = list(recordings)
     for number in since.tolist():
-        entry = entries[number]
-        there = second if entry.sensor == first else first
-        right[number] = replace(entry, sensor=there, position_mm=_moved(entry, places[entry.sensor], places[there]))
+        recording = recordings[number]
+        there = second if recording.sensor == first else first
+        right[number] = replace(
+            recording, sensor=there, position_mm=_moved(recording, positions[recording.sensor], positions[there])
+        )
     return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
 
 
-def _moved(entry: FrfRecording, here: tuple[float, float], there: tuple[float, float]) -> tuple[float, float] | None:
+def _moved(
+    recording: FrfRecording, here: tuple[float, float], there: tuple[float, float]
+) -> tuple[float, float] | None:
     """Where the contact lies beside the other sensor."""
-    if entry.position_mm is None:
+    if recording.position_mm is None:
         return None
-    x, y = (at + new - old for at, new, old in zip(entry.position_mm, there, here, strict=True))
+    x, y = (at + new - old for at, new, old in zip(recording.position_mm, there, here, strict=True))
     return x, y
 
 
 def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
     """Every pair and recording, with the gain at the base's s and p."""
-    own = np.equal.outer(levels.sensor, levels.sensor)
-    precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * own)
+    same_sensor = np.equal.outer(levels.sensor, levels.sensor)
+    precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * same_sensor)
     weighed = precision @ levels.value
     sign = spread**2 * np.array([-1.0, -1.0, 1.0, 1.0])[:, None]
     for pair in combinations(np.unique(levels.sensor).tolist(), 2):
@@ -97,14 +106,14 @@ def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
         yield from (Exchange(pair, both[k + 1 :], float(gain[k])) for k in range(len(gain)))
 
 
-def _fit(levels: Levels, found: Exchange) -> LevelFit:
-    first, second = found.sensors
+def _fit(levels: Levels, exchange: Exchange) -> LevelFit:
+    first, second = exchange.sensors
     sensor = levels.sensor.copy()
-    sensor[found.since] = np.where(levels.sensor[found.since] == first, second, first)
+    sensor[exchange.since] = np.where(levels.sensor[exchange.since] == first, second, first)
     return levels.fit(levels.value, sensor=sensor)
 
 
-def _steps(levels: Levels, found: Exchange) -> list[Floats]:
+def _steps(levels: Levels, exchange: Exchange) -> list[Floats]:
     """A step of either sensor since the exchange (recordings, 1)."""
-    late = np.isin(np.arange(len(levels.value)), found.since)
-    return [_STEP * (late & (levels.sensor == number)).astype(float)[:, None] for number in found.sensors]
+    late = np.isin(np.arange(len(levels.value)), exchange.since)
+    return [_STEP * (late & (levels.sensor == number)).astype(float)[:, None] for number in exchange.sensors]

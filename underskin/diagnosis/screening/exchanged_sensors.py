@@ -52,7 +52,7 @@ class DisplacedResponse:
 
 def displaced_response(
     skin: SkinDescription,
-    entries: Sequence[FrfRecording],
+    recordings: Sequence[FrfRecording],
     sensors: Sequence[str],
     displacement_mm: Floats,
     table: SigmaTable,
@@ -72,24 +72,26 @@ def displaced_response(
     table
         The σ table.
     """
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in skin.sensors}
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in skin.sensors}
     contacts = tuple(
-        entry.without_measurements(
-            frequency_hz=np.ones(1), sensor=sensor, position_mm=_moved(entry.position_mm or places[entry.sensor], by)
+        recording.without_measurements(
+            frequency_hz=np.ones(1),
+            sensor=sensor,
+            position_mm=_moved(recording.position_mm or positions[recording.sensor], displacement),
         )
-        for by in displacement_mm
-        for entry, sensor in zip(entries, sensors, strict=True)
+        for displacement in displacement_mm
+        for recording, sensor in zip(recordings, sensors, strict=True)
     )
     model = compose((), Conditions("contacts", skin, contacts), table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
     assert prediction.position_slopes is not None
-    shape = len(displacement_mm), len(entries)
+    shape = len(displacement_mm), len(recordings)
     slope = 1e-3 * np.hypot(*np.abs(prediction.position_slopes))
     return DisplacedResponse(*(np.nan_to_num(part).reshape(shape) for part in (np.abs(prediction.value), slope)))
 
 
-def _moved(place: tuple[float, float], by: Floats) -> tuple[float, float]:
-    return place[0] + float(by[0]), place[1] + float(by[1])
+def _moved(position: tuple[float, float], displacement: Floats) -> tuple[float, float]:
+    return position[0] + float(displacement[0]), position[1] + float(displacement[1])
 
 
 _ASTRAY = 1e-5  # ε
@@ -113,32 +115,39 @@ class ExchangeEvidence:
     """The evidence of exchanges among the sensors of a campaign."""
 
     def __init__(
-        self, skin: SkinDescription, entries: Sequence[FrfRecording], level: Floats, largest: float, table: SigmaTable
+        self,
+        skin: SkinDescription,
+        recordings: Sequence[FrfRecording],
+        level: Floats,
+        largest: float,
+        table: SigmaTable,
     ) -> None:
         """Work out the evidence as given; `level` (recordings,) over the usual one at the `largest` S [C/N]."""
-        self._skin, self._entries, self._table = skin, entries, table
+        self._skin, self._recordings, self._table = skin, recordings, table
         angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         around = np.column_stack([np.cos(angles), np.sin(angles)])
         self._miss_mm = np.concatenate([np.zeros((1, 2)), *(distance * around for distance in _DISTANCES_MM)])
-        own = self._response(entries, [entry.sensor for entry in entries])
-        self._largest, self._level, self._own = largest, level, own
-        self._total = np.stack([self._density(own, self._level, at).sum(axis=-1) for at in range(len(self._miss_mm))])
+        labelled = self._response(recordings, [recording.sensor for recording in recordings])
+        self._largest, self._level, self._labelled = largest, level, labelled
+        self._total = np.stack(
+            [self._density(labelled, self._level, at).sum(axis=-1) for at in range(len(self._miss_mm))]
+        )
         self._total += self._prior[:, None]
 
-    def exchange(self, own: Indices, others: Sequence[str]) -> Start:
+    def exchange(self, indices: Indices, others: Sequence[str]) -> Start:
         """The most probable start of an exchange; `own` are the sensors' recordings in time, `others` the sensor that
         each is of."""
-        turned = self._response([self._entries[number] for number in own], others)
-        given = DisplacedResponse(self._own.value[:, own], self._own.slope[:, own])
-        level, places = self._level[own], range(len(self._miss_mm))
-        change = np.stack([self._density(turned, level, at) - self._density(given, level, at) for at in places])
+        turned = self._response([self._recordings[number] for number in indices], others)
+        given = DisplacedResponse(self._labelled.value[:, indices], self._labelled.slope[:, indices])
+        level, displacements = self._level[indices], range(len(self._miss_mm))
+        change = np.stack([self._density(turned, level, at) - self._density(given, level, at) for at in displacements])
         since = np.cumsum(change[..., ::-1], axis=-1)[..., ::-1]
         evidence = logsumexp(self._total[..., None] + since, axis=(0, 1))
-        prior = np.full(len(own), -log(2 * max(len(own) - 1, 1)))
+        prior = np.full(len(indices), -log(2 * max(len(indices) - 1, 1)))
         prior[0] = -log(2)
         weighed = evidence - logsumexp(self._total) + prior
         first = int(np.argmax(weighed))
-        sensor = np.array([self._entries[number].sensor for number in own[first:]])
+        sensor = np.array([self._recordings[number].sensor for number in indices[first:]])
         without = [
             logsumexp(self._total + change[..., first:][..., sensor != name].sum(axis=-1)) for name in set(sensor)
         ]
@@ -151,8 +160,8 @@ class ExchangeEvidence:
         area = np.maximum(distance, _DISTANCES_MM[0] / 2)
         return np.asarray(np.log(area) - distance**2 / (2 * _MISS_MM**2))
 
-    def _response(self, entries: Sequence[FrfRecording], sensors: Sequence[str]) -> DisplacedResponse:
-        return displaced_response(self._skin, entries, sensors, self._miss_mm, self._table)
+    def _response(self, recordings: Sequence[FrfRecording], sensors: Sequence[str]) -> DisplacedResponse:
+        return displaced_response(self._skin, recordings, sensors, self._miss_mm, self._table)
 
     def _density(self, response: DisplacedResponse, level: Floats, at: int) -> Floats:
         """ln of that of each level under one displacement (d and noises, recordings)."""
@@ -167,7 +176,7 @@ _LEAST_SHAPE = 0.3  # of the largest: smaller ones are measured by it
 _ANSWERS = 0.6  # of a level, or of `_LEAST_SHAPE`, that is not expected: then exchanges are sought
 _WEAK = 0.3  # of the level to be expected
 _GAIN = log(100)  # of ln evidence beyond ln of how many are tried
-_EACH = log(4)  # of ln evidence, by each sensor's own recordings
+_GAIN_OF_EACH = log(4)  # of ln evidence, by each sensor's own recordings
 _FEWEST = 4  # recordings, for one of them to contradict the others
 _FAR_OFF = 30.0  # times the usual response
 
@@ -177,7 +186,7 @@ class _Exchange:
     """Of each sensor the one whose place it answers at, their recordings since the exchange and before, by how much ln
     evidence gains on its cost, and by how much by each sensor."""
 
-    place: Mapping[str, str]
+    true_sensor: Mapping[str, str]
     since: list[int]
     before: list[int]
     gain: float
@@ -185,76 +194,82 @@ class _Exchange:
 
 
 def without_exchanges(
-    campaign: Campaign, entries: Sequence[FrfRecording], table: SigmaTable
+    campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], list[Finding]]:
     """The recordings of exchanged sensors with the right sensor, or left out where none is right; the findings."""
-    if len(campaign.skin.sensors) < 2 or len(entries) < _FEWEST:
-        return list(entries), []
-    level = np.array([flat_level(entry) for entry in entries])
-    own, near = [entry.sensor for entry in entries], [_nearest(campaign, entry) for entry in entries]
-    shape, pressed = (
-        displaced_response(campaign.skin, entries, names, np.zeros((1, 2)), table).value[0] for names in (own, near)
+    if len(campaign.skin.sensors) < 2 or len(recordings) < _FEWEST:
+        return list(recordings), []
+    level = np.array([flat_level(recording) for recording in recordings])
+    labels, near = (
+        [recording.sensor for recording in recordings],
+        [_nearest(campaign, recording) for recording in recordings],
     )
-    silent, _ = no_response(aligned_lines(entries))
+    shape, pressed = (
+        displaced_response(campaign.skin, recordings, names, np.zeros((1, 2)), table).value[0]
+        for names in (labels, near)
+    )
+    silent, _ = no_response(aligned_lines(recordings))
     largest = float(max(shape.max(), pressed.max()))
     usual = _usual(level, np.where(silent, 0.0, np.maximum(shape, pressed)))
     if usual is None:
-        return list(entries), []
+        return list(recordings), []
     unasked = level - usual * shape > _ANSWERS * np.maximum(level, _LEAST_SHAPE * usual * largest)
     if not unasked.any():
-        return list(entries), []
+        return list(recordings), []
     tells = np.flatnonzero(~silent & (level > _WEAK * usual * shape))
-    known = [entries[number] for number in tells.tolist()]
-    evidence = ExchangeEvidence(campaign.skin, known, level[tells] / (usual * largest), largest, table)
-    links = _links(campaign, [entry for entry, odd in zip(known, unasked[tells], strict=True) if odd])
-    right, findings = list[FrfRecording | None](entries), list[Finding]()
-    mute = set(own) - {entry.sensor for entry in known}
-    exchanges, contradicting = _explained(known, links, evidence, mute)
-    for found in exchanges:
-        findings.append(_finding(found, known))
-        for number in found.since:
-            right[tells[number]] = _at_place(campaign, known[number], found.place)
+    informative = [recordings[number] for number in tells.tolist()]
+    evidence = ExchangeEvidence(campaign.skin, informative, level[tells] / (usual * largest), largest, table)
+    links = _links(campaign, [recording for recording, odd in zip(informative, unasked[tells], strict=True) if odd])
+    right, findings = list[FrfRecording | None](recordings), list[Finding]()
+    mute = set(labels) - {recording.sensor for recording in informative}
+    exchanges, contradicting = _explained(informative, links, evidence, mute)
+    for exchange in exchanges:
+        findings.append(_finding(exchange, informative))
+        for number in exchange.since:
+            right[tells[number]] = _relabelled(campaign, informative[number], exchange.true_sensor)
     if contradicting:
-        findings.append(_contradiction([known[number] for number in contradicting]))
+        findings.append(_contradiction([informative[number] for number in contradicting]))
         for number in contradicting:
             right[tells[number]] = None
-    return [entry for entry in right if entry is not None], findings
+    return [recording for recording in right if recording is not None], findings
 
 
 def _explained(
-    entries: Sequence[FrfRecording], links: Sequence[tuple[str, str]], evidence: ExchangeEvidence, mute: set[str]
+    recordings: Sequence[FrfRecording], links: Sequence[tuple[str, str]], evidence: ExchangeEvidence, mute: set[str]
 ) -> tuple[list[_Exchange], list[int]]:
     """The exchanges by which every sensor gains, each sensor in one of them at most and none of the `mute`, whose
     recordings tell nothing; and the recordings of other sensors that gain alone."""
-    moves = _weighed(entries, [{name: place} for name, place in links], evidence)
-    best = {name: place for one in reversed(moves) for name, place in one.place.items()}
+    moves = _weighed(recordings, [{name: sensor} for name, sensor in links], evidence)
+    best = {name: sensor for move in reversed(moves) for name, sensor in move.true_sensor.items()}
     chosen, settled = list[_Exchange](), set(mute)
-    for one in _weighed(entries, _permutations(links, best), evidence):
-        consistent = all(best.get(name, place) == place for name, place in one.place.items())
-        if consistent and one.least > _EACH and not settled & set(one.place):
-            chosen.append(one)
-            settled |= set(one.place)
-    return chosen, sorted({number for one in moves if not settled & set(one.place) for number in one.since})
+    for exchange in _weighed(recordings, _permutations(links, best), evidence):
+        consistent = all(best.get(name, sensor) == sensor for name, sensor in exchange.true_sensor.items())
+        if consistent and exchange.least > _GAIN_OF_EACH and not settled & set(exchange.true_sensor):
+            chosen.append(exchange)
+            settled |= set(exchange.true_sensor)
+    return chosen, sorted({number for move in moves if not settled & set(move.true_sensor) for number in move.since})
 
 
 def _weighed(
-    entries: Sequence[FrfRecording], tried: Sequence[Mapping[str, str]], evidence: ExchangeEvidence
+    recordings: Sequence[FrfRecording], tried: Sequence[Mapping[str, str]], evidence: ExchangeEvidence
 ) -> list[_Exchange]:
     """The plain ones of those tried, the plainest first."""
-    order = recording_order(entries)
-    found = []
-    for place in tried:
-        own = sorted((n for n, entry in enumerate(entries) if entry.sensor in place), key=lambda n: order[n])
-        start = evidence.exchange(np.array(own), [place[entries[number].sensor] for number in own])
+    order = recording_order(recordings)
+    exchanges = []
+    for true_sensor in tried:
+        indices = sorted(
+            (n for n, recording in enumerate(recordings) if recording.sensor in true_sensor), key=lambda n: order[n]
+        )
+        start = evidence.exchange(np.array(indices), [true_sensor[recordings[number].sensor] for number in indices])
         gain = start.gain - log(len(tried))
         if gain > _GAIN:
-            found.append(_Exchange(place, own[start.first :], own[: start.first], gain, start.least))
-    return sorted(found, key=lambda one: -one.gain)
+            exchanges.append(_Exchange(true_sensor, indices[start.first :], indices[: start.first], gain, start.least))
+    return sorted(exchanges, key=lambda exchange: -exchange.gain)
 
 
 def _links(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[str, str]]:
     """The sensors of these recordings, each with the sensor that is nearest to where it was pressed."""
-    links = {(entry.sensor, _nearest(campaign, entry)) for entry in unasked}
+    links = {(recording.sensor, _nearest(campaign, recording)) for recording in unasked}
     return sorted(link for link in links if link[0] != link[1])
 
 
@@ -271,29 +286,29 @@ def _permutations(links: Sequence[tuple[str, str]], best: Mapping[str, str]) -> 
     return tried
 
 
-def _nearest(campaign: Campaign, entry: FrfRecording) -> str:
+def _nearest(campaign: Campaign, recording: FrfRecording) -> str:
     """The sensor that is nearest to where a recording was pressed."""
-    places = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    pressed = entry.position_mm or places[entry.sensor]
-    return min(places, key=lambda name: dist(places[name], pressed))
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    pressed = recording.position_mm or positions[recording.sensor]
+    return min(positions, key=lambda name: dist(positions[name], pressed))
 
 
-def _finding(found: _Exchange, entries: Sequence[FrfRecording]) -> Finding:
-    since = entries[found.since[0]].id if found.before else None
-    names = sorted(found.place)
+def _finding(exchange: _Exchange, recordings: Sequence[FrfRecording]) -> Finding:
+    since = recordings[exchange.since[0]].id if exchange.before else None
+    names = sorted(exchange.true_sensor)
     if len(names) > 2:
-        places = [found.place[name] for name in names]
-        arguments = {"sensors": names, "places": places, "since": since, "recordings": len(found.since)}
+        targets = [exchange.true_sensor[name] for name in names]
+        arguments = {"sensors": names, "places": targets, "since": since, "recordings": len(exchange.since)}
         return Finding(Reason.LABELS_PERMUTED, "", "sensor", arguments)
     first, second = names
     if since is None:
         return Finding(Reason.LABELS_EXCHANGED, "", "sensor", {"first": first, "second": second})
-    arguments = {"first": first, "second": second, "since": since, "recordings": len(found.since)}
+    arguments = {"first": first, "second": second, "since": since, "recordings": len(exchange.since)}
     return Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
 
 
-def _contradiction(entries: Sequence[FrfRecording]) -> Finding:
-    arguments = {"sensors": sorted({entry.sensor for entry in entries}), "recordings": len(entries)}
+def _contradiction(recordings: Sequence[FrfRecording]) -> Finding:
+    arguments = {"sensors": sorted({recording.sensor for recording in recordings}), "recordings": len(recordings)}
     return Finding(Reason.LABELS_CONTRADICT_PLACES, "", "sensor", arguments)
 
 
@@ -309,7 +324,11 @@ def _usual(level: Floats, shape: Floats) -> float | None:
     return float(np.median(ratio[ratio > _LEAST_SHAPE * np.quantile(ratio, 0.9)]))
 
 
-def _at_place(campaign: Campaign, entry: FrfRecording, place: Mapping[str, str]) -> FrfRecording:
+def _relabelled(campaign: Campaign, recording: FrfRecording, true_sensor: Mapping[str, str]) -> FrfRecording:
     """The recording as one of the right sensor, the contact where it was."""
-    known = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    return replace(entry, sensor=place[entry.sensor], position_mm=entry.position_mm or known[entry.sensor])
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    return replace(
+        recording,
+        sensor=true_sensor[recording.sensor],
+        position_mm=recording.position_mm or positions[recording.sensor],
+    )

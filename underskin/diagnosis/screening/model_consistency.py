@@ -41,41 +41,46 @@ class Consistent:
     `beyond` are the ids of those whose contacts lie beyond the tables as declared.
     """
 
-    entries: list[FrfRecording]
+    recordings: list[FrfRecording]
     findings: list[Finding]
     lacking: Lacking | None = None
     beyond: frozenset[str] = frozenset()
 
 
 def against_model(
-    campaign: Campaign, entries: list[FrfRecording], table: SigmaTable, kept: Collection[str] | None
+    campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable, keep_ids: Collection[str] | None
 ) -> Consistent:
     """The recordings held against the base model; `kept` as for `within_tables`."""
-    aligned = aligned_lines(entries)
+    aligned = aligned_lines(recordings)
     unresponsive, variance = no_response(aligned)
     if unresponsive.all():
-        finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(entries)})
+        finding = Finding(Reason.SILENT_CAMPAIGN, "", "frf_re_pc_per_n", {"recordings": len(recordings)})
         return Consistent([], [finding], Lacking(Lack.NO_RESPONSE))
-    model = compose((), replace(campaign, recordings=tuple(entries)), table, "frf")
-    inside, beyond, findings = within_tables(campaign, entries, model, table, kept)
+    model = compose((), replace(campaign, recordings=tuple(recordings)), table, "frf")
+    inside, beyond, findings = within_tables(campaign, recordings, model, table, keep_ids)
     inside |= beyond
     ratio, largest, expected = _apparent(aligned, model, inside & ~unresponsive)
-    lost, dead_findings = dead(entries, aligned, unresponsive & inside, variance, np.where(inside, expected, 0.0))
+    lost, dead_findings = dead(recordings, aligned, unresponsive & inside, variance, np.where(inside, expected, 0.0))
     findings += dead_findings
     usable = inside & ~lost
-    turned = np.where(_one_sided(entries, aligned), ratio, np.nan)
-    contradiction = _contradiction(ratio, turned) if len(entries) == 2 else None
+    turned = np.where(_has_one_sign(recordings, aligned), ratio, np.nan)
+    contradiction = _contradiction(ratio, turned) if len(recordings) == 2 else None
     if contradiction is not None:
         return Consistent([], [*findings, contradiction], Lacking(Lack.TWO_RECORDINGS_CONTRADICT))
     ratio, turned, largest = (np.where(usable, column, np.nan) for column in (ratio, turned, largest))
-    off, off_findings = _off_by_1000(entries, ratio)
+    off, off_findings = _off_by_1000(recordings, ratio)
     usable &= ~off
-    found = signs_of(entries, turned, usable)
-    findings += [*off_findings, *_of_all(largest, campaign.skin.d33_pc_per_n), *found.findings]
-    usable &= found.signs != 0
-    entries = [_reversed(entry) if sign < 0 else entry for entry, sign in zip(entries, found.signs, strict=True)]
-    far = frozenset(entry.id for entry, chosen in zip(entries, usable & beyond, strict=True) if chosen)
-    return Consistent([entry for entry, chosen in zip(entries, usable, strict=True) if chosen], findings, beyond=far)
+    polarity = signs_of(recordings, turned, usable)
+    findings += [*off_findings, *_of_all(largest, campaign.skin.d33_pc_per_n), *polarity.findings]
+    usable &= polarity.signs != 0
+    recordings = [
+        _reversed(recording) if sign < 0 else recording
+        for recording, sign in zip(recordings, polarity.signs, strict=True)
+    ]
+    far = frozenset(recording.id for recording, chosen in zip(recordings, usable & beyond, strict=True) if chosen)
+    return Consistent(
+        [recording for recording, chosen in zip(recordings, usable, strict=True) if chosen], findings, beyond=far
+    )
 
 
 def _apparent(aligned: Sequence[Complexes], model: Model, usable: Mask) -> tuple[Floats, Floats, Floats]:
@@ -94,9 +99,9 @@ def _apparent(aligned: Sequence[Complexes], model: Model, usable: Mask) -> tuple
     return ratio, largest, np.abs(shape) * usual
 
 
-def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list[Finding]]:
+def _off_by_1000(recordings: list[FrfRecording], ratio: Floats) -> tuple[Mask, list[Finding]]:
     """Which recordings' levels are about 1000 × off all others, and the findings on them."""
-    off = np.zeros(len(entries), dtype=bool)
+    off = np.zeros(len(recordings), dtype=bool)
     findings: list[Finding] = []
     if not np.isfinite(ratio).any():
         return off, findings
@@ -107,18 +112,18 @@ def _off_by_1000(entries: list[FrfRecording], ratio: Floats) -> tuple[Mask, list
             if abs(slip[number] - np.log(factor)) < _FACTOR_WIDTH:
                 arguments = {"too_large": factor > 1}
                 findings.append(
-                    Finding(Reason.RESPONSE_BESIDE_OTHERS, entries[number].id, "frf_re_pc_per_n", arguments)
+                    Finding(Reason.RESPONSE_BESIDE_OTHERS, recordings[number].id, "frf_re_pc_per_n", arguments)
                 )
                 off[number] = True
     return off, findings
 
 
-def _one_sided(entries: list[FrfRecording], aligned: Sequence[Complexes]) -> Mask:
+def _has_one_sign(recordings: list[FrfRecording], aligned: Sequence[Complexes]) -> Mask:
     """Whether a recording's lowest lines are on the same side of zero as all of it: above a resonance charge is in
     antiphase, which reverses nothing."""
     sides = []
-    for entry, values in zip(entries, aligned, strict=True):
-        real, frequency = values.real, lines_of(entry).frequency
+    for recording, values in zip(recordings, aligned, strict=True):
+        real, frequency = values.real, lines_of(recording).frequency
         low = int((frequency <= np.cbrt(frequency[0] ** 2 * frequency[-1])).sum())
         lowest = real[: max(1, min(1 + (len(real) - 1) // _LOWEST, low))]
         sides.append(float(np.nanmedian(lowest)) * float(np.nanmedian(real)) > 0)
@@ -151,7 +156,7 @@ def _of_all(ratio: Floats, declared: float | None) -> list[Finding]:
     return [Finding(Reason.D33_NEEDED, "", "frf_re_pc_per_n", arguments)]
 
 
-def _reversed(entry: FrfRecording) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    return replace(entry, frf_re_pc_per_n=-entry.frf_re_pc_per_n, frf_im_pc_per_n=-entry.frf_im_pc_per_n)
+def _reversed(recording: FrfRecording) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    return replace(recording, frf_re_pc_per_n=-recording.frf_re_pc_per_n, frf_im_pc_per_n=-recording.frf_im_pc_per_n)

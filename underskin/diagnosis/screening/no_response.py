@@ -42,7 +42,7 @@ def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
 
 
 def dead(
-    entries: Sequence[FrfRecording],
+    recordings: Sequence[FrfRecording],
     aligned: Sequence[Complexes],
     unresponsive: Mask,
     variance: Floats,
@@ -54,26 +54,32 @@ def dead(
     one in the others, which noise alone does.
     """
     level = np.array([float(np.abs(np.nanmean(values))) for values in aligned])
-    silent = unresponsive | (_incoherent(entries) & (level < _WEAK * expected))
+    silent = unresponsive | (_incoherent(recordings) & (level < _WEAK * expected))
     missing: Mask = silent & (expected**2 > _EXPECTED * variance)
     findings = []
-    sensors = np.array([entry.sensor for entry in entries])
+    sensors = np.array([recording.sensor for recording in recordings])
     for name in dict.fromkeys(sensors[missing].tolist()):
-        own = sensors == name
-        if own.sum() > 1 and 2 * missing[own].sum() > own.sum() and (missing | (level < _WEAK * expected))[own].all():
-            missing = missing | own
-            arguments = {"recordings": int(own.sum()), "sensor": name}
+        of_sensor = sensors == name
+        if (
+            of_sensor.sum() > 1
+            and 2 * missing[of_sensor].sum() > of_sensor.sum()
+            and (missing | (level < _WEAK * expected))[of_sensor].all()
+        ):
+            missing = missing | of_sensor
+            arguments = {"recordings": int(of_sensor.sum()), "sensor": name}
             findings.append(Finding(Reason.SILENT_SENSOR, "", "frf_re_pc_per_n", arguments))
             continue
-        missing &= ~own | (expected > _PLAIN * expected.max())
+        missing &= ~of_sensor | (expected > _PLAIN * expected.max())
         findings += [
-            Finding(Reason.SILENT_RECORDING, entries[number].id, "frf_re_pc_per_n")
-            for number in np.flatnonzero(missing & own).tolist()
+            Finding(Reason.SILENT_RECORDING, recordings[number].id, "frf_re_pc_per_n")
+            for number in np.flatnonzero(missing & of_sensor).tolist()
         ]
     return missing, findings
 
 
-def _incoherent(entries: Sequence[FrfRecording]) -> Mask:
+def _incoherent(recordings: Sequence[FrfRecording]) -> Mask:
     """Whether the noise of most of a recording's lines is larger than their response; False where nothing tells."""
-    known = [lines_of(entry).coherence for entry in entries]
-    return np.array([one is not None and float(np.nanmedian(one)) < _INCOHERENT for one in known])
+    coherences = [lines_of(recording).coherence for recording in recordings]
+    return np.array(
+        [coherence is not None and float(np.nanmedian(coherence)) < _INCOHERENT for coherence in coherences]
+    )

@@ -42,7 +42,7 @@ from underskin.units import Complexes, Floats, Indices, Mask
 
 _BANDS = 24  # of equal width in the logarithm of frequency
 _LEAST_LINES = 6
-_MAINS_HZ, _BESIDE_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
+_MAINS_HZ, _NEAR_MAINS_HZ = (50.0, 60.0, 150.0, 180.0), 20.0  # pick-up has a phase of its own
 _STEP, _FAINT = 2.0, 0.3  # rad, and of the usual level: beside a zero the phase may turn either way
 _UNSURE = 6.0  # of a line's noise
 _WIDEST = 0.3  # rad, of a line's noise: beyond it a phase cannot be followed from line to line
@@ -51,7 +51,7 @@ _ENOUGH = 12  # second differences in a band, or in it and the two beside it on 
 
 
 @dataclass(frozen=True)
-class PhaseCourses:
+class LogFrfBands:
     """ln FRF without its real mean, in bands of frequency (recordings, bands), NaN where there is no line or the lines
     are too noisy; the polarity is taken off. `deviation` is the noise of each part."""
 
@@ -66,18 +66,18 @@ class PhaseCourses:
         return np.asarray(np.isfinite(self.value).any(axis=1))
 
 
-def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
+def log_frf_bands(recordings: Sequence[FrfRecording]) -> LogFrfBands:
     """Those of recordings."""
-    measured = [lines_of(entry) for entry in entries]
-    lowest = min(float(own.frequency.min()) for own in measured)
-    highest = max(float(own.frequency.max()) for own in measured)
+    measured = [lines_of(recording) for recording in recordings]
+    lowest = min(float(frf.frequency.min()) for frf in measured)
+    highest = max(float(frf.frequency.max()) for frf in measured)
     edges = np.geomspace(lowest * (1 - 1e-9), highest * (1 + 1e-9), _BANDS + 1)
-    value = np.full((len(entries), _BANDS), np.nan + 0j)
+    value = np.full((len(recordings), _BANDS), np.nan + 0j)
     followed = np.zeros(value.shape, dtype=bool)
-    share, noises = np.full((len(entries), _BANDS), np.nan), np.full(len(entries), np.nan)
+    share, noises = np.full((len(recordings), _BANDS), np.nan), np.full(len(recordings), np.nan)
     rough: list[tuple[Indices, Floats]] = []
-    for number, own in enumerate(measured):
-        frequency, lines = _usable(own)
+    for number, frf in enumerate(measured):
+        frequency, lines = _usable(frf)
         if len(lines) < _LEAST_LINES:
             continue
         logarithm = _logarithm(lines)
@@ -98,14 +98,14 @@ def phase_courses(entries: Sequence[FrfRecording]) -> PhaseCourses:
         noises[number] = noise
     if rough:
         noises = np.maximum(noises, np.nanmedian(noises))
-    return PhaseCourses(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
+    return LogFrfBands(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)
 
 
 def _usable(measured: Frf) -> tuple[Floats, Complexes]:
     """Frequency and value of the lines that are not 0 and not beside mains, by frequency."""
-    beside = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _BESIDE_MAINS_HZ
-    kept = ~beside & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
-    return measured.frequency[kept], measured.values[kept]
+    near_mains = np.min(np.abs(np.subtract.outer(measured.frequency, _MAINS_HZ)), axis=1) < _NEAR_MAINS_HZ
+    usable = ~near_mains & np.isfinite(measured.values) & (np.abs(measured.values) > 0)
+    return measured.frequency[usable], measured.values[usable]
 
 
 def _lost(logarithm: Complexes, band: Indices, noise: float) -> int:
@@ -123,8 +123,8 @@ def _unevenness(rough: Sequence[tuple[Indices, Floats]]) -> Floats:
     profile = np.ones(_BANDS)
     if not rough:
         return profile
-    band = np.concatenate([own for own, _ in rough])
-    second = np.concatenate([own for _, own in rough], axis=1)
+    band = np.concatenate([part for part, _ in rough])
+    second = np.concatenate([part for _, part in rough], axis=1)
     for number in range(_BANDS):
         chosen = np.abs(band - number) <= (0 if (band == number).sum() >= _ENOUGH else 2)
         if chosen.sum() >= _ENOUGH:
@@ -232,7 +232,7 @@ _UNLISTED = _Law(
 
 
 @dataclass(frozen=True)
-class Course:
+class LogFrf:
     """A course of ln FRF (bands,), real part and phase each with its deviation; the natural frequencies (any number,)
     of the contacts behind it over the usual one."""
 
@@ -242,9 +242,9 @@ class Course:
     spread: Floats
 
     @property
-    def conjugated(self) -> "Course":
+    def conjugated(self) -> "LogFrf":
         """The same in the other convention."""
-        return Course(self.frequency, self.value.conj(), self.deviation, self.spread)
+        return LogFrf(self.frequency, self.value.conj(), self.deviation, self.spread)
 
 
 class Lead(NamedTuple):
@@ -254,51 +254,55 @@ class Lead(NamedTuple):
     lag_us: float
 
 
-def misfit(course: Course) -> float:
+def misfit(log_frf: LogFrf) -> float:
     """χ² of the nearest course that at most two mechanisms give, with what their priors and their number cost."""
-    alone = {name: _nearest(course, (law,))[0] for name, law in _LAWS.items()}
-    first = min(alone, key=lambda name: alone[name])
-    pairs = [_nearest(course, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
-    return min(_nearest(course, ())[0], alone[first], *pairs)
+    single = {name: _nearest(log_frf, (law,))[0] for name, law in _LAWS.items()}
+    first = min(single, key=lambda name: single[name])
+    pairs = [_nearest(log_frf, (_LAWS[first], law))[0] for name, law in _LAWS.items() if name != first]
+    return min(_nearest(log_frf, ())[0], single[first], *pairs)
 
 
-def leading(course: Course) -> Lead:
+def leading(log_frf: LogFrf) -> Lead:
     """The nearest course of a lag of the force channel, alone or beside one mechanism."""
-    beside = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
-    chi2, fit = min((_nearest(course, (_LEAD, *laws)) for laws in beside), key=lambda one: one[0])
+    combinations = [(), *((law,) for law in _LAWS.values() if law is not _DELAY)]
+    chi2, fit = min((_nearest(log_frf, (_LEAD, *laws)) for laws in combinations), key=lambda nearest: nearest[0])
     return Lead(chi2, abs(float(fit[0])))
 
 
-def unlisted_misfit(course: Course) -> float:
+def unlisted_misfit(log_frf: LogFrf) -> float:
     """χ² of the nearest course that a vibrating part or a notch gives, with the same costs."""
-    return _nearest(course, (_UNLISTED,))[0]
+    return _nearest(log_frf, (_UNLISTED,))[0]
 
 
-def _nearest(course: Course, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
+def _nearest(log_frf: LogFrf, laws: tuple[_Law, ...]) -> tuple[float, Floats]:
     """χ² with its costs, and the parameters of the laws."""
     ends = np.cumsum([0, *(len(law.centre) for law in laws)])
     centre = np.concatenate([[], *(law.centre for law in laws)])
     deviation = np.concatenate([[], *(law.deviation for law in laws)])
-    size = _IDEALISED * np.abs(course.value)
+    size = _IDEALISED * np.abs(log_frf.value)
     weight = [
         1 / np.hypot(np.hypot(part, _CHANNEL_DEVIATION), size)
-        for part in (course.deviation.real, course.deviation.imag)
+        for part in (log_frf.deviation.real, log_frf.deviation.imag)
     ]
     level = weight[0] ** 2 / (weight[0] ** 2).sum()
 
     def residual(fit: Floats) -> Floats:
-        left = course.value - sum(
-            law.value(course.frequency, fit[first:last], course.spread)
+        difference = log_frf.value - sum(
+            law.value(log_frf.frequency, fit[first:last], log_frf.spread)
             for law, first, last in zip(laws, ends, ends[1:], strict=False)
         )
-        parts = [(left.real - level @ left.real) * weight[0], left.imag * weight[1], (fit - centre) / deviation]
+        parts = [
+            (difference.real - level @ difference.real) * weight[0],
+            difference.imag * weight[1],
+            (fit - centre) / deviation,
+        ]
         return np.concatenate(parts)
 
     if not laws:
         return float((residual(np.zeros(0)) ** 2).sum()), np.zeros(0)
-    starts = [np.concatenate(start) for start in product(*(law.starts(course.frequency) for law in laws))]
+    starts = [np.concatenate(start) for start in product(*(law.starts(log_frf.frequency) for law in laws))]
     fitted = (least_squares(residual, start, method="lm", ftol=_TOLERANCE, xtol=_TOLERANCE) for start in starts)
-    best = min(fitted, key=lambda one: float(one.cost))
+    best = min(fitted, key=lambda solution: float(solution.cost))
     return float(2 * best.cost) + _COST * len(laws), best.x
 
 
@@ -317,24 +321,24 @@ _STILL = 1.5e-3  # rad
 _QUANTILES = np.linspace(0.0625, 0.9375, 8)  # of the contacts' natural frequencies, which go as (force · radius)^(1/6)
 
 
-def in_one_convention(
-    entries: Sequence[FrfRecording], imported: Collection[str]
+def in_common_convention(
+    recordings: Sequence[FrfRecording], imported: Collection[str]
 ) -> tuple[list[FrfRecording], list[Finding]]:
     """The recordings with conjugated ones put right, and the finding on them; of those `imported` as FRFs (ids) alone:
     FRFs that were computed here are in the convention."""
-    foreign, findings = _in_one_convention([entry for entry in entries if entry.id in imported])
-    right = {entry.id: entry for entry in foreign}
-    return [right.get(entry.id, entry) for entry in entries], findings
+    foreign, findings = _conjugation_undone([recording for recording in recordings if recording.id in imported])
+    right = {recording.id: recording for recording in foreign}
+    return [right.get(recording.id, recording) for recording in recordings], findings
 
 
-def _in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    if not entries:
+def _conjugation_undone(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+    if not recordings:
         return [], []
-    courses = phase_courses(entries)
-    if not courses.telling.any():
-        return list(entries), []
-    signs = _aligned(courses)
-    orientation, lag_us = _orientation(entries, courses, signs)
+    bands = log_frf_bands(recordings)
+    if not bands.telling.any():
+        return list(recordings), []
+    signs = _aligned(bands)
+    orientation, lag_us = _orientation(recordings, bands, signs)
     findings = list[Finding]()
     if orientation == 0:  # both may be: most recordings decide
         orientation = 1 if (signs < 0).sum() <= (signs > 0).sum() else -1
@@ -342,29 +346,31 @@ def _in_one_convention(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecordi
             findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": lag_us}))
     turned = orientation * signs < 0
     if not turned.any():
-        return list(entries), findings
-    ids = [entry.id for entry, wrong in zip(entries, turned, strict=True) if wrong]
-    if turned[courses.telling].all():
-        turned = np.ones(len(entries), dtype=bool)
+        return list(recordings), findings
+    ids = [recording.id for recording, wrong in zip(recordings, turned, strict=True) if wrong]
+    if turned[bands.telling].all():
+        turned = np.ones(len(recordings), dtype=bool)
         findings.append(Finding(Reason.ALL_CONJUGATED, "", "frf_im_pc_per_n", {"lag_us": None}))
     else:
-        arguments = {"conjugated": ids, "recordings": len(entries)}
+        arguments = {"conjugated": ids, "recordings": len(recordings)}
         about = ids[0] if len(ids) == 1 else ""
         findings.append(Finding(Reason.RECORDINGS_CONJUGATED, about, "frf_im_pc_per_n", arguments))
-    return [_conjugated(entry) if wrong else entry for entry, wrong in zip(entries, turned, strict=True)], findings
+    return [
+        _conjugated(recording) if wrong else recording for recording, wrong in zip(recordings, turned, strict=True)
+    ], findings
 
 
-def _aligned(courses: PhaseCourses) -> Floats:
+def _aligned(bands: LogFrfBands) -> Floats:
     """±1 of each recording (recordings,), all 1 where nothing contradicts; 0 where it tells no phase."""
-    telling = courses.telling
+    telling = bands.telling
     same = telling.astype(float)
     if telling.sum() < _LEAST:
         return same
-    phase, weight = _phases(courses)
-    smooth = _SmoothCourse(courses.frequency, weight)
+    phase, weight = _phases(bands)
+    smooth = _SmoothPhase(bands.frequency, weight)
     signs = _leading_signs(phase, weight) * same
     for _ in range(10):
-        better = np.where(_along(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
+        better = np.where(_projection(phase, weight, smooth.of(phase, signs)) < 0, -1.0, 1.0) * same
         if (better == signs).all():
             break
         signs = better
@@ -376,7 +382,7 @@ def _aligned(courses: PhaseCourses) -> Floats:
     return signs if _of_two_signs(phase, weight, signs) > _OVER_CHANNELS else same
 
 
-class _SmoothCourse:
+class _SmoothPhase:
     """One phase over frequency, times the sign of each recording: a sum of what delay, loss, relaxation and high pass
     do, of normal coefficients."""
 
@@ -404,25 +410,28 @@ class _SmoothCourse:
 def _of_two_signs(phase: Floats, weight: Floats, signs: Floats) -> float:
     """ln likelihood of courses ±1 times the mean one, over that of one course and a channel's own phase in each
     recording, a few of them stray."""
-    course = _mean(phase, weight, signs)
-    information = (weight * course**2).sum(axis=1)
-    told = (signs != 0) & (information > 0)
-    amplitude, variance = _along(phase, weight, course)[told] / information[told], 1 / information[told]
-    size = np.sqrt((weight * course**2).sum() / weight.sum())
-    share = min((signs[told] < 0).mean(), (signs[told] > 0).mean())
+    mean_phase = _mean(phase, weight, signs)
+    information = (weight * mean_phase**2).sum(axis=1)
+    informative = (signs != 0) & (information > 0)
+    amplitude, variance = (
+        _projection(phase, weight, mean_phase)[informative] / information[informative],
+        1 / information[informative],
+    )
+    size = np.sqrt((weight * mean_phase**2).sum() / weight.sum())
+    share = min((signs[informative] < 0).mean(), (signs[informative] > 0).mean())
     usual = 1.0 if (signs < 0).sum() < (signs > 0).sum() else -1.0
     stray = np.log(_STRAY) + norm.logpdf(amplitude, 0.0, _STRAY_SIZE)
-    apart, alike = [], []
-    for own, varied in product(_CHANNEL, _VARIED):
-        spread = np.sqrt(variance + (own / size) ** 2)
-        one, other = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
+    two_signs, one_sign = [], []
+    for channel, varied in product(_CHANNEL, _VARIED):
+        spread = np.sqrt(variance + (channel / size) ** 2)
+        same, opposite = (_log_density(sign * usual * amplitude, spread, varied) for sign in (1, -1))
         mean = float(np.average(amplitude, weights=spread**-2))
-        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else one
-        either = np.logaddexp(np.log1p(-share) + one, np.log(share) + other)
-        prior = -0.5 * (own / _USUAL_CHANNEL) ** 2
-        apart.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
-        alike.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
-    return max(apart) - max(alike)
+        shifted = norm.logpdf(amplitude, mean, np.hypot(spread, varied)) if varied < 1 else same
+        either = np.logaddexp(np.log1p(-share) + same, np.log(share) + opposite)
+        prior = -0.5 * (channel / _USUAL_CHANNEL) ** 2
+        two_signs.append(prior + float(np.logaddexp(either + np.log1p(-_STRAY), stray).sum()))
+        one_sign.append(prior + float(np.logaddexp(shifted + np.log1p(-_STRAY), stray).sum()))
+    return max(two_signs) - max(one_sign)
 
 
 def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
@@ -435,54 +444,54 @@ def _log_density(amplitude: Floats, spread: Floats, varied: float) -> Floats:
     return np.asarray(ratio**2 / 2 - amplitude / size - np.log(size) + log_ndtr(amplitude / spread - ratio))
 
 
-def _orientation(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> tuple[int, float | None]:
+def _orientation(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> tuple[int, float | None]:
     """1 where the listed mechanisms explain the aligned course and not its conjugate, −1 where they explain that and
     neither an unlisted part nor a lag of the force channel explains the course itself, 0 where both may be; and that
     lag [µs] where it is the other explanation."""
-    course = _mean_course(entries, courses, signs)
-    phase = course.value.imag / np.hypot(course.deviation.imag, _STILL)
+    log_frf = _mean_log_frf(recordings, bands, signs)
+    phase = log_frf.value.imag / np.hypot(log_frf.deviation.imag, _STILL)
     if phase @ phase < len(phase) + _PLAIN:
         return 0, None
-    given, turned = misfit(course), misfit(course.conjugated)
+    given, turned = misfit(log_frf), misfit(log_frf.conjugated)
     if turned - given > _PLAIN:
         return 1, None
-    if given - turned <= _PLAIN or turned - unlisted_misfit(course) >= _RARER:
+    if given - turned <= _PLAIN or turned - unlisted_misfit(log_frf) >= _RARER:
         return 0, None
-    lead = leading(course)
+    lead = leading(log_frf)
     if turned - lead.misfit > _PLAIN:
         return 1, None
     return (-1, None) if lead.misfit - turned > _PLAIN else (0, lead.lag_us)
 
 
-def _mean_course(entries: Sequence[FrfRecording], courses: PhaseCourses, signs: Floats) -> Course:
+def _mean_log_frf(recordings: Sequence[FrfRecording], bands: LogFrfBands, signs: Floats) -> LogFrf:
     """The mean of the aligned courses; its deviation is the recordings' own noise, or their scatter if larger."""
-    aligned = np.where(signs[:, None] < 0, courses.value.conj(), courses.value)
-    known = np.isfinite(aligned) & np.isfinite(courses.deviation) & courses.followed
-    weight = np.where(known, courses.deviation, np.inf) ** -2.0
-    aligned = np.where(known, aligned, 0.0)
+    aligned = np.where(signs[:, None] < 0, bands.value.conj(), bands.value)
+    usable = np.isfinite(aligned) & np.isfinite(bands.deviation) & bands.followed
+    weight = np.where(usable, bands.deviation, np.inf) ** -2.0
+    aligned = np.where(usable, aligned, 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        own = total**-0.5
+        noise = total**-0.5
         mean = (weight * aligned).sum(axis=0) / total
-        parts = [np.sqrt((weight * part**2).sum(axis=0) / total / known.sum(axis=0)) for part in (
+        parts = [np.sqrt((weight * part**2).sum(axis=0) / total / usable.sum(axis=0)) for part in (
             (aligned - mean).real, (aligned - mean).imag)]  # fmt: skip
-    real, imaginary = (np.maximum(own, part) for part in parts)
+    real, imaginary = (np.maximum(noise, part) for part in parts)
     used = total > 0
-    natural = np.array([(entry.preload_n * entry.indenter_radius_mm) ** (1 / 6) for entry in entries])
+    natural = np.array([(recording.preload_n * recording.indenter_radius_mm) ** (1 / 6) for recording in recordings])
     spread = np.quantile(natural / np.median(natural), _QUANTILES)
-    return Course(courses.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
+    return LogFrf(bands.frequency[used], mean[used], (real + 1j * imaginary)[used], spread)
 
 
-def _phases(courses: PhaseCourses) -> tuple[Floats, Floats]:
+def _phases(bands: LogFrfBands) -> tuple[Floats, Floats]:
     """Phase and weight (recordings, bands) [rad, rad⁻²], 0 where there is none."""
-    known = np.isfinite(courses.value) & np.isfinite(courses.deviation) & courses.followed
-    phase = np.clip(np.where(known, courses.value, 0).imag, -_LARGEST, _LARGEST)
-    return phase, np.where(known, courses.deviation, np.inf) ** -2.0
+    usable = np.isfinite(bands.value) & np.isfinite(bands.deviation) & bands.followed
+    phase = np.clip(np.where(usable, bands.value, 0).imag, -_LARGEST, _LARGEST)
+    return phase, np.where(usable, bands.deviation, np.inf) ** -2.0
 
 
 def _leading_signs(phase: Floats, weight: Floats) -> Floats:
-    left, _, _ = np.linalg.svd(phase * np.sqrt(weight), full_matrices=False)
-    return np.where(left[:, 0] * np.sign(left[:, 0].sum() or 1.0) < 0, -1.0, 1.0)
+    vectors, _, _ = np.linalg.svd(phase * np.sqrt(weight), full_matrices=False)
+    return np.where(vectors[:, 0] * np.sign(vectors[:, 0].sum() or 1.0) < 0, -1.0, 1.0)
 
 
 def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
@@ -490,10 +499,10 @@ def _mean(phase: Floats, weight: Floats, signs: Floats) -> Floats:
     return np.asarray((signs[:, None] * weight * phase).sum(axis=0) / np.where(total > 0, total, 1.0))
 
 
-def _along(phase: Floats, weight: Floats, course: Floats) -> Floats:
-    return np.asarray((weight * phase * course).sum(axis=1))
+def _projection(phase: Floats, weight: Floats, mean_phase: Floats) -> Floats:
+    return np.asarray((weight * phase * mean_phase).sum(axis=1))
 
 
-def _conjugated(entry: FrfRecording) -> FrfRecording:
-    assert entry.frf_im_pc_per_n is not None
-    return replace(entry, frf_im_pc_per_n=-entry.frf_im_pc_per_n)
+def _conjugated(recording: FrfRecording) -> FrfRecording:
+    assert recording.frf_im_pc_per_n is not None
+    return replace(recording, frf_im_pc_per_n=-recording.frf_im_pc_per_n)

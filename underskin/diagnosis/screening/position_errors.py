@@ -21,42 +21,44 @@ _UNIT_FACTORS = (
 )
 _NEARER = 5.0
 _AT_SENSORS_MM = (1e-4, 0.01)  # no stage and no lab means such distances from a sensor
-_ALONE = 0.25  # of the recordings at most; more are no accident of single ones
+_MOST_SHARE = 0.25  # of the recordings at most; more are no accident of single ones
 
 Mask = NDArray[np.bool_]
 
 
-def misplaced(campaign: Campaign, entries: Sequence[FrfRecording]) -> tuple[Mask, list[Finding], list[Finding]]:
+def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Mask, list[Finding], list[Finding]]:
     """Which single recordings' places are 1000 × off, the findings on them, and the findings where many are off."""
-    own, place = _sensors_and_places(campaign, entries)
-    alone = np.zeros(len(entries), dtype=bool)
+    sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
+    mask = np.zeros(len(recordings), dtype=bool)
     single, shared = [], []
     for factor, least, unit, sensors_unit in _UNIT_FACTORS:
-        given, meant = (np.hypot(*(scale * place - own).T) for scale in (1.0, factor))
+        given, meant = (np.hypot(*(scale * contact_mm - sensor_mm).T) for scale in (1.0, factor))
         off = (given > least) & (_NEARER * meant < given)
         slip = {"too_small": factor > 1, "given_in": unit}
-        if off.sum() > _ALONE * len(entries):
+        if off.sum() > _MOST_SHARE * len(recordings):
             shared.append(Finding(Reason.PLACES, "", "position_mm", {**slip, "sensors_in": sensors_unit}))
             continue
         single += [
-            Finding(Reason.PLACE, entries[number].id, "position_mm", slip) for number in np.flatnonzero(off).tolist()
+            Finding(Reason.PLACE, recordings[number].id, "position_mm", slip) for number in np.flatnonzero(off).tolist()
         ]
-        alone |= off
-    return alone, single, shared
+        mask |= off
+    return mask, single, shared
 
 
-def at_sensors(campaign: Campaign, entries: Sequence[FrfRecording]) -> list[Finding]:
+def at_sensors(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
     """Places that differ from their sensors' by some µm at most: an offset series in m."""
-    own, place = _sensors_and_places(campaign, entries)
-    farthest = float(np.hypot(*(place - own).T).max())
+    sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
+    farthest = float(np.hypot(*(contact_mm - sensor_mm).T).max())
     if not _AT_SENSORS_MM[0] < farthest < _AT_SENSORS_MM[1]:
         return []
     return [Finding(Reason.PLACES_AT_SENSORS, "", "position_mm", {"farthest_mm": farthest})]
 
 
-def _sensors_and_places(campaign: Campaign, entries: Sequence[FrfRecording]) -> tuple[Floats, Floats]:
+def _sensors_and_places(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Floats, Floats]:
     """Of each recording [mm], (recordings, 2) each."""
-    known = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
-    own: Floats = np.array([known[entry.sensor] for entry in entries]).reshape(-1, 2)
-    place: Floats = np.array([entry.position_mm or known[entry.sensor] for entry in entries]).reshape(-1, 2)
-    return own, place
+    positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
+    sensor_mm: Floats = np.array([positions[recording.sensor] for recording in recordings]).reshape(-1, 2)
+    contact_mm: Floats = np.array(
+        [recording.position_mm or positions[recording.sensor] for recording in recordings]
+    ).reshape(-1, 2)
+    return sensor_mm, contact_mm

@@ -27,42 +27,44 @@ class Signs:
     findings: list[Finding]
 
 
-def signs_of(entries: Sequence[FrfRecording], turned: Floats, usable: Mask) -> Signs:
+def signs_of(recordings: Sequence[FrfRecording], turned: Floats, usable: Mask) -> Signs:
     """Those of recordings whose levels over the base model's are `turned`, NaN where that tells no sign."""
     negative = np.isfinite(turned) & (turned < 0) & usable
     positive = np.isfinite(turned) & (turned > 0) & usable
-    signs = np.ones(len(entries))
+    signs = np.ones(len(recordings))
     findings = []
     if negative.sum() > positive.sum():
         findings.append(Finding(Reason.ALL_REVERSED, "", "frf_re_pc_per_n"))
         signs[:] = -1.0
         negative, positive = positive, negative
-    whole = _whole_sensors(entries, negative, positive)
-    at_random = (negative & ~_of(entries, whole)).sum() > _LISTED
-    for name in () if at_random else whole:
-        own = _of(entries, (name,))
+    sensors = _reversed_sensors(recordings, negative, positive)
+    at_random = (negative & ~_of(recordings, sensors)).sum() > _LISTED
+    for name in () if at_random else sensors:
+        of_sensor = _of(recordings, (name,))
         findings.append(Finding(Reason.SENSOR_REVERSED, "", "frf_re_pc_per_n", {"sensor": name}))
-        signs[own] *= -1.0
-        negative, positive = np.where(own, positive, negative), np.where(own, negative, positive)
+        signs[of_sensor] *= -1.0
+        negative, positive = np.where(of_sensor, positive, negative), np.where(of_sensor, negative, positive)
     few = negative.sum() <= max(_FEW * positive.sum(), 1) and positive.sum() > 1
     if not negative.any() or not (few or _plain(turned, negative, positive)):
         return Signs(signs, findings)
     signs[negative] *= -1.0
-    ids = [entries[number].id for number in np.flatnonzero(negative).tolist()]
+    ids = [recordings[number].id for number in np.flatnonzero(negative).tolist()]
     if len(ids) <= _LISTED:
         findings += [Finding(Reason.RECORDING_REVERSED, name, "frf_re_pc_per_n") for name in ids]
         return Signs(signs, findings)
-    arguments = {"reversed_recordings": ids, "recordings": len(entries)}
+    arguments = {"reversed_recordings": ids, "recordings": len(recordings)}
     findings.append(Finding(Reason.RECORDINGS_REVERSED, "", "frf_re_pc_per_n", arguments))
     return Signs(np.where(negative | positive, signs, 0.0), findings)
 
 
-def _whole_sensors(entries: Sequence[FrfRecording], negative: Mask, positive: Mask) -> tuple[str, ...]:
+def _reversed_sensors(recordings: Sequence[FrfRecording], negative: Mask, positive: Mask) -> tuple[str, ...]:
     """The sensors with several reversed recordings and hardly another."""
-    names = dict.fromkeys(entry.sensor for entry in entries)
-    counts = {name: _of(entries, (name,)) for name in names}
+    names = dict.fromkeys(recording.sensor for recording in recordings)
+    counts = {name: _of(recordings, (name,)) for name in names}
     return tuple(
-        name for name, own in counts.items() if (negative & own).sum() > max(1.0, (positive & own).sum() / _FEW / 5)
+        name
+        for name, of_sensor in counts.items()
+        if (negative & of_sensor).sum() > max(1.0, (positive & of_sensor).sum() / _FEW / 5)
     )
 
 
@@ -73,5 +75,5 @@ def _plain(turned: Floats, negative: Mask, positive: Mask) -> bool:
     return bool(((size < _ALIKE) & (size > 1 / _ALIKE)).mean() >= _MOSTLY)
 
 
-def _of(entries: Sequence[FrfRecording], names: Sequence[str]) -> Mask:
-    return np.array([entry.sensor in names for entry in entries])
+def _of(recordings: Sequence[FrfRecording], names: Sequence[str]) -> Mask:
+    return np.array([recording.sensor in names for recording in recordings])

@@ -23,7 +23,7 @@ _COST = 2.0  # per ln of how many sensors there are: one that is tried, and one 
 
 
 @dataclass(frozen=True)
-class Alone:
+class OutlyingSensor:
     """Number of the sensor, the logarithm of its gain over the others', and by how much ln evidence gains on its
     cost."""
 
@@ -32,14 +32,14 @@ class Alone:
     gain: float
 
 
-def standing_alone(levels: Levels) -> Alone | None:
+def outlying_sensor(levels: Levels) -> OutlyingSensor | None:
     """The sensor that stands alone most plainly, None where none is plain."""
     numbers = np.unique(levels.sensor).tolist()
     if len(numbers) < _LEAST_SENSORS:
         return None
     base = levels.fit(levels.value)
-    own = max(numbers, key=lambda number: _plainness(base, levels, number))
-    column = (levels.sensor == own).astype(float)
+    outlier = max(numbers, key=lambda number: _plainness(base, levels, number))
+    column = (levels.sensor == outlier).astype(float)
     fit = levels.fit(levels.value, _AMPLITUDE * column[:, None])
     gain = fit.evidence - base.evidence - _COST * log(len(numbers))
     if gain < _GAIN:
@@ -48,20 +48,27 @@ def standing_alone(levels: Levels) -> Alone | None:
     if abs(amplitude) < _LEAST:
         return None
     rivals = [levels.fit(levels.value, smooth_along(axis)).evidence for axis in levels.axes]
-    return Alone(own, amplitude, gain) if fit.evidence > max(rivals, default=-np.inf) + _OVER_RIVALS else None
+    return (
+        OutlyingSensor(outlier, amplitude, gain) if fit.evidence > max(rivals, default=-np.inf) + _OVER_RIVALS else None
+    )
 
 
-def at_the_others(entries: Sequence[FrfRecording], levels: Levels, found: Alone) -> tuple[list[FrfRecording], Finding]:
+def without_sensor_gain(
+    recordings: Sequence[FrfRecording], levels: Levels, outlier: OutlyingSensor
+) -> tuple[list[FrfRecording], Finding]:
     """The recordings with those of the sensor at the others' level, and the finding on it."""
-    first = int(levels.number[levels.sensor == found.sensor][0])
-    name = entries[first].sensor
-    scaled = [_times(entry, exp(-found.amplitude)) if entry.sensor == name else entry for entry in entries]
+    first = int(levels.number[levels.sensor == outlier.sensor][0])
+    name = recordings[first].sensor
+    scaled = [
+        _times(recording, exp(-outlier.amplitude)) if recording.sensor == name else recording
+        for recording in recordings
+    ]
     arguments = {
         "sensor": name,
-        "share": exp(found.amplitude),
-        "recordings": sum(one.sensor == name for one in entries),
+        "share": exp(outlier.amplitude),
+        "recordings": sum(recording.sensor == name for recording in recordings),
     }
-    reason = Reason.SENSOR_WEAKER if found.amplitude < 0 else Reason.SENSOR_STRONGER
+    reason = Reason.SENSOR_WEAKER if outlier.amplitude < 0 else Reason.SENSOR_STRONGER
     return scaled, Finding(reason, "", "frf_re_pc_per_n", arguments)
 
 
@@ -70,8 +77,8 @@ def _plainness(base: LevelFit, levels: Levels, number: int) -> float:
     return abs(amplitude) / deviation
 
 
-def _times(entry: FrfRecording, factor: float) -> FrfRecording:
-    assert entry.frf_re_pc_per_n is not None
-    assert entry.frf_im_pc_per_n is not None
-    real, imaginary = factor * entry.frf_re_pc_per_n, factor * entry.frf_im_pc_per_n
-    return replace(entry, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)
+def _times(recording: FrfRecording, factor: float) -> FrfRecording:
+    assert recording.frf_re_pc_per_n is not None
+    assert recording.frf_im_pc_per_n is not None
+    real, imaginary = factor * recording.frf_re_pc_per_n, factor * recording.frf_im_pc_per_n
+    return replace(recording, frf_re_pc_per_n=real, frf_im_pc_per_n=imaginary)

@@ -18,30 +18,30 @@ from underskin.recordings.campaign import FrfRecording
 _FEWEST = 2  # silent recordings of each of them
 
 
-def without_silent_pair(entries: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
+def without_silent_pair(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
     """The recordings without those since two sensors show no response, and the finding on it."""
-    since = _silent_since(entries)
+    since = _silent_since(recordings)
     if not since:
-        return list(entries), []
-    first, second = sorted({entries[number].sensor for number in since})
-    arguments = {"first": first, "second": second, "since": entries[since[0]].id, "recordings": len(since)}
-    left = [entry for number, entry in enumerate(entries) if number not in since]
-    return left, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
+        return list(recordings), []
+    first, second = sorted({recordings[number].sensor for number in since})
+    arguments = {"first": first, "second": second, "since": recordings[since[0]].id, "recordings": len(since)}
+    remaining = [recording for number, recording in enumerate(recordings) if number not in since]
+    return remaining, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
 
 
-def _silent_since(entries: Sequence[FrfRecording]) -> list[int]:
+def _silent_since(recordings: Sequence[FrfRecording]) -> list[int]:
     """The recordings, in time, of the two sensors that answer until some recording and never since, where others do;
     none where not two do so."""
-    silent, _ = no_response(aligned_lines(entries))
-    order = np.argsort(recording_order(entries), kind="stable").tolist()
+    silent, _ = no_response(aligned_lines(recordings))
+    order = np.argsort(recording_order(recordings), kind="stable").tolist()
     falling = set[str]()
-    for name in {entry.sensor for entry in entries}:
-        answers = [bool(~silent[number]) for number in order if entries[number].sensor == name]
+    for name in {recording.sensor for recording in recordings}:
+        answers = [bool(~silent[number]) for number in order if recordings[number].sensor == name]
         if answers[0] and not any(answers[-_FEWEST:]) and answers == sorted(answers, reverse=True):
             falling.add(name)
     if len(falling) != 2:
         return []
-    own = [number for number in order if entries[number].sensor in falling]
-    since = own[int((~silent[own]).sum()) :]
-    others = [number for number in order[order.index(since[0]) :] if number not in own]
+    of_pair = [number for number in order if recordings[number].sensor in falling]
+    since = of_pair[int((~silent[of_pair]).sum()) :]
+    others = [number for number in order[order.index(since[0]) :] if number not in of_pair]
     return since if silent[since].all() and others and not silent[others].any() else []

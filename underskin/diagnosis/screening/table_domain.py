@@ -27,46 +27,50 @@ Undo = Callable[[Campaign, float], Campaign]
 
 
 def within_tables(
-    campaign: Campaign, entries: list[FrfRecording], model: Model, table: SigmaTable, kept: Collection[str] | None
+    campaign: Campaign,
+    recordings: list[FrfRecording],
+    model: Model,
+    table: SigmaTable,
+    keep_ids: Collection[str] | None,
 ) -> tuple[Mask, Mask, list[Finding]]:
     """Which contacts lie within the tables as declared, which others are kept, and the findings on the rest.
 
     `kept` are the recordings whose contacts are known to lie within the tables; None: where a plausible modulus brings
     them there. Where none lies within as declared, that modulus must bring most of them there.
     """
-    inside = _inside(model, len(entries))
-    whole = replace(campaign, recordings=tuple(entries))
-    beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(whole, table)
+    inside = _inside(model, len(recordings))
+    subset = replace(campaign, recordings=tuple(recordings))
+    beyond = np.zeros_like(inside) if inside.all() else ~inside & _inside_where_stiffest(subset, table)
     if not inside.any() and beyond.mean() <= _ENOUGH:
         beyond[:] = False
     if_stiffer = beyond.copy()
-    if kept is not None:
-        beyond &= [entry.id in kept for entry in entries]
+    if keep_ids is not None:
+        beyond &= [recording.id in keep_ids for recording in recordings]
     skin = campaign.skin
     assert skin.thickness_mm is not None
     assert skin.youngs_modulus_mpa is not None
-    force = np.array([entry.preload_n for entry in entries])
-    sphere = to_si("indenter_radius_mm", [entry.indenter_radius_mm for entry in entries])
+    force = np.array([recording.preload_n for recording in recordings])
+    sphere = to_si("indenter_radius_mm", [recording.indenter_radius_mm for recording in recordings])
     modulus = float(to_si("youngs_modulus_mpa", skin.youngs_modulus_mpa))
     radius_mm = 1e3 * hertz.contact_radius(force, sphere, modulus, skin.poisson_ratio)
     if not (inside | beyond).any():
         ratios = radius_mm / skin.thickness_mm
         arguments = {"smallest": float(ratios.min()), "largest": float(ratios.max())}
         none_inside = Finding(Reason.NO_CONTACT_WITHIN_TABLES, "", "skin.thickness_mm", arguments)
-        return inside, beyond, [none_inside, *_possible_unit_errors(whole, table)]
+        return inside, beyond, [none_inside, *_possible_unit_errors(subset, table)]
     stiffer = {"declared_mpa": skin.youngs_modulus_mpa, "factor": LARGEST_FACTOR}
-    left_out = [
-        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, entries[number].id, "preload_n", stiffer)
+    exclusions = [
+        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, recordings[number].id, "preload_n", stiffer)
         if if_stiffer[number]
         else Finding(
             Reason.OUT_OF_TABLES_DECLARED,
-            entries[number].id,
+            recordings[number].id,
             "preload_n",
             {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
         )
         for number in np.flatnonzero(~(inside | beyond))
     ]
-    return inside, beyond, left_out
+    return inside, beyond, exclusions
 
 
 def _inside(model: Model, recordings: int) -> Mask:
@@ -98,7 +102,7 @@ def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding
 
 def _recordings_times(name: str) -> Undo:
     def times(campaign: Campaign, factor: float) -> Campaign:
-        changed = (replace(entry, **{name: factor * getattr(entry, name)}) for entry in campaign.recordings)
+        changed = (replace(recording, **{name: factor * getattr(recording, name)}) for recording in campaign.recordings)
         return replace(campaign, recordings=tuple(changed))
 
     return times

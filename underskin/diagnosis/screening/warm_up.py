@@ -48,17 +48,21 @@ def warming(levels: Levels, causes: Sequence[Cause]) -> WarmUp | None:
     if len(levels.value) < _LEAST or not times:
         return None
     drifts = [np.zeros(len(levels.value)), *(_drift(levels, time) for time in times)]
-    found = explained(levels, causes, _AMPLITUDE * np.array(drifts)[:, :, None])
-    best = int(np.argmax(found.evidence[1:]))
-    evidence, amplitude = float(found.evidence[1 + best]), _AMPLITUDE * float(found.coefficient[1 + best, 0])
-    gain = evidence - float(found.evidence[0])
+    posterior = explained(levels, causes, _AMPLITUDE * np.array(drifts)[:, :, None])
+    best = int(np.argmax(posterior.evidence[1:]))
+    evidence, amplitude = float(posterior.evidence[1 + best]), _AMPLITUDE * float(posterior.coefficient[1 + best, 0])
+    gain = evidence - float(posterior.evidence[0])
     if gain < _GAIN or abs(amplitude) < _LEAST_AMPLITUDE:
         return None
     first, *steps = _steps(levels)
     slower = [_drift(levels, times[-1] * longer) for longer in _SLOWER]
     ageing = _ageing(levels.cycles) if amplitude > 0 and levels.cycles is not None else []
-    rivals = [(first, _OVER_FIRST), *((step, _OVER_STEP) for step in steps), *((one, _OVER_SLOWER) for one in slower)]
-    rivals += [(one, _OVER_AGEING) for one in ageing]
+    rivals = [
+        (first, _OVER_FIRST),
+        *((step, _OVER_STEP) for step in steps),
+        *((column, _OVER_SLOWER) for column in slower),
+    ]
+    rivals += [(column, _OVER_AGEING) for column in ageing]
     rivals += _sensor_step(levels)
     columns, over = zip(*rivals, strict=True)
     needed = explained(levels, causes, _AMPLITUDE * np.array(columns)[:, :, None]).evidence + over
@@ -68,13 +72,13 @@ def warming(levels: Levels, causes: Sequence[Cause]) -> WarmUp | None:
     return WarmUp(times[best], amplitude, gain) if evidence > needed.max() else None
 
 
-def without_first(entries: Sequence[FrfRecording], found: WarmUp) -> tuple[list[FrfRecording], Finding]:
+def without_first(recordings: Sequence[FrfRecording], warm_up: WarmUp) -> tuple[list[FrfRecording], Finding]:
     """The recordings after the warm-up, and the finding on it."""
-    last = min(found.time * np.log(max(abs(found.amplitude) / _OVER, 1.0)), _MOST_SHARE * len(entries))
-    late = recording_order(entries) > last
-    arguments = {"percent": 100 * float(np.exp(-found.amplitude) - 1), "recordings": int((~late).sum())}
-    kept = [entry for entry, chosen in zip(entries, late, strict=True) if chosen]
-    return kept, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
+    last = min(warm_up.time * np.log(max(abs(warm_up.amplitude) / _OVER, 1.0)), _MOST_SHARE * len(recordings))
+    late = recording_order(recordings) > last
+    arguments = {"percent": 100 * float(np.exp(-warm_up.amplitude) - 1), "recordings": int((~late).sum())}
+    remaining = [recording for recording, chosen in zip(recordings, late, strict=True) if chosen]
+    return remaining, Finding(Reason.WARM_UP, "", "recorded_at", arguments)
 
 
 def _steps(levels: Levels) -> list[Floats]:

@@ -90,27 +90,27 @@ def _report(
         ordered.append(campaign if counted else with_curves(campaign, of_curves))
         results.append(diagnose(ordered[-1], table, without=without))
         progress((number + 1) / (len(with_frf) + 1))
-    alone = [_standing_alone(result) for result in results]
-    results = _with_changed_sensors(ordered, results, alone, table, without)
+    outliers = [_outlying_sensors(result) for result in results]
+    results = _with_changed_sensors(ordered, results, outliers, table, without)
     reports = [reported(result) for result in results]
     usable = [number for number, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = (own.document for number, own in enumerate(reports) if number not in usable)
+        lacking = (report.document for number, report in enumerate(reports) if number not in usable)
         return next(lacking, reports[0].document)
     dated = CampaignDates([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
-    return together_report(name, ordered, results, reports, usable, dated, alone, table)
+    return together_report(name, ordered, results, reports, usable, dated, outliers, table)
 
 
 def _with_changed_sensors(
     campaigns: Sequence[Campaign],
     results: Sequence[DiagnosisResult],
-    alone: Sequence[frozenset[str]],
+    outliers: Sequence[frozenset[str]],
     table: SigmaTable,
     without: Collection[str],
 ) -> list[DiagnosisResult]:
     """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
-    apart = [_apart(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
-    single = changes(apart, alone, [0.0] * len(apart), np.arange(len(apart), dtype=float))
+    sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
+    single = changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
     again = []
     for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
         as_before = corrected(campaign, single, number)
@@ -118,19 +118,19 @@ def _with_changed_sensors(
     return again
 
 
-def _standing_alone(result: DiagnosisResult) -> frozenset[str]:
+def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
     reasons = (Reason.SENSOR_WEAKER, Reason.SENSOR_STRONGER)
     return frozenset(str(finding.arguments["sensor"]) for finding in result.findings if finding.reason in reasons)
 
 
-def _apart(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
+def _sensors(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
     """The sensors under the answer of the campaign alone, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
-    strengths: Values = {} if leader is None else {name: _of_one(leader, name) for name in leader.names}
+    strengths: Values = {} if leader is None else {name: _strengths_of(leader, name) for name in leader.names}
     return sensors_of(campaign, strengths, table, used_recordings(result))
 
 
-def _of_one(explanation: Explanation, name: str) -> dict[str, float]:
+def _strengths_of(explanation: Explanation, name: str) -> dict[str, float]:
     shared = Shared.of(explanation, [name], skin=False)
     return values(shared.parameters, shared.mean)
 
@@ -139,26 +139,32 @@ def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaig
     """Those with FRFs, and those of curves alone."""
     parts: tuple[list[Campaign], list[Campaign]] = ([], [])
     for campaign in campaigns:
-        parts[not any(isinstance(one, FrfRecording) for one in campaign.recordings)].append(campaign)
+        parts[not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)].append(campaign)
     return parts
 
 
 def with_curves(campaign: Campaign, of_curves: Sequence[Campaign]) -> Campaign:
     """The campaign with the curves of others of its skin, each called by its own campaign's name."""
-    curves = [replace(entry, id=f"{other.name}: {entry.id}") for other in of_curves for entry in other.recordings]
+    curves = [replace(curve, id=f"{other.name}: {curve.id}") for other in of_curves for curve in other.recordings]
     return replace(campaign, recordings=(*campaign.recordings, *curves)) if curves else campaign
 
 
 def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaign]:
     """The campaigns without curves that an earlier one, or one `seen` before, has number for number: a block that was
     joined to the FRFs of two dates is one measurement."""
-    found = []
+    distinct = []
     for campaign in campaigns:
-        curves = {one.id: _curve(one) for one in campaign.recordings if not isinstance(one, FrfRecording)}
-        kept = tuple(one for one in campaign.recordings if curves.get(one.id) not in seen)
-        found.append(replace(campaign, recordings=kept) if len(kept) < len(campaign.recordings) else campaign)
+        curves = {
+            recording.id: _curve(recording)
+            for recording in campaign.recordings
+            if not isinstance(recording, FrfRecording)
+        }
+        remaining = tuple(recording for recording in campaign.recordings if curves.get(recording.id) not in seen)
+        distinct.append(
+            replace(campaign, recordings=remaining) if len(remaining) < len(campaign.recordings) else campaign
+        )
         seen |= set(curves.values())
-    return found
+    return distinct
 
 
 def _curve(recording: CurveRecording) -> bytes:
@@ -169,18 +175,18 @@ def refuse_copies(campaigns: Sequence[Campaign]) -> None:
     """Raise InvalidInput where an FRF is in two campaigns, number for number: it would count twice."""
     owners: dict[bytes, str] = {}
     for campaign in campaigns:
-        for place, recording in enumerate(campaign.recordings):
+        for index, recording in enumerate(campaign.recordings):
             if not isinstance(recording, FrfRecording):
                 continue
             owner = owners.setdefault(_measured(recording), campaign.name)
             if owner != campaign.name:
                 allowed = f"must not hold the same numbers as a recording of {owner}: it would count twice"
-                raise InvalidInput(f"{campaign.name}: recordings[{place}]", recording.sensor, allowed)
+                raise InvalidInput(f"{campaign.name}: recordings[{index}]", recording.sensor, allowed)
 
 
 def _measured(recording: FrfRecording) -> bytes:
     series = (recording.frf_re_pc_per_n, recording.frf_im_pc_per_n, recording.force_n, recording.charge_pc)
-    return b"".join(b"-" if one is None else one.tobytes() for one in series)
+    return b"".join(b"-" if column is None else column.tobytes() for column in series)
 
 
 def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
