@@ -1,4 +1,4 @@
-"""What the rig can do, as the user says or as the campaign did, and the recordings that this allows."""
+"""What the rig can do, given by the user or inferred from the campaign, and the recordings within these limits."""
 
 import itertools
 import math
@@ -12,17 +12,17 @@ from underskin.errors import out_of_range
 from underskin.recordings.campaign import Conditions, FrfConditions, frf_of, offsets
 
 MOST_RECORDINGS = 8
-_FURTHER = 1.25  # beyond the highest preload used
+_FURTHER = 1.25  # times the highest preload used
 _PRELOADS = 8
-# Than the campaign's largest dynamic force and longest dwell, where no more is known
+# Times the campaign's largest dynamic force and longest dwell, where limits are not given
 _LOUDER, _LONGER = (3.0, 10.0), 10.0
 
 
 @dataclass(frozen=True)
 class RigLimits:
-    """What the rig can do, in lab units; what is left None is inferred from the campaign.
+    """The limits of the rig, in lab units; fields that are None are inferred from the campaign.
 
-    Raises InvalidInput where no rig could: a force, a radius or a count not above zero, a distance or a time below it.
+    Raises InvalidInput for a force, a radius or a count not above zero, or a distance or a time below zero.
     """
 
     preload_n: tuple[float, float] | None = None
@@ -48,7 +48,7 @@ class RigLimits:
 
     @property
     def given(self) -> bool:
-        """Whether the user said anything of what the rig can do."""
+        """Whether the user gave any limit."""
         return any(
             value is not None
             for value in (self.preload_n, self.indenter_radius_mm, self.dynamic_force_n, self.dwell_s, self.offset_mm)
@@ -56,8 +56,8 @@ class RigLimits:
 
 
 def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
-    """The limits, those left open as the campaign did it: its spheres, amplitudes, dwells and distances from the
-    sensor, its preloads and a quarter beyond the highest."""
+    """The limits with missing ones from the campaign: its spheres, dynamic forces, dwells and distances from the
+    sensor, and its preloads up to a quarter beyond the highest."""
     recordings = frf_of(conditions)
     preloads = [recording.preload_n for recording in recordings]
     distances = np.round(1e3 * np.hypot(*offsets(conditions).T), 1)
@@ -74,8 +74,8 @@ def inferred(conditions: Conditions, limits: RigLimits) -> RigLimits:
 
 
 def wider(conditions: Conditions, limits: RigLimits) -> RigLimits:
-    """Inferred limits with what most rigs can do besides: a larger dynamic force, a longer dwell, half and all of the
-    thickness beside the sensor."""
+    """Inferred limits widened to what most rigs can do: larger dynamic forces, a longer dwell, and contacts at half and
+    at one thickness from the sensor."""
     thickness = conditions.skin.thickness_mm
     assert thickness is not None
     assert limits.dynamic_force_n is not None

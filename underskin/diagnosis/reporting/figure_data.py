@@ -1,21 +1,13 @@
-"""The numbers behind the figures of a report.
+"""Numbers behind the figures of a diagnosis, thinned to what a reader can resolve.
 
-What the figure of a curve shows: its samples, what two explanations predict of it, and the marks on its course.
-
-Forces are less the zero that the samples in the air tell. Predicted ones are what the cell would show of the law's: the
-fit grants it the rest of a zero, a drift and a gain, of each curve its own. What leaves more so than by plain least
-squares, by which the report says what it leaves, is drawn by those: weighed by noise that has to hold all that it
-lacks, it may lie far from every sample.
-
-What the figure of FRFs shows of each recording: its lines, what two explanations predict of them, and the noise.
-
-A prediction holds the gain that the fit found of the sensor, but neither gain nor place of the single recording: how
-far these two shift all of its lines is part of the noise, as is the noise of each line.
-
-What the figures of a diagnosis show: measured and predicted responses, thinned to a number that an eye can read.
-
-A point is one recording, or one recording at some neighbouring lines where the misfit or its explanation runs along the
-lines. Its values are means weighted with 1/variance.
+- Curves: samples, two predictions, contact points and jumps. Forces are relative to the zero in the air. A prediction
+  is what the cell would show: zero offset, drift and gain are fitted per curve. Where it leaves more of the force than
+  plain least squares do, the least-squares fit is drawn, whose residual the report quotes: a fit weighted with a noise
+  that includes the model's defects may lie far from every sample.
+- FRFs: lines, two predictions and the noise of each recording. A prediction holds the fitted gain of the sensor, but
+  neither gain nor position error of the single recording; these count as noise.
+- Maps and scatter plots: a point is one recording, or one recording over some neighbouring lines where the misfit or
+  its explanation depends on the line. Values are means weighted with 1/variance.
 """
 
 from collections.abc import Iterable, Sequence
@@ -35,14 +27,14 @@ from underskin.recordings.campaign import Campaign, CurveRecording, FrfRecording
 from underskin.recordings.curve_course import course
 from underskin.units import Array, Complexes, Floats, Indices, readable_unit
 
-MOST_SAMPLES = 600  # of a curve
-_MORE = 1.1  # times what plain least squares leave
-_SAMPLES_NEAR_CORNER = 12  # samples on either side of a jump or of the deepest one, all of which are shown
+MOST_SAMPLES = 600  # drawn of a curve
+_MORE = 1.1  # times the residual of plain least squares
+_SAMPLES_NEAR_CORNER = 12  # on either side of a jump or of the deepest sample, all drawn
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A place on a curve."""
+    """A point of a curve."""
 
     displacement_mm: float
     force_n: float
@@ -50,8 +42,8 @@ class Mark:
 
 @dataclass(frozen=True)
 class CurvePrediction:
-    """Of one curve by one explanation: the force of its rows (rows,), the standard deviation about it that noise and
-    the errors that neighbouring samples share leave (rows,), and where contact begins."""
+    """One explanation's prediction of one curve: force (rows,), its standard deviation (rows,) from noise and from
+    errors that neighbouring samples share, and the contact point."""
 
     force_n: Floats
     deviation_n: Floats
@@ -60,10 +52,10 @@ class CurvePrediction:
 
 @dataclass(frozen=True)
 class ShownCurve:
-    """One recording: those of its `count` samples that are shown (shown,), and the means that were fitted (rows,).
+    """One recording: the drawn samples (shown,) of its `count`, and the means that were fitted (rows,).
 
-    `snap_in` is the first sample in contact after that jump, `pull_off` the last one before that; None where no jump
-    was found.
+    `snap_in` is the first sample in contact after the jump, `pull_off` the last one before its jump; None where there
+    is no jump.
     """
 
     name: str
@@ -79,7 +71,7 @@ class ShownCurve:
 
     @property
     def misfit_percent(self) -> float:
-        """100 √(Σ|y − m|²/Σ|y|²) of the explanation after."""
+        """100 √(Σ|y − m|²/Σ|y|²) under the explanation after."""
         size = float(np.linalg.norm(self.force_n))
         return 100 * float(np.linalg.norm(self.force_n - self.after.force_n)) / size if size else 0.0
 
@@ -87,7 +79,7 @@ class ShownCurve:
 def shown_curves(
     problem: FittingProblem, recorded: Campaign, before: Explanation, after: Explanation
 ) -> list[ShownCurve]:
-    """Every curve that was fitted, the worst explained one first; `recorded` holds them with all their samples."""
+    """All fitted curves, the worst explained first; `recorded` holds them with every sample."""
     raw = {
         recording.id: recording
         for recording in recorded.recordings
@@ -103,8 +95,10 @@ def shown_curves(
 
 
 def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Floats) -> tuple[Floats, Floats] | None:
-    """Of indentations of which an explanation's most probable `reading` (rows,) [N] leaves more than plain least
-    squares do: the fit (parameters,) by these, and what the cells would show by it (rows,) [N]; else None."""
+    """The least-squares fit (parameters,) of indentations and the cells' reading under it (rows,) [N].
+
+    None for other kinds, and where the explanation's most probable `reading` (rows,) [N] leaves no larger residual.
+    """
     if problem.kind != "indentation":
         return None
     fit, _ = explanation.least_squares
@@ -115,7 +109,7 @@ def plain_reading(problem: FittingProblem, explanation: Explanation, reading: Fl
 
 
 def _predictions(problem: FittingProblem, explanation: Explanation) -> list[CurvePrediction]:
-    """Of each curve."""
+    """The prediction of each curve."""
     lines, fit = problem.lines, explanation.point.fit
     force = explanation.model.predict(fit).value.real
     cell = cell_response(lines, explanation.best.levels, force)
@@ -128,7 +122,7 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
     for recording, span in zip(lines.campaign.recordings, lines.spans, strict=True):
         assert isinstance(recording, CurveRecording)
         contact = float(fit[parameter_index(explanation, f"contact_point {recording.id}")])
-        # What the cell shows in the air just before, a drift included, whatever describes it
+        # The cell's reading in the air just before contact, including any drift
         in_air = np.flatnonzero(recording.displacement_mm[: int(recording.displacement_mm.argmax()) + 1] <= contact)
         shown = reading[span][in_air[-1]] if len(in_air) else cell.offset[span][0]
         predicted.append(CurvePrediction(reading[span], deviation[span], Mark(contact, float(shown))))
@@ -136,7 +130,8 @@ def _predictions(problem: FittingProblem, explanation: Explanation) -> list[Curv
 
 
 def _deviation(problem: FittingProblem, explanation: Explanation, cell: CellResponse) -> Floats:
-    """Of each row about what the cells show (rows,) [N]: less than the noise, for zero, drift and gain were fitted."""
+    """Standard deviation of each row about the cells' reading (rows,) [N]: less than the noise, since zero, drift and
+    gain are fitted."""
     lines, levels = problem.lines, explanation.best.levels
     assert lines.smooth is not None
     shared = [
@@ -174,8 +169,7 @@ def _shown(
 
 
 def _thinned(way: Floats, corners: list[int]) -> Indices:
-    """Which samples are shown of those that lie so far along a curve, 0 to 1: as evenly as they lie, and all beside
-    corners."""
+    """Indices of the samples drawn: even in the arc length `way` (0 to 1), and all near the corners."""
     count = len(way)
     if count <= MOST_SAMPLES:
         return np.arange(count)
@@ -187,16 +181,16 @@ def _thinned(way: Floats, corners: list[int]) -> Indices:
 
 
 MOST_RECORDINGS = 120
-_FEWEST_LINES, _MOST_LINES = 40, 160  # of a recording
-_MOST_FRF_POINTS = 6000  # of all together
+_FEWEST_LINES, _MOST_LINES = 40, 160  # drawn of a recording
+_MOST_FRF_POINTS = 6000  # drawn of all recordings
 _PC_PER_C = 1e12
 
 
 @dataclass(frozen=True)
 class ShownFrf:
-    """One recording: those of its `count` lines that are shown (shown,); responses in pC/N.
+    """One recording: the drawn lines (shown,) of its `count`; responses in pC/N.
 
-    `deviation` (2, shown): the noise's standard deviation about the explanation after, of real and imaginary part.
+    `deviation` (2, shown): standard deviation of the noise about the explanation after, of real and imaginary part.
     `misfit_before`, `misfit_after`: 100 √(Σ|y − m|²/Σ|m|²) over all its lines.
     """
 
@@ -215,8 +209,8 @@ class ShownFrf:
 
 
 def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation) -> list[ShownFrf]:
-    """The recordings that were fitted, the one that is explained worst after first; of very many those explained worst,
-    of each sensor as many as of another."""
+    """The fitted recordings, the one with the largest misfit after first; at most `MOST_RECORDINGS`, those with the
+    largest misfit, equally many of each sensor."""
     lines = problem.lines
     measured, predicted_before, predicted_after = (
         _PC_PER_C * rows
@@ -254,7 +248,7 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
 
 
 def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
-    """Of each row [C/N], with the sensors' gains and what scatter of the place does to the mean."""
+    """Prediction of each row [C/N], with the sensors' gains and the effect of position scatter on the mean."""
     lines, best = problem.lines, explanation.best
     gain = best.sensor_gains[lines.sensor] + 0.5 * best.levels.position**2 * problem.curvature.laplacian
     predicted: Complexes = whole_prediction(problem, explanation) * np.exp(gain)[lines.recording]
@@ -262,8 +256,8 @@ def _predicted(problem: FittingProblem, explanation: Explanation) -> Complexes:
 
 
 def _frf_deviation(problem: FittingProblem, explanation: Explanation) -> Floats:
-    """Of real and imaginary part of each row about the prediction (2, rows) [C/N]: the lines' noise, mains pick-up, and
-    gain and place of the recording."""
+    """Standard deviation of real and imaginary part about the prediction (2, rows) [C/N]: noise of the lines, mains
+    pick-up, gain and position of the recording."""
     lines, best = problem.lines, explanation.best
     levels, predicted = best.levels, _predicted(problem, explanation)
     pickup = best.pickup_variance
@@ -282,7 +276,7 @@ def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
 
 
 def _worst(sensors: Sequence[str], misfits: Sequence[float]) -> list[int]:
-    """Which recordings are shown, in order."""
+    """Indices of the recordings shown, in order."""
     order = sorted(range(len(misfits)), key=lambda number: -misfits[number])
     if len(order) <= MOST_RECORDINGS:
         return order
@@ -295,7 +289,7 @@ def _worst(sensors: Sequence[str], misfits: Sequence[float]) -> list[int]:
 
 
 def _thinned_lines(frequency: Floats, most: int) -> Indices:
-    """Which of a recording's lines are shown, about evenly over the logarithm of frequency; `frequency` rises."""
+    """Indices of the lines shown, about even in the logarithm of `frequency`, which rises."""
     count = len(frequency)
     if count <= most:
         return np.arange(count)
@@ -308,34 +302,34 @@ AXES = {name: f"{words} [{unit}]" if unit else words for name, (words, unit) in 
 _TRAVEL = "displacement_mm"
 
 _MOST_POINTS = 600
-_LEAST_BINS = 8  # of the lines, so that a shape over them can be seen in campaigns of any size
+_LEAST_BINS = 8  # of the lines, so that a shape over them is visible in campaigns of any size
 _MOST_LEVELS = 24  # of an axis
 _MOST_OF_TRAVEL = 12  # of the displacement, whose labels are long
-_DIGITS, _DECIMALS = range(3, 10), range(7)  # of a label: as many as tell it from its neighbours
-_ALMOST_ALL = 0.9  # of the gaps between neighbouring lines that are no wider than a step
+_DIGITS, _DECIMALS = range(3, 10), range(7)  # tried for labels, until all differ
+_ALMOST_ALL = 0.9  # share of the gaps between neighbouring lines that are no wider than a step
 _SLACK = 1e-9  # of a step, for lines on its edge
-_SMALLEST = 0.05  # of the largest response: smaller ones are no scale for a residual
+_SMALLEST = 0.05  # of the largest response: the least scale of a residual
 
 
 @dataclass(frozen=True)
 class Points:
-    """Responses in pC/N, forces of curves in N; `deviation` without gain scatter, which is relative."""
+    """Responses [pC/N], or forces of curves [N]; `deviation` does not include gain scatter, which is relative."""
 
     recording: Indices  # (points,)
     measured: Complexes  # (points,)
     predicted: Complexes  # (points,)
     deviation: Floats  # (points,) of real and of imaginary part
-    gain: float  # sd of a recording's gain; that of its sensor is in what is predicted
+    gain: float  # standard deviation of a recording's gain; the sensor's gain is in `predicted`
 
     @property
     def residual_percent(self) -> Complexes:
-        """Measured less predicted over |predicted|, or over 5 % of the largest where that is less."""
+        """Measured minus predicted over |predicted|, or over 5 % of the largest where that is more."""
         size = np.abs(self.predicted)
         residual: Complexes = 100 * (self.measured - self.predicted) / np.maximum(size, _SMALLEST * size.max())
         return residual
 
     def times(self, factor: float) -> "Points":
-        """In a unit of which so many make the one that they are in."""
+        """The points in a unit that is `factor` times smaller."""
         return replace(
             self,
             measured=factor * self.measured,
@@ -345,7 +339,7 @@ class Points:
 
     @property
     def noise_percent(self) -> Floats:
-        """Its standard deviation over the same."""
+        """Standard deviation of the noise over the same scale."""
         size = np.abs(self.predicted)
         noise: Floats = 100 * np.hypot(self.deviation, self.gain * size) / np.maximum(size, _SMALLEST * size.max())
         return noise
@@ -353,8 +347,8 @@ class Points:
 
 @dataclass(frozen=True)
 class Levels:
-    """An axis in steps: of each point the step, of each step its name and the values that it holds; `title` says what
-    the names are."""
+    """An axis in steps: the step of each point, and the name and range of values of each step; `title` is that of the
+    axis."""
 
     step: Indices  # (points,)
     names: list[str]
@@ -364,10 +358,10 @@ class Levels:
 
 
 class Thinned:
-    """Which rows each point is the mean of."""
+    """The assignment of rows to points, each the weighted mean of its rows."""
 
     def __init__(self, diagnosis: DiagnosisResult, problem: FittingProblem, shown: Explanation) -> None:
-        """One point a recording unless region or explanation run along the lines."""
+        """One point per recording unless region or explanation depend on the line."""
         self.lines = lines = problem.lines
         self.problem = problem
         along = any(axis in diagnosis.region for axis in lines.row_axes)
@@ -383,7 +377,7 @@ class Thinned:
         self._total = np.bincount(self._point, self._weight)
 
     def points(self, explanation: Explanation) -> Points:
-        """Measured, and predicted by an explanation with the sensors' fitted gains."""
+        """Measured values, and an explanation's prediction with the sensors' fitted gains."""
         lines, best = self.lines, explanation.best
         levels = best.levels
         gains = np.exp(best.sensor_gains)[lines.sensor][lines.recording]
@@ -402,7 +396,7 @@ class Thinned:
         )
 
     def levels(self, axis: str) -> Levels | None:
-        """The axis in steps; None where all points lie at one."""
+        """The axis in steps; None where all points have the same value."""
         column = axis_values(self.lines, axis, True)
         assert column is not None
         if axis == "frequency_hz":
@@ -415,7 +409,7 @@ class Thinned:
         return Levels(step.reshape(-1), names.tolist(), names, names, AXES[axis]) if len(names) > 1 else None
 
     def _of_lines(self, frequency: Floats) -> Levels | None:
-        """The steps that all recordings have in common, neighbouring ones together where they are too many."""
+        """The steps common to all recordings, neighbours merged where there are too many."""
         distinct, step = np.unique(self._bin, return_inverse=True)
         steps = min(len(distinct), _MOST_LEVELS)
         if steps < 2:
@@ -428,11 +422,11 @@ class Thinned:
         return Levels(step, _distinct(np.sqrt(low * high), _DIGITS, fractional=False), low, high, AXES["frequency_hz"])
 
     def axes(self) -> list[str]:
-        """The axes that the points can be laid out along, those of the rows first."""
+        """The axes of the points, those of the rows first."""
         return [*self.lines.row_axes[: int(self.by_line)], *recording_axes(self.lines.campaign)]
 
     def _row_variance(self, explanation: Explanation) -> Floats:
-        """The variance from positioning and mains pick-up, of each row."""
+        """Variance from positioning, mains pick-up and shared errors of samples (rows,)."""
         prediction, levels = explanation.best.prediction, explanation.best.levels
         variance = np.zeros(len(prediction.value))
         if self.lines.smooth is not None:
@@ -452,15 +446,15 @@ class Thinned:
 
 
 def _steps_of_samples(coordinate: Floats, most: int) -> Indices:
-    """Steps of like counts of distinct places, of each sample (rows,)."""
+    """The step of each sample (rows,), with about equal numbers of distinct values of `coordinate`."""
     distinct, number = np.unique(np.round(coordinate, 6), return_inverse=True)
     steps: Indices = number.reshape(-1) * min(len(distinct), most) // len(distinct)
     return steps
 
 
 def _steps_of_lines(lines: Lines, most: int) -> Indices:
-    """Steps even in the logarithm of frequency, the same for all recordings, of each line (rows,): so wide that nearly
-    every recording has a line in each."""
+    """The step of each line (rows,): even in the logarithm of frequency, the same for all recordings, and so wide that
+    nearly every recording has a line in each."""
     positive = lines.frequency[lines.frequency > 0]
     log = np.log(np.maximum(lines.frequency, np.min(positive, initial=np.inf)))
     low, high = (log.min(), log.max()) if len(positive) else (0.0, 0.0)
@@ -472,8 +466,7 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
 
 
 def _stepped(column: Floats, axis: str) -> Levels:
-    """Its distinct values, or as many steps of like counts; a displacement is named in the unit in which it reads
-    well."""
+    """The distinct values of a column as steps, or steps of about equal counts; displacements in a readable unit."""
     distinct, number = np.unique(np.round(column, 6), return_inverse=True)
     steps = min(len(distinct), _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS)
     of_value = np.arange(len(distinct)) * steps // len(distinct)
@@ -488,7 +481,7 @@ def _stepped(column: Floats, axis: str) -> Levels:
 
 
 def _distinct(values: Floats, digits: Iterable[int], *, fractional: bool) -> list[str]:
-    """As labels that differ, of so few digits, or decimals, as suffice; never as a power of ten, nor -0."""
+    """Labels with the fewest digits, or decimals, for which they differ; never a power of ten, nor -0."""
     labels: list[str] = []
     for count in digits:
         rounded = [float(np.format_float_positional(value, count, fractional=fractional)) + 0.0 for value in values]

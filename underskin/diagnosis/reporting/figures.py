@@ -1,11 +1,8 @@
-"""The figures of reports.
+"""Figures of reports, as plotly objects in lab units.
 
-Figures of a diagnosis: where recordings and model differ, measured against predicted before and after, how probable
-each explanation is; those of single recordings and of parameters have files of their own. Maps have a scale from purple
-to orange, which colour-blind people tell apart; lab units.
-
-Figures of reports on several campaigns: d33 of each sensor from campaign to campaign, and what each skin of a fleet
-has beside the band of the population; from the report alone.
+Of one diagnosis: where recordings and model differ, measured against predicted before and after, and the probability
+of each explanation. Of several campaigns, from the report alone: d33 of each sensor over the campaigns, and each skin
+against the band of its population. Colour scales run from purple to orange, which colour-blind readers can tell apart.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -42,17 +39,17 @@ from underskin.recordings.campaign import Campaign
 from underskin.units import Floats, readable_unit
 
 _GREY = "#BBBBBB"
-_MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, that show their number
-_CELL = 10  # pixels, of those numbers: 7.5 points on paper
-_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters on a line; pixels of a letter and of a line
-_ABOVE_NOISE = 2.0  # times what 95 % of the noise stays in: as far the colours of a map reach at least
+_MOST_LABELLED, _MOST_ABREAST = 80, 12  # cells of a map, and of one of its rows, up to which numbers are shown
+_CELL = 10  # pixels, size of these numbers: 7.5 points on paper
+_TITLE, _TITLE_SIZE, _TITLE_LINE = 18, 12, 16  # of a panel: characters per line; pixels of a letter and of a line
+_ABOVE_NOISE = 2.0  # least end of a map's colour scale, over the 95 % interval of the noise
 _BAND = 60  # points along a band
-_LABEL = 24  # characters on a line of a label
-_EDGE = 0.04  # of what is shown: room at an axis' ends
+_LABEL = 24  # characters per line of a label
+_EDGE = 0.04  # of the range shown: margin at the ends of an axis
 
 
 def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name, those there are: where, frf or curve, before_after, explanations, parameters. `document`: its report."""
+    """The figures by name: where, frf or curve, before_after, explanations, parameters. `document`: the report."""
     if diagnosis.search is None or diagnosis.problem is None:
         return {}
     base = next(explanation for explanation in diagnosis.search.explanations if not explanation.names)
@@ -75,12 +72,12 @@ def figures(diagnosis: DiagnosisResult, document: Mapping[str, Any]) -> dict[str
 
 
 def _curve(problem: FittingProblem, recorded: Campaign, base: Explanation, shown: Explanation) -> go.Figure:
-    """Each curve with the model before and after; with one of them where nothing is added."""
+    """Each curve with the model before and after; with one model where nothing is added."""
     return curve_figure(shown_curves(problem, recorded, base, shown), problem.kind, *_models(problem, shown))
 
 
 def _models(problem: FittingProblem, shown: Explanation) -> tuple[str, str]:
-    """What the models before and after are called; before empty where nothing is added."""
+    """Names of the models before and after; before is empty where nothing is added."""
     simplest = SIMPLEST[problem.kind]
     return (simplest, _named(shown)) if shown.names else ("", f"{simplest}, nothing added")
 
@@ -115,7 +112,7 @@ def explanations(document: Mapping[str, Any]) -> go.Figure:
 
 
 def _in_lines(names: Sequence[str]) -> str:
-    """Mechanisms as an axis has room for them: as many on a line as are short."""
+    """Mechanisms broken into lines of at most `_LABEL` characters, where names are short enough."""
     lines: list[str] = []
     for name in names:
         if lines and len(lines[-1]) + len(name) <= _LABEL:
@@ -126,11 +123,11 @@ def _in_lines(names: Sequence[str]) -> str:
 
 
 def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points) -> go.Figure:
-    """Measured less the model to which nothing is added, over the located axes; the region outlined.
+    """Residual of the base model over the located axes, with the region outlined.
 
-    A cell is the mean over the points in it; out of phase where the misfit lies in the phase, as the title says. What
-    is within the noise is pale: that of what is stated, since the model alone takes its misfit for noise. `meta` of the
-    layout has what 95 % of it stays in [%].
+    A cell is the mean over its points; out of phase where the misfit lies in the phase, as the title says. Cells within
+    the noise are pale. The noise is that of the stated explanation, since the base model counts its misfit as noise;
+    `meta` of the layout has half its 95 % interval [%].
     """
     part, name = _part(diagnosis, before.residual_percent)
     which = "" if thinned.lines.curves else f", {name}"
@@ -177,7 +174,7 @@ def residual_map(diagnosis: DiagnosisResult, thinned: Thinned, before: Points, a
 
 
 def _percent_label(percent: float) -> str:
-    """A number of a cell with its sign; empty where there is none."""
+    """The signed number in a cell; empty for NaN."""
     if np.isnan(percent):
         return ""
     return f"{percent:+.0f}".replace("-", "−") if round(percent) else "0"
@@ -186,7 +183,7 @@ def _percent_label(percent: float) -> str:
 def before_and_after(
     diagnosis: DiagnosisResult, thinned: Thinned, before: Points, after: Points, shown: Explanation
 ) -> go.Figure:
-    """Measured against predicted, by the model alone and by what is stated, each with the band that noise allows."""
+    """Measured against predicted, by the base model and by the stated explanation, each with the band of the noise."""
     headings = f"before: {SIMPLEST[thinned.lines.kind]}", f"after: {_named(shown)}"
     titles = ["<br>".join(wrap(title, _TITLE)) for title in headings]
     figure = make_subplots(1, 2, subplot_titles=titles, horizontal_spacing=0.12)
@@ -207,9 +204,9 @@ def before_and_after(
     ):
         predicted, measured = (_part(diagnosis, column)[0] for column in (points.predicted, points.measured))
         along = np.linspace(predicted.min(), predicted.max(), _BAND)
-        # Where all predictions are alike the band would have no width along the abscissa.
+        # If all predictions were equal the band would have no width along the abscissa.
         along = along if np.ptp(along) > 0 else along + np.linspace(-1, 1, _BAND) * (np.abs(along).max() or 1.0) * 0.05
-        # That of what is stated in both: the model alone takes its misfit for noise.
+        # The noise of the stated explanation in both: the base model counts its misfit as noise.
         half = SDS_OF_95 * np.hypot(after.gain * along, float(np.median(after.deviation)))
         figure.add_scatter(
             x=[*along, *along[::-1]],
@@ -260,7 +257,7 @@ def _named(shown: Explanation) -> str:
 
 
 def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Floats, str]:
-    """The real part, or the imaginary where the misfit lies in the phase alone, and what it is called."""
+    """The real part, or the imaginary part where the misfit lies in the phase, and its name."""
     if diagnosis.problem is not None and diagnosis.problem.lines.curves:
         return column.real, "force"
     telling = [result for result in diagnosis.axes if result.p_value is not None and result.p_value < SIGNIFICANT]
@@ -271,7 +268,7 @@ def _part(diagnosis: DiagnosisResult, column: np.ndarray[Any, Any]) -> tuple[Flo
 
 
 def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None, str | None]:
-    """Those of the region, then the campaign's, as far as points differ along them; frequency lies on x."""
+    """The first two axes along which points differ, those of the region first; frequency is on x."""
     every = thinned.axes()
     candidates = [name for name in dict.fromkeys([*diagnosis.region, *every]) if name in every]
     varying: list[str | None] = [name for name in candidates if thinned.levels(name) is not None]
@@ -280,7 +277,7 @@ def _map_axes(diagnosis: DiagnosisResult, thinned: Thinned) -> tuple[str | None,
 
 
 def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tuple[float, float]:
-    """From where to where the region reaches on an axis of the map, whose steps are 0, 1, …"""
+    """Ends of the region on an axis of the map, whose steps are 0, 1, …"""
     ends = diagnosis.region.get(axis or "")
     if ends is None:
         return -0.5, len(levels.names) - 0.5
@@ -291,12 +288,12 @@ def _outline(diagnosis: DiagnosisResult, axis: str | None, levels: Levels) -> tu
 
 
 _MARKERS = ("circle", "square", "diamond", "cross", "triangle-up", "x")
-_SENSORS_WIDTH = 0.5  # of a campaign's place on the axis, over which its sensors lie side by side
+_SENSORS_WIDTH = 0.5  # of the distance between campaigns, over which the sensors of one are spread
 _ROW, _OF_SKIN = 130, 22  # height of a quantity, and of a skin in it [pixels]
 
 
 def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
-    """By name: sensors, population; those that the report has."""
+    """The figures of the report by name: sensors, population."""
     drawn = {}
     rows = (document["d33"] or {}).get("per_sensor")
     if rows:
@@ -307,9 +304,11 @@ def several_figures(document: Mapping[str, Any]) -> dict[str, go.Figure]:
 
 
 def sensors_over_campaigns(rows: Sequence[Mapping[str, Any]], names: Sequence[str]) -> go.Figure:
-    """d33 with its 95 % interval of each sensor in each campaign, sensors side by side; of many their median, the range
-    of most and, by name, those that stand apart. `rows` are those of `d33.per_sensor`, `names` all campaigns in their
-    order: one of which no d33 is told has its place too."""
+    """d33 with its 95 % interval of each sensor in each campaign; of many sensors the median, the range of 90 % and,
+    by name, the outliers.
+
+    `rows` are those of `d33.per_sensor`, `names` all campaigns in order, including those without d33.
+    """
     with_d33 = dict.fromkeys(row["campaign"] for row in rows)
     campaigns = list(dict.fromkeys([*names, *with_d33]))
     sensors = list(dict.fromkeys(row["sensor"] for row in rows))
@@ -347,7 +346,7 @@ def _by_sensor(
 
 
 def _summarised(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> Iterator[go.Scatter]:
-    """The median of each campaign's sensors with the range of 90 % of them, then those that stand apart."""
+    """The median of each campaign's sensors with the range of 90 % of them, then the outliers."""
     of_campaign = {
         number: campaign_rows
         for number, name in enumerate(campaigns)
@@ -390,8 +389,8 @@ def _summarised(rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str]) -> 
 
 
 def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
-    """Each quantity of each skin with its 95 % interval on the band of the population (95 %), those that depart in
-    another colour; `populations` is the report's `population`."""
+    """Each quantity of each skin with its 95 % interval on the 95 % band of the population, departing skins in another
+    colour; `populations` is the report's `population`."""
     titles = [
         capital(quantity_in_words(population["parameter"]))
         + ("" if population["unit"] == "-" else f" [{population['unit']}]")
@@ -428,7 +427,7 @@ def skins_in_populations(populations: Sequence[Mapping[str, Any]]) -> go.Figure:
 
 
 def _error_bars(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """The 95 % intervals of some rows as plotly has them: how far beside the value."""
+    """The 95 % intervals of rows as plotly's error bars: distances from the value."""
     return {
         "type": "data",
         "symmetric": False,

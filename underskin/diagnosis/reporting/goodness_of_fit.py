@@ -1,8 +1,7 @@
-"""How well the answer fits, what warns of it, and what each kind of recording adds.
+"""How well the answer fits, findings on the fit, and what each kind of recording contributes.
 
-How much better the recordings are described: errors before and after, in sample and on groups held out. Findings on the
-stated explanation itself: what in its fit should not be taken at face value. What each kind of recording told, and
-where they contradict each other, as a report has it.
+Errors before and after, in sample and on held-out groups; parameters at bounds, contacts beyond the tables and large
+noise as findings; Young's modulus by kind of recording, and contradictions between the kinds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,10 +42,10 @@ def explains_percent(
     name: str,
     score: cross_validation.PredictionScore,
 ) -> float | None:
-    """How much of the base model's misfit beyond noise comes back where the mechanism is left out of its set [%].
+    """Share of the base model's misfit beyond noise that returns where the mechanism is left out of its set [%].
 
-    None where the misfit without it is no larger than noise makes it: an effect that only many recordings together
-    tell. A mechanism that adds variance takes nothing away (see `_share_of_variance`).
+    None where the misfit without it is within noise: an effect that only many recordings together show. A mechanism
+    that adds variance reduces no misfit (see `_share_of_variance`).
     """
     mechanism_parameters = problem.lines.mechanisms[name].parameters(problem.lines.campaign, problem.kind)
     if any(parameter.acts_on == "line_variance" for parameter in mechanism_parameters):
@@ -69,7 +68,7 @@ def _relative_square(problem: FittingProblem, explanation: Explanation) -> float
 
 
 def _share_of_variance(explanation: Explanation) -> float:
-    """What mains pick-up is of the lines' variance where it acts: Σ q² · q²/(q² + n²) / Σ q², n a line's own noise."""
+    """Share of mains pick-up q in the lines' variance, Σ q² · q²/(q² + n²) / Σ q², n being a line's own noise."""
     best = explanation.best
     pickup = best.pickup_variance
     noise = (best.levels.level * best.hypothesis.lines.deviation) ** 2
@@ -79,7 +78,7 @@ def _share_of_variance(explanation: Explanation) -> float:
 def fit_summary(
     search: Search, problem: FittingProblem, groups: Sequence[cross_validation.HeldOut], explanation: Explanation
 ) -> dict[str, Any]:
-    """Errors before and after, held-out groups, the fitted noise, and of curves the modulus."""
+    """Errors before and after, held-out groups, the fitted noise, and the modulus of curves."""
     base = next(candidate for candidate in search.explanations if not candidate.names)
     inside = [cross_validation.in_sample(problem, candidate) for candidate in (base, explanation)]
     outside = cross_validation.total(groups)
@@ -101,7 +100,7 @@ def fit_summary(
         **parts,
         "mechanisms": [
             name for name in explanation.names if name in problem.lines.mechanisms.named
-        ],  # of `after`, also where something beyond them is unexplained
+        ],  # of `after`, also where a misfit beyond them is unexplained
         "noise_floor_percent": rounded(floor),
         "groups": [
             {
@@ -118,7 +117,7 @@ def fit_summary(
 
 
 def _plainly(problem: FittingProblem, name: str) -> str:
-    """A mechanism's name; of a law that nobody listed where it enters, what it follows, its form."""
+    """A mechanism's name; of an unlisted law the quantity it acts on, its axis and its form."""
     law = problem.lines.mechanisms[name]
     if not isinstance(law, UnlistedLaw):
         return name
@@ -126,19 +125,21 @@ def _plainly(problem: FittingProblem, name: str) -> str:
 
 
 def _least_squares(problem: FittingProblem, explanation: Explanation) -> dict[str, float | None]:
-    """Of indentations, what plain least squares of the same law leave [%], and their modulus [MPa]."""
+    """Of indentations, the residual of a plain least-squares fit of the same law [%], and its modulus [MPa]."""
     if problem.kind != "indentation":
         return {}
     fit, residual_percent = explanation.least_squares
     index = parameter_index(explanation, "youngs_modulus")
-    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # of which the parameter is a factor
+    declared = problem.lines.campaign.skin.youngs_modulus_mpa or 1.0  # the parameter is a factor on it
     modulus_mpa = declared * float(explanation.model.parameters[index].from_fit(float(fit[index])))
     return {"rmse_percent": rounded(residual_percent), "least_squares_modulus_mpa": rounded(modulus_mpa)}
 
 
 def modulus(problem: FittingProblem, explanation: Explanation) -> dict[str, Any]:
-    """Young's modulus under an explanation, with its 95 % interval, which allows for what an apparent modulus hides;
-    from factors on what was declared, or free."""
+    """Young's modulus under an explanation with its 95 % interval, from factors on the declared one, or free.
+
+    The interval allows for mechanisms that an apparent modulus may hide.
+    """
     mechanisms = problem.lines.mechanisms
     hiding = may_hide(mechanisms, problem.lines.campaign, mechanisms.named)
     return with_hidden(_apparent_modulus(problem, explanation), hidden_factors(hiding, explanation.names))
@@ -157,7 +158,7 @@ def _apparent_modulus(problem: FittingProblem, explanation: Explanation) -> dict
 
 
 def _product(explanation: Explanation, indices: Sequence[int]) -> dict[str, float | None]:
-    """Of parameters on a logarithmic scale, with the 95 % interval."""
+    """The product of parameters on a logarithmic scale, with its 95 % interval."""
     rows = [explanation.best.hypothesis.mean_places.index(index) for index in indices]
     middle = float(explanation.point.fit[list(indices)].sum())
     half = SDS_OF_95 * float(np.sqrt(explanation.best.covariance[np.ix_(rows, rows)].sum()))
@@ -176,13 +177,13 @@ def _noise(explanation: Explanation) -> dict[str, Any]:
     }
 
 
-# With depth, as a layer on a stiff base does
+# Mechanisms that stiffen the response with depth, as a layer on a stiff base does
 _STIFFENS = ("strain_stiffening", "compressible_layer", "layered_contact")
 
 
 def fit_warnings(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """Parameters at their bounds, recordings beyond the tables as found or as declared, noise that is larger than the
-    lines' own, and a thickness that only the curves tell."""
+    """Findings on the fit: parameters at bounds, contacts beyond the tables (fitted or declared), noise larger than the
+    lines' own, and a thickness inferred from curves alone."""
     findings = [
         *(bound.finding for bound in at_bounds(explanation)),
         *_beyond_tables(problem, explanation),
@@ -204,7 +205,7 @@ def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Fi
 
 
 def _within_fitted_tables(problem: FittingProblem, explanation: Explanation) -> list[Finding]:
-    """On contacts that lie within the tables as found, and beyond them as declared."""
+    """The finding on contacts that lie within the tables with the fitted modulus, and beyond them with the declared."""
     if problem.kind != "frf":
         return []
     best, skin = explanation.best, problem.lines.campaign.skin
@@ -254,8 +255,11 @@ _MODULUS_ERROR = "modulus_error"
 
 
 def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any]]:
-    """E by each kind alone, and from curves the parameters of their mechanisms under the leading set, or under what the
-    curves alone find where the kinds contradict each other; empty where there is one kind."""
+    """E by each kind alone, and the parameters of the curves' own mechanisms; empty where there is one kind.
+
+    The parameters are those under the leading set, or under the curves' own best set where the kinds contradict each
+    other.
+    """
     if joined.beside is None or joined.apart is None:
         return []
     rows = []
@@ -273,7 +277,7 @@ def by_kind(joined: KindsTogether, leading: Sequence[str]) -> list[dict[str, Any
 
 
 def _of_elastomer(modulus: Mapping[str, Any], curves: OfCurves) -> dict[str, Any]:
-    """With an interval that allows for what an apparent modulus hides, and for how the skin's may differ."""
+    """With an interval that allows for hidden mechanisms, and for a difference between block and skin."""
     return with_hidden(modulus, curves.hidden, curves.tolerance)
 
 
@@ -282,7 +286,7 @@ def _row(parameter: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _modulus_of_first_kind(joined: KindsTogether) -> dict[str, Any] | None:
-    """E as the recordings of the first kind alone have it; None where they do not ask for another than is declared."""
+    """E by the recordings of the first kind alone; None where their best set keeps the declared one."""
     assert joined.apart is not None
     declared = joined.problem.lines.campaign.skin.youngs_modulus_mpa
     leader = joined.apart.answers[0]
@@ -299,7 +303,7 @@ def _modulus_of_first_kind(joined: KindsTogether) -> dict[str, Any] | None:
 
 
 def moduli_clause(joined: KindsTogether, rows: Sequence[Mapping[str, Any]]) -> str:
-    """E by kind; empty where there is one kind."""
+    """A clause on E by kind; empty where there is one kind."""
     moduli = [row for row in rows if row["parameter"] == "youngs_modulus"]
     if not moduli:
         return ""
@@ -312,7 +316,7 @@ def moduli_clause(joined: KindsTogether, rows: Sequence[Mapping[str, Any]]) -> s
 
 
 def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
-    """That the kinds are not of one material, where this is more probable than that they are."""
+    """The statement that the kinds are not of one material, where this is more probable than the opposite."""
     if joined.beside is None or not joined.apart_is_likelier:
         return []
     kinds = [joined.problem.kind, *(kind.kind for kind in joined.beside.kinds)]
@@ -325,7 +329,7 @@ def contradictions(joined: KindsTogether) -> list[dict[str, Any]]:
 
 
 def mechanisms_of_curves(joined: KindsTogether, names: Sequence[str], leading: Sequence[str]) -> list[dict[str, Any]]:
-    """Name, parameters and share of the misfit of mechanisms that act on the curves beside alone."""
+    """Name, parameters and share of the misfit of mechanisms that act on the additional curves only."""
     rows = []
     for kind in () if joined.beside is None else joined.beside.kinds:
         assert joined.beside is not None
@@ -350,6 +354,6 @@ def _of_mechanism(name: str, explanation: Explanation, without: Explanation) -> 
 
 
 def _misfit_square(explanation: Explanation) -> float:
-    """Σ (F − model)² of the samples, what the cell may add not counted."""
+    """Σ (F − model)² of the samples, without zero offset, drift and gain of the cell."""
     predicted = explanation.model.predict(explanation.point.fit).value.real
     return float(((explanation.best.hypothesis.lines.value.real - predicted) ** 2).sum())

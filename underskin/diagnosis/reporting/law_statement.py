@@ -1,18 +1,8 @@
-"""The statement of a report in words.
+"""The statement of a report in words, three sentences at most.
 
-A statement as a few sentences of clauses, so that it stays short however much there is to say.
-
->>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
-'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
-
-The statement of a report: what decides, what is missing, what that means, and what to quote, in three sentences.
-
-Which physics usually does such a thing: hints, by where an unnamed law enters and what it follows.
-
-The same table stands in docs/unlisted.md.
-
-Findings that decide how far the statement of a report can be trusted, as clauses of that statement. A law that nobody
-listed in plain words: what it changes, by how much, what it is worth, what usually does it.
+First what decides how far the answer can be trusted and the verdict, then what is missing and its rivals, last what to
+quote. `HINTS` says which physics usually causes an unlisted law, by the quantity that it acts on and the axis that it
+follows; docs/unlisted.md has the same table.
 """
 
 import re
@@ -40,17 +30,22 @@ from underskin.mechanisms.unlisted.laws import LagLaw, RecordingLaw, UnlistedLaw
 from underskin.mechanisms.unlisted.vocabulary import ACTS_ON, acted_on, followed
 from underskin.recordings.readers.calendar_times import time_zone
 
-_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # of a sentence within a clause
+_END = re.compile(r"([.?!]) +(?=[\"'(]?[A-Z])")  # end of a sentence within a clause
 _END_OR_STOP = re.compile(r"([.?!]) +")
 _STOP = re.compile(r"\. +")
-_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': stays as it is
-_SYMBOLS = ("d33",)  # that no sentence writes with a capital
+_NAME = re.compile(r"\w+('s|s')")  # Hertz's, Mullins': keeps its capital
+_SYMBOLS = ("d33",)  # keep their small letter at the beginning of a sentence
 
 
 def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
-    """One sentence of each of `sentences` that has a clause that is not empty; within them no full stop stands before
-    a space, so that they can be told apart again by these. `names` of campaigns and skins stay whole: "Palm 2. Upper"
-    is no end of a sentence."""
+    """One sentence from the clauses of each of `sentences`; empty clauses, and sentences without any, are left out.
+
+    Within a sentence no full stop is followed by a space, so that the sentences can be split again. `names` of
+    campaigns and skins are not split: "Palm 2. Upper" is no end of a sentence.
+
+    >>> of_clauses(["one slip: given in µm? Left out", "apart from that, all agrees"], [], ["d33 to quote: 14 pC/N"])
+    'One slip: given in µm? – left out; apart from that, all agrees. d33 to quote: 14 pC/N.'
+    """
     protected_names = {name: _END_OR_STOP.sub("\\1\N{NO-BREAK SPACE}", name) for name in names}
 
     def as_clause(text: str) -> str:
@@ -63,7 +58,7 @@ def of_clauses(*sentences: Sequence[str], names: Sequence[str] = ()) -> str:
 
 
 def clause(text: str) -> str:
-    """A text of one sentence or of several as part of a sentence, without the full stop at its end."""
+    """A text of one or several sentences as part of a sentence, without a full stop at its end."""
     first, *parts = _END.split(text.strip().rstrip("."))
     for mark, following in zip(parts[::2], parts[1::2], strict=True):
         first += f"{'; ' if mark == '.' else f'{mark} – '}{small(following)}"
@@ -71,31 +66,31 @@ def clause(text: str) -> str:
 
 
 def capital(text: str) -> str:
-    """With a capital at its beginning."""
+    """The text with a capital at its beginning, unless it begins with a symbol."""
     return text if text.startswith(_SYMBOLS) else text[:1].upper() + text[1:]
 
 
 def small(text: str) -> str:
-    """With a small letter at its beginning, unless that is a symbol or somebody's name."""
+    """The text with a small letter at its beginning, unless it begins with a symbol or a name."""
     plain = text[1:2].islower() or text.startswith("A ")
     return text[:1].lower() + text[1:] if plain and not _NAME.match(text) else text
 
 
 _WORTH_NAMING = 0.02
-_FAR_ABOVE = 2.0  # times the noise: an error held out that a verdict's first sentence tells
+_FAR_ABOVE = 2.0  # times the noise: a held-out error that the first sentence mentions
 _INSUFFICIENT = "The recordings cannot tell anything: "
 _TO_CORRECT = "Nothing can be told before a correction: "
 _CORRECTED = (Lack.CURVES_CONTRADICT, Lack.IMPOSSIBLE_DECLARATION)  # more recordings would not help
 _SMALL = 5.0  # % of the response
-_STATED = 3  # mechanisms whose strengths are told
+_STATED = 3  # mechanisms whose strengths are given
 
 
 @dataclass(frozen=True)
 class StatementContext:
-    """What a statement says beside the answer itself.
+    """Clauses of a statement apart from the answer itself.
 
-    `slips` and `contradictions` are clauses on what decides how far any answer can be trusted, `reserves` on what this
-    one leaves open; `quoted` are clauses on d33, and on E as each kind of recording has it.
+    `slips` and `contradictions` decide how far any answer can be trusted, `reserves` are what this answer leaves open;
+    `quoted` are on d33, and on E by kind of recording.
     """
 
     slips: Sequence[str] = ()
@@ -104,18 +99,18 @@ class StatementContext:
     quoted: Sequence[str] = ()
 
     def first(self, verdict: str, *reserve: str) -> list[str]:
-        """The clauses of the first sentence: what decides comes before the verdict."""
+        """The clauses of the first sentence: contradictions and errors in the recordings come before the verdict."""
         decides = [*self.contradictions, *self.slips]
         return [*decides, f"apart from that, {verdict}" if decides else verdict, *reserve, *self.reserves]
 
 
 @dataclass(frozen=True)
 class AnswerFacts:
-    """What is known of the leading answer beside its probability.
+    """Facts on the leading answer apart from its probability.
 
-    `groups` are the report's `presence`, the most probable first, `idle` mechanisms that may as well have no effect,
-    `at_bounds` the parameters at an end of their search,
-    `mechanisms` those of the report, and `meanings` is what their values mean together.
+    `groups` are the report's `presence`, the most probable first, `idle` the mechanisms that may as well have no
+    effect, `at_bounds` the parameters at a bound of their search, `mechanisms` those of the report, and `meanings` what
+    their values mean together.
     """
 
     groups: Sequence[Mapping[str, Any]] = ()
@@ -138,10 +133,11 @@ def answer_statement(
     shape: str = "",
     power: Sequence[Power] = (),
 ) -> str:
-    """Three sentences at most: the verdict, after what decides how far it can be trusted; what is missing, its rivals,
-    or the `shape` of what remains; what to quote, or where nothing is missing what would have shown (`power`).
+    """The statement of a report: three sentences at most.
 
-    `fit` is the report's; of curves it has the modulus under the stated answer, or what the base model leaves.
+    First the verdict, after what decides how far it can be trusted; then what is missing, its rivals, or the `shape` of
+    the residual; last what to quote, or, where nothing is missing, what would have shown (`power`). `fit` is the
+    report's; of curves it has the modulus under the stated answer, or the residual of the base model.
     """
     model = SIMPLEST[kind]
     stated, *means = _answer(answers, verdict, model, of_answer, all_used=not around.slips)
@@ -163,7 +159,7 @@ def answer_statement(
 def _answer(
     answers: Sequence[Answer], verdict: str, model: str, of_answer: AnswerFacts, *, all_used: bool
 ) -> tuple[str, ...]:
-    """The verdict as a clause, and further ones on what it means."""
+    """The verdict as a clause, and further clauses on its meaning."""
     leader = answers[0]
     percent = in_percent(leader.probability)
     rivals = [answer for answer in answers[1:4] if answer.probability > _WORTH_NAMING]
@@ -208,9 +204,9 @@ def _answer(
 
 
 def _lacking(leader: Answer, of_answer: AnswerFacts) -> tuple[str, bool]:
-    """The mechanisms of the leading set with their probability, and whether that is each mechanism's own.
+    """The mechanisms of the leading set, and whether each has its own probability instead of that of the set.
 
-    It is where a mechanism is in other sets too, or these have its twin in its place.
+    It has where it is also in other sets, or these hold an indistinguishable one in its place.
     """
     group, least = next(iter(of_answer.groups), None), leader.probability + _WORTH_NAMING
     twins = group is not None and len(group["mechanisms"]) > 1 and set(leader.names) < set(group["mechanisms"])
@@ -233,7 +229,7 @@ def _answers_in_words(answers: Sequence[Answer]) -> str:
 
 
 def _law(names: Sequence[str]) -> str:
-    """What a mechanism is; of several nothing, since a page says it of each."""
+    """What a mechanism is; empty for several, which a page explains one by one."""
     return f"{in_words(names)}: {small(CATALOGUE[names[0]].plain)}" if len(names) == 1 else ""
 
 
@@ -256,8 +252,7 @@ def parameter_in_words(parameter: Mapping[str, Any]) -> str:
 
 
 def _reserve(fit: Mapping[str, Any]) -> str:
-    """What keeps an answer from being one without reserve: recordings held out that are predicted far worse than noise
-    would have it."""
+    """A reserve where held-out recordings are predicted far worse than the noise."""
     missed, floor = fit["after"]["heldout_rmse_percent"], fit["noise_floor_percent"]
     if missed is None or floor is None or missed <= _FAR_ABOVE * floor:
         return ""
@@ -270,20 +265,20 @@ def insufficient_statement(what: Lacking | None, slips: Sequence[str]) -> str:
     return of_clauses([f"{_TO_CORRECT if what.lack in _CORRECTED else _INSUFFICIENT}{lacking(what)}"], slips)
 
 
-# The page of a stored report lays its statement out by these two; nothing is decided by what they return.
+# For the layout of a stored report's statement on its page only.
 def lacking_part(statement: str) -> str:
-    """What is lacking or wrong, with its full stop, out of the statement that `insufficient_statement` made."""
+    """What is lacking or wrong, with its full stop, from a statement of `insufficient_statement`."""
     return statement.removeprefix(_INSUFFICIENT).removeprefix(_TO_CORRECT)
 
 
 def first_and_rest(statement: str) -> tuple[str, str]:
-    """The first sentence of a statement, which is the verdict, without its full stop, and the other sentences."""
+    """The first sentence of a statement, the verdict, without its full stop, and the other sentences."""
     first, _, rest = statement.partition(". ")
     return first.rstrip("."), rest
 
 
 def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
-    """E of curves, and what it is under."""
+    """A clause on E of curves, and on the answer under which it holds."""
     modulus = after["youngs_modulus"]
     if modulus.get("at_bound"):
         bound = f"{modulus['value']:.3g} {modulus['unit']}"
@@ -293,8 +288,10 @@ def _modulus_clause(after: Mapping[str, Any], how: str) -> str:
 
 
 def misfit_clause(fit: Mapping[str, Any], model: str, law: Sequence[str] | None = None) -> str:
-    """How far the base model goes on curves, and the best set of mechanisms, or a law that nobody listed with the
-    mechanisms beside it, which `law` holds."""
+    """A clause on the residual of curves under the base model, and under the best set of mechanisms.
+
+    With `law`, the latter is an unlisted law together with these mechanisms.
+    """
     before, after, names = fit["before"], fit["after"], fit["mechanisms"]
     modulus = before.get("least_squares_modulus_mpa")
     base_words = f"{model} alone" + (f", with Young's modulus {modulus:.3g} MPa," if modulus else "")
@@ -308,7 +305,7 @@ def misfit_clause(fit: Mapping[str, Any], model: str, law: Sequence[str] | None 
 
 
 def power_clause(power: Sequence[Power], kind: Kind) -> str:
-    """What the recordings would have shown."""
+    """A clause on the mechanisms that the recordings would have shown."""
     all_of_them = sum(kind in mechanism.kinds for mechanism in CATALOGUE.values())
     shown = [limit.mechanism for limit in power if limit.smallest_visible_percent <= _SMALL]
     if not shown:
@@ -394,7 +391,7 @@ HINTS: Mapping[tuple[str, str], str] = {
     ("frequency_response", "recorded_at"): "A clock or filter that drifts would do this.",
     ("frequency_response", _ANY): "Electronics or a frame that follow this axis would do this.",
 }
-OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sample is compressed or pulled
+OF_BLOCKS: Mapping[tuple[str, str], str] = {  # instead of `HINTS`, where a sample is compressed or pulled
     (
         "modulus",
         "displacement_mm",
@@ -422,7 +419,7 @@ OF_BLOCKS: Mapping[tuple[str, str], str] = {  # in place of these, where a sampl
 
 
 def hint(acts_on: str, axis: str, kind: Kind) -> str:
-    """A sentence, or none."""
+    """The physics that usually causes such a law, as a sentence; empty where none is known."""
     if kind == "compression" and (acts_on, axis) in OF_BLOCKS:
         return OF_BLOCKS[acts_on, axis]
     return HINTS.get((acts_on, axis), HINTS.get((acts_on, _ANY), ""))
@@ -457,12 +454,12 @@ _MOST = 2  # findings that are quoted; the others are counted
 
 
 def slips(findings: Sequence[Mapping[str, str]]) -> list[str]:
-    """Clauses on errors in the recordings: on the most decisive ones what they are, on the others how many."""
+    """Clauses on errors in the recordings: the most important ones are quoted, the others counted."""
     return _clauses(findings, _SLIPS)
 
 
 def reserves(findings: Sequence[Mapping[str, str]]) -> list[str]:
-    """Clauses on what the stated answer leaves open: a remainder, an error held out, a d33 that cannot be."""
+    """Clauses on what the stated answer leaves open: a remainder, a held-out error, an implausible d33."""
     return _clauses(findings, _RESERVES)
 
 
@@ -483,8 +480,10 @@ def _quoted(finding: Mapping[str, str]) -> str:
 
 
 def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
-    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be what is
-    missing. Mechanisms of other kinds of recordings are none of it."""
+    """Clauses on the mechanisms of curves that their recordings do not support, and why: one of them may be missing.
+
+    Mechanisms of other kinds of recordings are not included.
+    """
     return [
         f"{name.replace('_', ' ')} was not tried: {reason}"
         for name, reason in unsupported.items()
@@ -493,12 +492,12 @@ def not_tried(unsupported: Mapping[str, str], kind: Kind) -> list[str]:
 
 
 def _is_physics(mechanism: Mechanism) -> bool:
-    """Whether it is more than another value of what is declared, which curves without a declared value have free."""
+    """Whether it is more than another value of a declared quantity, which is free for curves without a declared one."""
     return mechanism.stage is not Stage.DECLARED
 
 
-_HERTZ = ("preload_n", "indenter_radius_mm")  # with whose cube root Hertz's contact radius grows
-_DELAY = 0.5  # of the exponent of a phase, above which it is more like a delay than like a loss angle
+_HERTZ = ("preload_n", "indenter_radius_mm")  # Hertz's contact radius grows with their cube roots
+_DELAY = 0.5  # exponent of a phase above which it is more like a delay than a loss angle
 
 
 def statement(
@@ -511,10 +510,11 @@ def statement(
     *,
     outweighed: bool,
 ) -> str:
-    """Three sentences at most: that no known mechanism describes this, after what decides how far that can be trusted;
-    what is missing, with its numbers and what it is worth; its rivals, what usually does this, and what to quote.
+    """The statement on an unlisted law: three sentences at most.
 
-    `left` says how far the base model goes on curves; the law may be `outweighed` by a course of no form.
+    First that no known mechanism describes this, after what decides how far that can be trusted; then the law, with its
+    size and held-out errors; last its rivals, the usual cause, and what to quote. `misfit` is the clause on the
+    residual of curves; the law is `outweighed` where a smooth change of no listed form is more probable.
     """
     law = leading.law
     acts_on = law.description.acts_on
@@ -541,14 +541,14 @@ def statement(
 
 
 def _share_of_quantity(document: Mapping[str, Any]) -> float:
-    """The share of laws of any form that act on the same and follow the same."""
+    """The share of laws of any form that act on the same quantity along the same axis."""
     same = (document["acts_on"], document["axis"])
     rivals = (rival["probability"] for rival in document["rivals"] if (rival["acts_on"], rival["axis"]) == same)
     return float(document["probability"] + sum(rivals))
 
 
 def _hinted(leading: LeadingLaw) -> str:
-    """What it follows, as hints have it."""
+    """The axis of the law, as the key of `HINTS`."""
     law = leading.law
     if isinstance(law, CurveLaw) and law.shape.variant == TURN:
         return TURNED
@@ -560,7 +560,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
-    """That a power law is one that is known with another exponent."""
+    """That a power law is a known one with another exponent."""
     if law.description.form != "power":
         return []
     parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
@@ -577,7 +577,7 @@ def _altered(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
 
 
 def _order(law: UnlistedLaw, document: Mapping[str, Any]) -> list[str]:
-    """That lines fall off towards low frequencies as behind a high pass, of what order."""
+    """The order of a high pass that makes lines fall off towards low frequencies."""
     if not (isinstance(law, FrequencyLaw) and law.variant == "high_pass"):
         return []
     parameters = {parameter["name"]: parameter for parameter in document["parameters"]}
@@ -627,7 +627,7 @@ def _axis_words(leading: LeadingLaw) -> str:
 
 
 def _size(leading: LeadingLaw) -> str:
-    """−8 % (−10 to −6) at 14:00."""
+    """The largest change with its interval and where it occurs: "−8 % (−10 to −6) at 14:00"."""
     at, size, deviation = leading.largest()
     law = leading.law
     where = f" {location}" if (location := _where(leading, at)) else ""

@@ -1,20 +1,14 @@
-"""Numbers of a report, with their intervals.
+"""Numbers of a report: rounding, parameters with 95 % intervals, parameters at bounds, d33 over all answers.
 
-Numbers as a report states them: rounded to stated digits, parameters with their 95 % intervals.
-
-Parameters of an explanation that lie at a bound of their search: at that value or beyond, and so no result.
-
-A set of mechanisms that holds one explains nothing, and its d33 is not to be quoted. A bound beyond which there is
-nothing, or at which a mechanism does nothing, is none (`Parameter.ends_search`).
-
-The level that a law which nobody listed refers to: where its factor is 1 is a convention of its form.
-
-A resonance beside the response may leave the low frequencies as they are, or the high ones: both fit alike, and d33
-differs by what the law does between them. So d33 may be that of any line, or any recording.
-
-What all surviving answers say together: which mechanisms are there, d33, and whether they predict alike. What the base
-model idealises although declared facts say it: laws without a free parameter, such as the layer's. Which sensors stand
-apart in d33 where sensors differ: a clause that names them, since a spread names none.
+- A parameter at a bound of its search is no result: a set of mechanisms that holds one explains nothing, and its d33 is
+  not to be quoted. A bound beyond which there is nothing, or at which a mechanism has no effect, does not count
+  (`Parameter.ends_search`).
+- The level at which the factor of an unlisted law is 1 is a convention of its form. A resonance may leave the low
+  frequencies as they are, or the high ones: both fit equally well, and d33 differs by what the law does in between. d33
+  is therefore averaged over the law's factor at all rows (`law_levels`).
+- Summaries over all surviving answers: the probability of each mechanism, d33, answers with the same predictions, and
+  laws without a free parameter that declared facts imply (such as the layer's) but the base model idealises.
+- Sensors whose d33 lies far from the others'.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -49,12 +43,12 @@ SDS_OF_95 = float(ndtri(0.975))  # half the width of a 95 % interval in standard
 
 
 def rounded(value: float, digits: int = 4) -> float | None:
-    """To significant digits; None for what is not finite."""
+    """The value to significant digits; None if it is not finite."""
     return float(f"{value:.{digits}g}") if np.isfinite(value) else None
 
 
 def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Floats) -> float:
-    """Of a mixture of normal distributions, whose `shares` sum to 1, (parts,)."""
+    """A quantile of a mixture of normal distributions (parts,), whose `shares` sum to 1."""
 
     def beyond(at: float) -> float:
         return float(shares @ ndtr((at - means) / deviations) - level)
@@ -66,8 +60,8 @@ def mixture_quantile(level: float, shares: Floats, means: Floats, deviations: Fl
 def with_hidden(
     modulus: Mapping[str, Any], hidden: Sequence[tuple[float, float]], tolerance: float = 0.0
 ) -> dict[str, Any]:
-    """A modulus with its 95 % interval, of which the logarithm may be too large by `hidden` values with probabilities,
-    and differs by a standard deviation of `tolerance` from the one sought."""
+    """A modulus with its 95 % interval, whose logarithm may be too large by the `hidden` values with their
+    probabilities, and differs from that sought with the standard deviation `tolerance`."""
     if len(hidden) == 1 and tolerance == 0:
         return dict(modulus)
     deviation = np.log(modulus["high"] / modulus["low"]) / (2 * SDS_OF_95)
@@ -79,16 +73,16 @@ def with_hidden(
 
 
 def parameter_index(explanation: Explanation, name: str) -> int:
-    """Where in its model's parameters one is."""
+    """The index of a parameter in the explanation's model."""
     return [parameter.name for parameter in explanation.model.parameters].index(name)
 
 
 def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, Any]:
-    """A parameter's most probable value and 95 % interval, within its bounds: 1.96 standard deviations either way.
+    """A parameter's most probable value and 95 % interval within its bounds: ±1.96 standard deviations.
 
-    Where these reach the value at which a mechanism does nothing, and the profile of the posterior falls off before it,
-    the interval ends where the profile does. `at_bound` is the end of its search that it lies at or beyond, `low` or
-    `high`, where it does.
+    Where the interval would include the value at which a mechanism has no effect, but the profile of the posterior
+    falls off before it, the profile gives the end. `at_bound`, `low` or `high`, is present where the value lies at or
+    beyond that end of its search.
     """
     best, point = explanation.best, explanation.point
     parameter = explanation.model.parameters[index]
@@ -121,7 +115,7 @@ def parameter_with_interval(explanation: Explanation, index: int) -> dict[str, A
 
 
 def multiple_of(explanation: Explanation, parameter: Parameter) -> float:
-    """The value that a parameter's bounds and prior are multiples of: 1, or that of the one it is relative to."""
+    """The unit of a parameter's bounds and prior: 1, or the value of the parameter that it is relative to."""
     if parameter.relative_to is None:
         return 1.0
     other = parameter_index(explanation, parameter.relative_to)
@@ -129,7 +123,7 @@ def multiple_of(explanation: Explanation, parameter: Parameter) -> float:
 
 
 def without_effect(explanation: Explanation) -> list[str]:
-    """Its mechanisms of which the 95 % interval of every strength holds the value at which the mechanism does nothing.
+    """The mechanisms whose every strength may be zero: its 95 % interval holds the value without effect.
 
     A strength is a parameter with such a value (`limit`); on a logarithmic scale none reaches 0 or ∞.
     """
@@ -148,9 +142,9 @@ def _holds_limit(explanation: Explanation, index: int) -> bool:
 
 
 def _absolute(explanation: Explanation, index: int, multiples: list[float]) -> list[float]:
-    """A parameter that is fitted as a multiple of another, as their product; both on logarithmic scales.
+    """The value of a parameter that is fitted as a multiple of another one, both on logarithmic scales.
 
-    The interval is that of the product, cut off where the multiple has its bounds.
+    The interval is that of the product, cut off at the bounds of the multiple.
     """
     best, parameter = explanation.best, explanation.model.parameters[index]
     assert parameter.relative_to is not None
@@ -163,12 +157,12 @@ def _absolute(explanation: Explanation, index: int, multiples: list[float]) -> l
     return [value, max(value / factor, min(parameter.low * unit, value)), min(value * factor, parameter.high * unit)]
 
 
-_MEASURED = ("d33", "youngs_modulus")  # that belong to no mechanism, where they are free
+_MEASURED = ("d33", "youngs_modulus")  # free parameters that belong to no mechanism
 
 
 @dataclass(frozen=True)
 class AtBound:
-    """A parameter at an end of its search, `low` to `high` in `unit`; `mechanism` in plain words, or the base model."""
+    """A parameter at the `end` of its search, `low` to `high` in `unit`; `mechanism` in words, or the base model."""
 
     mechanism: str
     parameter: str
@@ -179,21 +173,21 @@ class AtBound:
 
     @property
     def words(self) -> str:
-        """As the reason why something is no result: "timing delay: delay at or beyond 5000 µs"."""
+        """The reason why a value is no result: "timing delay: delay at or beyond 5000 µs"."""
         value = f"{in_digits(self.end, 3)} {self.unit.strip('-')}".rstrip()
         parameter_words = self.parameter.replace("_", " ")
         return f"{self.mechanism.replace('_', ' ')}: {parameter_words} at or beyond {value}, where its search ends"
 
     @property
     def finding(self) -> Finding:
-        """The same among the findings."""
+        """The same as a finding."""
         arguments = {"mechanism": self.mechanism, "parameter": self.parameter}
         bounds = {"low": self.low, "high": self.high, "unit": self.unit}
         return Finding(Reason.PARAMETER_AT_BOUND, "", self.parameter, {**arguments, **bounds})
 
 
 def at_bounds(explanation: Explanation) -> Sequence[AtBound]:
-    """Those of an explanation's mechanisms, and of d33 and a modulus that nobody declared."""
+    """Parameters at bounds: those of an explanation's mechanisms, d33, and an undeclared modulus."""
     spans = own_places(explanation.names, explanation.best.hypothesis.lines)
     mechanisms = explanation.best.hypothesis.lines.mechanisms
     owner = {index: mechanisms[name] for name, span in spans.items() for index in range(span.start, span.stop)}
@@ -215,13 +209,13 @@ def _at_bound(explanation: Explanation, parameter: Parameter, mechanism: str, si
     return AtBound(mechanism, parameter.name.removeprefix("law_"), low, high, parameter.unit, end)
 
 
-_LEVELS = 9  # evenly over the rows
+_LEVELS = 9  # quantiles over the rows
 _FACTORS = ("gain", "frequency_response")
 
 
 def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
-    """Logarithms of the factors (levels,) by which d33 may be another, equally probable; 0 alone where no law is a
-    factor."""
+    """Logarithms of equally probable factors on d33 (levels,) from the reference level of unlisted laws; only 0 where
+    no law is a factor."""
     mechanisms, names = problem.lines.mechanisms, explanation.names
     laws = [
         law
@@ -248,19 +242,19 @@ def law_levels(problem: FittingProblem, explanation: Explanation) -> Floats:
     return np.quantile(np.log(here[nonzero] / there[nonzero]), shares)
 
 
-_COUNTS = 0.003  # of the probability, below which an answer is left out of averages
-_WORTH_MORE = 0.03  # of the probability, below which what may be there besides an answer is left out
-_TWINS = 2.0  # nats by which sets with the one in place of the other differ at most
-_NAMED, _LEAST_NAMED = 0.02, 3  # probability of a group that is listed, and how many are at least
-_ALIKE = 0.5  # of the noise: answers that differ by less predict alike
+_COUNTS = 0.003  # probability below which an answer is left out of averages
+_WORTH_MORE = 0.03  # probability of an answer below which mechanisms hidden under it are neglected
+_TWINS = 2.0  # nats: largest difference between sets with either of two indistinguishable mechanisms
+_NAMED, _LEAST_NAMED = 0.02, 3  # probability from which a group is listed, and the least number listed
+_ALIKE = 0.5  # of the noise: answers that differ by less have the same predictions
 _ENOUGH_ALIKE = 0.95
 
 
 def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Groups of mechanisms that these recordings cannot tell apart, and the posterior that one of each is there.
+    """Groups of mechanisms that these recordings cannot tell apart, and the posterior that one of each group acts.
 
-    Two are in a group where some answer stands as well with the one in place of the other. `present` is the posterior
-    of each mechanism, from which that of one alone in its group is taken.
+    Two mechanisms are in a group where some answer is as good with one in place of the other. `present` is the
+    posterior of each mechanism, used for groups of one.
     """
     groups = []
     for group in _groups(search):
@@ -275,7 +269,7 @@ def presence(search: Search, present: Mapping[str, float]) -> list[dict[str, Any
 
 
 def present(search: Search, problem: FittingProblem) -> dict[str, float]:
-    """The posterior that each mechanism is there, also beside a law or a process that nobody listed."""
+    """The posterior of each mechanism, including answers where it acts together with an unlisted law or process."""
     probabilities: dict[str, float] = {}
     for answer in search.answers:
         if answer.explanation is not None:
@@ -326,11 +320,11 @@ def _twins(evidence: Mapping[frozenset[str], float]) -> list[tuple[str, str]]:
 
 
 def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[str, Any] | None:
-    """The median and the 95 % interval of d33 over all answers that have one, each with its probability and with what
-    may be there besides without showing; None where what no answer explains is more probable than all of them.
+    """The median and the 95 % interval of d33 over all answers, weighted with their probabilities and allowing for
+    mechanisms that would not show; None where answers without d33 are more probable than all others.
 
-    What the declared values of the skin may be off by widens the interval, and not `relative`, which is for comparing
-    sensors, dates and spheres. `unsure` is a further relative standard uncertainty.
+    The tolerances of the skin's declared values widen the interval, but not `relative`, which is for comparing sensors,
+    dates and spheres. `unsure` is a further relative standard uncertainty.
     """
     by_explanation: dict[int, tuple[float, Explanation]] = {}  # curves' own mechanisms do not change d33
     for probability, explanation in (pair for answer in search.answers for pair in _stand_on(search, answer)):
@@ -372,8 +366,8 @@ def d33(search: Search, problem: FittingProblem, unsure: float = 0.0) -> dict[st
 
 
 def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation, probability: float) -> Normals:
-    """ln d33 under an answer, at each level that a law of it may refer to, and with one more mechanism that does not
-    show; the shares sum to 1."""
+    """ln d33 under an answer, at each reference level of its laws, and with one more mechanism that does not show; the
+    shares sum to 1."""
     index = parameter_index(explanation, "d33")
     best = explanation.best
     spread = marginalise_sensor_spread(best.fitter, best.at, index)
@@ -390,9 +384,7 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
         odds = UNSEEN_ODDS / max(search.supported - len(explanation.names), 1)
         for name in others:
             with_mechanism = None if name in explanation.names else with_unseen(problem, explanation, name, "d33")
-            if (
-                with_mechanism is not None
-            ):  # what declared facts say is as probable as its absence, and counts as it fits
+            if with_mechanism is not None:  # a law that declared facts imply has even odds, weighted by its fit
                 several.append(
                     with_mechanism
                     if name in declared_laws(problem.lines)
@@ -405,13 +397,15 @@ def _d33_under(search: Search, problem: FittingProblem, explanation: Explanation
 
 
 def _as_unseen(normals: Normals) -> float:
-    """The factor that takes from a mechanism's shares what it would show by: no set of the answers holds it."""
+    """The factor that limits a mechanism's shares to those of one that does not show, as no answer holds it."""
     return min(1.0, float(np.exp(SHOWS) / normals.share.sum()))
 
 
 def _stand_on(search: Search, answer: Answer) -> list[tuple[float, Explanation]]:
-    """The explanations of an answer, each with its probability: of `none_of_these` all laws that nobody listed which
-    show, as they may have the same course and differ by what is d33."""
+    """The explanations of an answer with their probabilities.
+
+    Those of `none_of_these` are all supported unlisted laws, which may predict the same and differ in d33.
+    """
     if answer.explanation is not None:
         return [(answer.probability, answer.explanation)]
     laws = [explanation for explanation in search.laws if search.is_supported(explanation)]
@@ -421,8 +415,8 @@ def _stand_on(search: Search, answer: Answer) -> list[tuple[float, Explanation]]
 
 
 def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict[str, Any] | None:
-    """The rivals of the leading answer that predict these recordings as it does, by less than half the noise, and the
-    probability of all of them; None where that is too little to stand for one answer, or one stands alone."""
+    """The rivals of the leading answer whose predictions differ from its own by less than half the noise, and their
+    total probability; None where that is too small, or there are no such rivals."""
     leader = search.answers[0]
     if leader.explanation is None or not leader.explanation.names or leader.probability >= EXPLAINED:
         return None
@@ -444,22 +438,22 @@ def alike(search: Search, problem: FittingProblem, floor_percent: float) -> dict
 
 
 def alike_clause(document: Mapping[str, Any]) -> str:
-    """That one of several answers may serve as a model."""
+    """A clause saying that any of several answers may serve as a model."""
     return (
         f"all that hold {100 * document['probability']:.1f} % predict these recordings alike, to "
         f"{document['differ_percent']:g} %: as a model any of them serves within what was measured"
     )
 
 
-_LEAST_ASKED = 0.03  # of the probability, below which an answer is asked no more than whether it holds the law
+_LEAST_ASKED = 0.03  # probability below which an answer without the law contributes none to it
 
 
 def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> list[dict[str, Any]]:
-    """Of each such law the posterior that it is there, over all answers, and what it does to the response that is
-    `shown`, root mean square in percent of it.
+    """Laws without a free parameter that the base model idealises: their posteriors over all answers, and their effect
+    on the response of `shown`, root mean square in percent of it.
 
-    It has even odds beside its absence under every answer; where it shows too little to be named in one, its share of
-    that is by the evidence.
+    The prior odds of a law are even under every answer; in an answer that does not name it, its share is by the
+    evidence.
     """
     named = problem.lines.mechanisms.named
     stated = {frozenset(answer.names) for answer in search.answers}
@@ -475,7 +469,7 @@ def idealised(search: Search, problem: FittingProblem, shown: Explanation) -> li
 
 
 def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Collection[frozenset[str]]) -> float:
-    """The posterior of an answer and the law together; 0 of one beside which the answer with the law is `stated`."""
+    """The joint posterior of an answer and the law; 0 where the answer with the law is itself in `stated`."""
     if answer.explanation is None or name in answer.names:
         return answer.probability * (0.5 if answer.explanation is None else 1.0)
     with_law = frozenset({name, *answer.explanation.names, *answer.alone})
@@ -488,7 +482,7 @@ def _probability(answer: Answer, problem: FittingProblem, name: str, stated: Col
 
 
 def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> float:
-    """Since the law has no parameter, the models with and without it have the same."""
+    """Effect of a law on the response [%]; the models with and without it have the same parameters."""
     without = tuple(other for other in shown.names if other != name)
     order = [other for other in problem.lines.mechanisms if other in {*without, name}]
     models = [problem.hypothesis(names, has_position_scatter=False).model for names in (without, tuple(order))]
@@ -500,13 +494,13 @@ def _effect_percent(problem: FittingProblem, shown: Explanation, name: str) -> f
 _SPREAD = "sensor_spread"
 _LEAST_SENSORS = 4
 _LEAST = 0.1  # of d33: sensors of one skin differ by some percent
-_OUTLIER_SDS = 3.0  # standard deviations: of the sensors, by the median absolute deviation, and of its own
-_ROBUST = 1.4826  # standard deviations of a normal distribution in its median absolute deviation
-_MOST = 3  # that are named
+_OUTLIER_SDS = 3.0  # standard deviations, both of the sensors (from the median absolute deviation) and of its own d33
+_ROBUST = 1.4826  # standard deviation of a normal distribution over its median absolute deviation
+_MOST = 3  # sensors named
 
 
 def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
-    """The sensors whose d33 lies far from the others', by how much; empty where none does, or sensors are alike."""
+    """A clause on the sensors whose d33 lies far from the others'; empty where none does, or without sensor spread."""
     if _SPREAD not in shown.names or problem.kind != "frf":
         return ""
     numbers, off, deviation = _sensor_deviations(problem, shown)
@@ -520,7 +514,7 @@ def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
 
 
 def _sensor_deviations(problem: FittingProblem, shown: Explanation) -> tuple[Indices, Floats, Floats]:
-    """The numbers of the sensors, d33 of each over the sensors' median, less 1, and its standard deviation."""
+    """Indices of the sensors, d33 of each over the median minus 1, and its standard deviation."""
     levels = shown.best.levels
     sensor_residuals = residuals(problem, shown, levels.gain, levels.position)
     numbers, sensor = np.unique(problem.lines.sensor, return_inverse=True)

@@ -1,21 +1,12 @@
-"""Figures of recordings beside what was fitted to them.
+"""Figures of single recordings with their fits, and of the parameters' intervals.
 
-What the figures of a diagnosis have in common: colours of Okabe and Ito, which colour-blind people tell apart, and
-the layout. Black is what was measured, orange the model before, blue the one after, grey the band of the noise.
+Curves: force against depth with both models and the marks, and below the residual of each model on the band of the
+noise. FRFs: magnitude and phase with both models, and below the residuals on the band of the noise. One recording is
+shown at a time and chosen from a menu, which changes the numbers of the traces, not the traces, so that hundreds of
+FRFs stay a small file.
 
-The figure of curves: force against depth with the models before and after and the marks, below what each leaves on
-the noise's band.
-
-One recording is shown at a time; a menu chooses. What a colour means, a dash and a marker mean as well: orange, dashed
-and a square are the model before; blue, solid and a circle the one after; black is what was measured.
-
-The figure of FRFs: magnitude and phase with the models before and after, below what each leaves on the noise's band.
-
-One recording is shown at a time; a menu chooses. A colour, a dash and a marker mean the same as in the figure of
-curves: orange, dashed and a square are the model before; blue, solid and a circle the one after; black is what was
-measured. The menu changes the numbers of the traces, not the traces, so that hundreds of recordings stay a small file.
-
-The figure of what the recordings say of the parameters of the stated mechanisms.
+Colour, dash and marker mean the same everywhere (colours of Okabe and Ito, for colour-blind readers): black is
+measured; orange, dashed and square the model before; blue, solid and circle the model after; grey the noise.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +35,7 @@ from underskin.mechanisms.base import Kind
 from underskin.mechanisms.parameter import Parameter
 from underskin.units import Floats, readable_unit
 
-PLAIN = {"exponentformat": "none"}  # else ticks had prefixes beside the unit of their axis: 10μ of N
+PLAIN = {"exponentformat": "none"}  # without it ticks would have prefixes as well as the axis its unit: 10μ of N
 TEMPLATE = go.layout.Template(pio.templates["plotly_white"]).update(
     layout={"xaxis": PLAIN, "yaxis": PLAIN}, data={"heatmap": [{"colorbar": PLAIN}]}
 )
@@ -52,22 +43,22 @@ MEASURED, BEFORE, AFTER, BAND = "#000000", "#D55E00", "#0072B2", "rgba(0,0,0,0.1
 
 
 def styled(figure: go.Figure) -> go.Figure:
-    """The figure in the layout of all."""
+    """The figure in the common layout."""
     figure.update_layout(template=TEMPLATE, font={"size": 14, "color": "#222222"})
     return figure
 
 
 _MOST_CURVES = 12
 _TITLES = {"indentation": "Force against depth", "compression": "Force against displacement"}
-_LOADED = 0.02  # of the largest force, from which on a curve is in view from the start
-_CURVE_ROOM = 0.4, 0.05  # of what is in view: the air beside it, if there is any, and the edge
+_LOADED = 0.02  # of the largest force, from which a curve is in the initial view
+_CURVE_ROOM = 0.4, 0.05  # of the initial view: additional range in the air, if recorded, and margin
 _ALONG = 40  # points along an edge of the band
 _CURVE_HEIGHT, _PANEL = 460, 150  # pixels
-_PANEL_TITLE = 12  # smaller than others, that those of two panels do not touch
+_PANEL_TITLE = 12  # smaller than others, so that those of two panels do not touch
 
 
 class _CurveModel(NamedTuple):
-    """How a model is called and drawn."""
+    """Name and style of a model; `role` is before or after."""
 
     role: str
     name: str
@@ -78,7 +69,7 @@ class _CurveModel(NamedTuple):
 
 @dataclass(frozen=True)
 class _Drawing:
-    """One recording: its traces, and of the layout what is its own, by path."""
+    """One recording: its traces, and its part of the layout by path."""
 
     label: str
     traces: list[dict[str, Any]]
@@ -86,7 +77,8 @@ class _Drawing:
 
 
 def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: str) -> go.Figure:
-    """Of the first curves; `before` and `after` are what the models are called, `before` empty where they are one."""
+    """The figure of the first curves; `before` and `after` are names of the models, `before` empty where there is
+    one."""
     models = [_CurveModel("after", after, AFTER, SHOWN, {"symbol": "circle", "size": 8})]
     if before:
         models.insert(0, _CurveModel("before", before, BEFORE, PAPER, {"symbol": "square-open", "size": 13}))
@@ -115,7 +107,7 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
 
 
 class _Curve:
-    """One recording in the units in which its numbers read well; depth is counted from the contact point after."""
+    """One recording in readable units; depth is measured from the contact point of the model after."""
 
     def __init__(self, curve: ShownCurve, kind: Kind, models: Sequence[_CurveModel]) -> None:
         self._curve, self._models = curve, models
@@ -125,7 +117,7 @@ class _Curve:
         self._along = "depth" if kind == "indentation" else "displacement"
 
     def drawing(self) -> _Drawing:
-        """Samples and models above, what each model leaves below, marks on top."""
+        """Samples and models above, residuals below, marks on top."""
         curve = self._curve
         every = len(curve.sample_n) == curve.count
         samples = f"{curve.count} samples" if every else f"{len(curve.sample_n)} of {curve.count} samples"
@@ -157,7 +149,7 @@ class _Curve:
         return _Drawing(f"{curve.name}: {curve.misfit_percent:.2g} % left", traces, layout)
 
     def _band(self, model: _CurveModel, most: float, row: int) -> list[dict[str, Any]]:
-        """What holds 95 % of the residuals of an exact law, on the way in and on the way back."""
+        """The band that holds 95 % of the residuals of an exact law, on loading and unloading."""
         curve = self._curve
         half = SDS_OF_95 * curve.after.deviation_n
         turn = int(curve.displacement_mm.argmax())
@@ -198,7 +190,7 @@ class _Curve:
     def _trace(
         self, role: str, displacement_mm: Floats, force_n: Floats, largest: float, look: dict[str, Any]
     ) -> dict[str, Any]:
-        """In the unit in which forces up to `largest` [N] read well. `meta`: what it is, and its units in the lab's."""
+        """A trace in the readable unit of forces up to `largest` [N]; `meta` has its role and its units in mm and N."""
         unit, per_n = readable_unit("force_n", largest)
         return {
             "type": "scatter",
@@ -214,7 +206,7 @@ class _Curve:
         return (self._per_mm * (displacement_mm - self._zero)).astype(np.float32)
 
     def _view(self) -> list[float]:
-        """From where to where the abscissa reaches at first: the loaded part and the marks, with some air."""
+        """The initial range of the abscissa: the loaded part and the marks, with some air."""
         curve = self._curve
         loaded = np.abs(curve.force_n) > _LOADED * np.abs(curve.force_n).max()
         marks = [mark.displacement_mm for _, mark, _ in self._marks()]
@@ -225,7 +217,7 @@ class _Curve:
 
 
 def _curve_menu(drawings: Sequence[_Drawing]) -> dict[str, Any]:
-    """Shows one recording; a button's `name` is its label without markup."""
+    """The menu that shows one recording; a button's `name` is its label without markup."""
     buttons = []
     for drawing in drawings:
         visible = [other is drawing for other in drawings for _ in other.traces]
@@ -237,17 +229,17 @@ def _curve_menu(drawings: Sequence[_Drawing]) -> dict[str, Any]:
 _ROWS = (0.34, 0.2, 0.23, 0.23)  # heights of the panels
 _HEIGHT = 700  # pixels
 _LEAST_PHASE = 10.0  # ° to each side, so that noise is not magnified
-_LONG_TITLE = 11  # pixels: as long as a panel is high where a window is narrow
-_ROOM = 0.08  # at either end of an axis
-_IN_VIEW = 10.0  # times the noise's band: as far as residuals are in view at first
-_FEW = 3  # lines, up to which a model's have markers
-_SMALLEST, _NONE = 0.05, 1e-9  # of a recording's largest response, and pC/N: smaller ones are no scale for a residual
+_LONG_TITLE = 11  # pixels: fits the height of a panel in a narrow window
+_ROOM = 0.08  # margin at either end of an axis
+_IN_VIEW = 10.0  # times the noise's band: initial range of residuals
+_FEW = 3  # lines up to which a model has markers
+_SMALLEST, _NONE = 0.05, 1e-9  # of a recording's largest response, and pC/N: least scale of a residual
 _RESPONSES = ("measured", "before", "after")
 _DIGITS, _RESIDUAL_DIGITS = 5, 3  # of responses and frequencies, and of phases and residuals
 
 
 class _Model(NamedTuple):
-    """How a model is called and drawn."""
+    """Name and style of a model; `role` is before or after."""
 
     role: str
     name: str
@@ -257,7 +249,7 @@ class _Model(NamedTuple):
 
 
 class _Trace(NamedTuple):
-    """What it shows, on which of the four panels, and how."""
+    """The quantity of a trace (`role`), its panel of four, unit and style."""
 
     role: str
     panel: int
@@ -266,9 +258,9 @@ class _Trace(NamedTuple):
 
 
 def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Figure:
-    """Of recordings, the first at first; `before` and `after`: what the models are called, `before` empty where they
-    are one. `layout.meta` has the recordings' names, sensors, spheres and preloads, what either model leaves of them,
-    and what each trace shows."""
+    """The figure of FRFs, the first recording in view; `before` and `after` are names of the models, `before` empty
+    where there is one. `layout.meta` has the recordings' names, sensors, spheres, preloads and misfits, and the role of
+    each trace."""
     models = [_Model("after", after, AFTER, SHOWN, "circle")]
     if before:
         models.insert(0, _Model("before", before, BEFORE, PAPER, "square-open"))
@@ -325,7 +317,7 @@ def frf_figure(recordings: Sequence[ShownFrf], before: str, after: str) -> go.Fi
 
 
 def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
-    """In the order in which they are drawn."""
+    """The traces in the order of drawing."""
     dots = {"mode": "markers", "marker": {"color": MEASURED, "symbol": "circle-open", "size": 5}}
     traces = [_Trace("measured", 1, "pC/N", {**dots, "name": "measured", "legendgroup": "measured"})]
     traces.append(_Trace("measured phase", 2, "°", {**dots, "legendgroup": "measured", "showlegend": False}))
@@ -352,8 +344,8 @@ def _traces(models: Sequence[_Model], few: bool) -> list[_Trace]:
 
 
 def _columns(recording: ShownFrf) -> dict[str, Floats]:
-    """What the traces show of a recording, by their `role`: each (shown,); residuals and noise in percent of what is
-    predicted after, or of 5 % of the largest where that is less."""
+    """The ordinates of a recording's traces by `role`, each (shown,); residuals and noise in percent of the prediction
+    after, or of 5 % of the largest where that is more."""
     before, phase = (np.degrees(np.unwrap(np.angle(predicted))) for predicted in (recording.before, recording.after))
     columns = {
         "measured": np.abs(recording.measured),
@@ -374,7 +366,7 @@ def _columns(recording: ShownFrf) -> dict[str, Floats]:
 
 
 def _numbers(recording: ShownFrf, roles: Sequence[str]) -> dict[str, list[Any]]:
-    """x and y of every trace, to the digits that a figure shows."""
+    """x and y of every trace, rounded to the digits of a figure."""
     columns, frequency = _columns(recording), _short(recording.frequency_hz, _DIGITS)
     return {
         "x": [frequency for _ in roles],
@@ -387,7 +379,7 @@ def _short(values: Floats, digits: int) -> list[float]:
 
 
 def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
-    """What of the layout is a recording's own, by path; `both`: whether there is a model before."""
+    """A recording's part of the layout, by path; `both`: whether there is a model before."""
     columns = _columns(recording)
     names = ("measured", "before", "after") if both else ("measured", "after")
     sizes = np.concatenate([columns[name] for name in names])
@@ -413,7 +405,7 @@ def _view(recording: ShownFrf, both: bool) -> dict[str, Any]:
 def _menu(
     recordings: Sequence[ShownFrf], numbers: Sequence[dict[str, list[Any]]], views: Sequence[dict[str, Any]], both: bool
 ) -> dict[str, Any]:
-    """Shows one recording; a button's `name` is its label without markup."""
+    """The menu that shows one recording; a button's `name` is its label without markup."""
     first = recordings[0].frequency_hz
     alike = all(np.array_equal(recording.frequency_hz, first) for recording in recordings)
     buttons = []
@@ -438,13 +430,13 @@ def _percent(value: float) -> str:
     return np.format_float_positional(value, precision=2, fractional=False, trim="-") + " %"
 
 
-_MARGIN = 1.0  # of an interval: room beside it
-_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it that labels need
+_MARGIN = 1.0  # of an interval, on either side of it
+_ROW, _BETWEEN = 140, 0.73  # height of a parameter's row [pixels], and the share of it for labels
 _TITLE = 13  # pixels
 
 
 def parameter_intervals(problem: FittingProblem, shown: Explanation, document: Mapping[str, Any]) -> go.Figure:
-    """Each parameter's 95 % interval in its own unit, and in words that of its prior, which would hide it."""
+    """Each parameter's 95 % interval in its unit; that of its prior is in words, since drawn it would dwarf it."""
     spans = own_places(shown.names, problem.lines)
     rows = [
         (mechanism["name"], parameter, prior, multiple_of(shown, prior))
@@ -470,7 +462,7 @@ def parameter_intervals(problem: FittingProblem, shown: Explanation, document: M
             marker={"color": MEASURED, "symbol": "line-ns-open", "size": 16, "line": {"width": 2}}, row=panel, col=1,
         )  # fmt: skip
         margin = _MARGIN * (high - low) or 0.1 * abs(low) or 1.0
-        start = low - margin if low < 0 else max(low - margin, 0.0)  # what is positive stays so
+        start = low - margin if low < 0 else max(low - margin, 0.0)  # positive parameters have no negative range
         figure.update_xaxes(range=[start, high + margin], row=panel, col=1)
     figure.update_yaxes(visible=False, range=[-1, 1])
     figure.update_layout(
@@ -489,7 +481,7 @@ def _labelled(parameter: Mapping[str, Any]) -> str:
 
 
 def _before(prior: Parameter, scale: float, unit: str) -> str:
-    """What was known before the recordings, in words."""
+    """The 95 % interval of the prior, in words."""
     low, high = (scale * prior.from_fit(prior.quantile(q)) for q in (0.025, 0.975))
     return with_minus(
         f"before the recordings (prior), 95 %: {low:.3g} to {high:.3g}{'' if unit == '-' else f' {unit}'}"

@@ -1,7 +1,7 @@
-"""The report (`report/1`): the results of all steps as one document, its numbers rounded to stated digits.
+"""The report (`report/1`): the results of all steps of a diagnosis as one document of plain JSON values.
 
-Four significant digits for values, three decimals for probabilities and p-values: enough for any use. The same input
-gives the same report on one machine; on a processor that rounds differently a last digit may differ.
+Values have four significant digits, probabilities and p-values three decimals. The same input gives the same report on
+one machine; on a processor that rounds differently a last digit may differ.
 """
 
 import math
@@ -59,16 +59,16 @@ _STIFFER_WITH_DEPTH = frozenset({"layered_contact", "strain_stiffening"})
 
 @dataclass(frozen=True)
 class DiagnosisResult:
-    """Everything that the steps worked out about one campaign; `search` is None where the data were too few."""
+    """The results of all steps on one campaign; `search` is None where the data were too few."""
 
     name: str
     findings: Sequence[Finding]
     provenance: Mapping[str, Any]
     skin_d33_pc_per_n: float | None = None  # as the skin declares it
-    level_unsure: float = 0.0  # relative uncertainty of all FRFs that noise in their channels leaves
+    level_unsure: float = 0.0  # relative uncertainty of all FRFs due to noise in their channels
     lacking: Lacking | None = None  # of a campaign from which nothing can be concluded
     search: Search | None = None
-    few: Search | None = None  # in its place where recordings agree with the model but are too few to say so alone
+    few: Search | None = None  # instead of `search` where recordings agree with the model but are too few to say so
     problem: FittingProblem | None = None
     axes: Sequence[AxisResult] = ()
     region: Mapping[str, list[float | str]] = field(default_factory=dict)
@@ -77,13 +77,13 @@ class DiagnosisResult:
     confounded: Sequence[Confounding] = ()
     power: Sequence[Power] = ()
     shifts: Sequence[HiddenShift] = ()
-    shape: Shape | None = None  # of what remains, where no mechanism describes it
+    shape: Shape | None = None  # of the residual, where no mechanism describes it
     plan: NextRecordings | None = None
     curves: Campaign | None = None  # with every sample, where curves were diagnosed
     joined: KindsTogether | None = None  # with recordings of other kinds
 
     def with_findings(self, *further: Finding) -> "DiagnosisResult":
-        """The same with further findings behind the others."""
+        """The same result with further findings appended."""
         return replace(self, findings=(*self.findings, *further))
 
     @property
@@ -97,10 +97,10 @@ class DiagnosisResult:
 
 
 def verdict(diagnosis: DiagnosisResult) -> str:
-    """The verdict that the probabilities give, as docs/diagnosis.md explains it.
+    """The verdict by the probabilities, as docs/diagnosis.md explains it.
 
-    A set of mechanisms explains nothing while one of them may as well have no effect, or has a parameter at the bound
-    of its search; nor does the base model with d33 or a free modulus there.
+    A set of mechanisms explains nothing if one of them may as well have no effect, or has a parameter at the bound of
+    its search; nor does the base model with d33 or a free modulus at a bound.
     """
     if diagnosis.search is None:
         return "insufficient_data"
@@ -117,8 +117,10 @@ def verdict(diagnosis: DiagnosisResult) -> str:
 
 
 def _may_be_the_other(search: Search, explanation: Explanation) -> bool:
-    """Whether a thickness that nobody declared leaves open which of a thin layer and a stiffening sample stiffens a
-    curve with depth: the one in place of the other is no less probable than a law of contact that idealises may be."""
+    """Whether an undeclared thickness leaves open if a thin layer or a stiffening sample stiffens curves with depth.
+
+    That is so where the evidence of one in place of the other is above that which an idealised contact law may have.
+    """
     lines = explanation.best.hypothesis.lines
     if lines.kind != "indentation" or lines.campaign.skin.thickness_mm is not None:
         return False
@@ -133,7 +135,7 @@ def _may_be_the_other(search: Search, explanation: Explanation) -> bool:
 
 
 def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
-    """Its mechanisms that may as well have no effect, and show on no recordings of another kind."""
+    """Mechanisms that may as well have no effect, and are not supported by recordings of another kind."""
     joined = diagnosis.joined
     return [
         name
@@ -144,19 +146,19 @@ def _idle(diagnosis: DiagnosisResult, explanation: Explanation) -> list[str]:
 
 @dataclass(frozen=True)
 class Reported:
-    """A report, plain JSON values, and its d33 with what keeps it from being quoted."""
+    """A report of plain JSON values, and its d33 with the reasons against quoting it."""
 
     document: dict[str, Any]
     d33: StatedD33
 
 
 def report(diagnosis: DiagnosisResult) -> dict[str, Any]:
-    """The document."""
+    """The report of a diagnosis."""
     return reported(diagnosis).document
 
 
 def reported(diagnosis: DiagnosisResult) -> Reported:
-    """The document and its d33."""
+    """The report of a diagnosis, and its d33."""
     stated = verdict(diagnosis)
     document: dict[str, Any] = {"schema": SCHEMA, "campaign": diagnosis.name, "verdict": stated}
     if diagnosis.search is None or diagnosis.problem is None:
@@ -209,7 +211,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
     alike = numbers.alike(search, problem, float(fit["noise_floor_percent"] or 0.0)) if problem.kind == "frf" else None
     findings = [finding.in_report() for finding in (*diagnosis.findings, *fit_warnings(problem, shown), *d33.findings)]
     present = numbers.presence(search, numbers.present(search, problem))
-    # At a typical strength: what shows only where it changes more than it usually does, would be read as ruled out
+    # Detection limits are left out for mechanisms that would not show at a typical strength: they are not ruled out
     unseen = {
         confounding.mechanism for confounding in diagnosis.confounded if confounding.confounded_with in BY_NUISANCES
     }
@@ -242,7 +244,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
             mechanisms=mechanisms,
             meanings=_meanings(problem, mechanisms) if named is not None else (),
         )
-        # What remains tells no form where a mechanism that may explain it was not tried
+        # The shape of the residual is not stated where a mechanism that may explain it was not tried
         shape = "" if untried else statements.shape_clause(diagnosis.shape)
         statement = answer_statement(search.answers, stated, problem.kind, fit, around, of_answer, shape, plain)
     completed = {
@@ -265,7 +267,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
         "d33": d33.document,
         **({"by_kind": by_kind, "contradictions": contradictory} if by_kind else {}),
         "next_experiment": diagnosis.next_experiment or None,
-        # The rest was left early: hopeless, or without a gain over the smaller set that it grew from.
+        # Sets that were tried but not fitted could not win, or did not improve on the smaller set.
         "provenance": {
             **diagnosis.provenance,
             **({} if leading is None else {"unnamed": leading.as_fitted}),
@@ -277,7 +279,7 @@ def reported(diagnosis: DiagnosisResult) -> Reported:
 
 
 def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
-    """How deep spheres were pressed, over their radius and the declared thickness; empty of other recordings."""
+    """A clause on the depth of indentation over radius and declared thickness; empty for other recordings."""
     model, lines = explanation.model, problem.lines
     if lines.kind != "indentation" or not isinstance(model, CurveModel):
         return ""
@@ -295,7 +297,7 @@ def _depths_clause(problem: FittingProblem, explanation: Explanation) -> str:
 def _not_tried(
     stated: str, search: Search, problem: FittingProblem, findings: Sequence[Mapping[str, str]]
 ) -> list[str]:
-    """What was not tried, where something remains that it could explain."""
+    """Clauses on mechanisms that were not tried, where they could explain a residual."""
     remains = stated in ("unexplained", "ambiguous") or any(
         finding["code"] == FindingCode.REMAINDER for finding in findings
     )
@@ -329,7 +331,7 @@ def _mechanisms_of_curves(diagnosis: DiagnosisResult, leader: Answer) -> list[di
 
 
 def _meanings(problem: FittingProblem, mechanisms: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the parameters of each mean together, where they do not speak for themselves."""
+    """The joint meaning of each mechanism's parameters, where a single value does not show it."""
     values = {
         mechanism["name"]: {parameter["name"]: parameter["value"] for parameter in mechanism["parameters"]}
         for mechanism in mechanisms

@@ -1,8 +1,8 @@
-"""What a report states of mechanisms, of d33, and of what to measure next.
+"""Sentences and entries of a report: location, shape of the residual, rivals, next recordings, d33.
 
-What a report says in words, for people who press skins: no statistics but percentages, values with their units. The
-planned recordings as the report's `next_experiment`, with a statement in words. The d33 of a report: whether it is to
-be quoted, and what would change it that these recordings do not show.
+Written for experimenters: percentages and values with units, no further statistics. `next_experiment` is the plan of
+recordings as the report has it; `StatedD33` says whether d33 is to be quoted, and what would change it without showing
+in these recordings.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -34,12 +34,12 @@ from underskin.findings.finding import Finding
 from underskin.findings.formatting import in_digits, in_percent
 from underskin.prediction import plausibility
 
-_MOST_UNLISTED = 0.016  # of none_of_these, where no process shows
-_IN_PERCENT = 90.0  # beyond it an effect is said as a factor
+_MOST_UNLISTED = 0.016  # largest probability of none_of_these where no process is supported
+_IN_PERCENT = 90.0  # beyond it an effect is given as a factor
 
 
 def shape_clause(shape: Shape | None) -> str:
-    """What is known of a residual that no mechanism describes; empty where nothing was looked at."""
+    """A clause on the residual that no mechanism describes; empty where it was not analysed."""
     if shape is None:
         return ""
     form = "has no simple form over one axis" if shape.form is None else f"looks like {_form(shape.form, shape)}"
@@ -72,7 +72,7 @@ def _form_axis(form: ShapeForm) -> str:
 
 
 def why_not(answer: Answer, leader: Answer, imitating: Collection[tuple[str, ...]] = ()) -> str:
-    """Why an answer is less probable than the leading one; `imitating`: sets that look like an unlisted law."""
+    """Why an answer is less probable than the leading one; `imitating`: sets that resemble an unlisted law."""
     if answer.probability > 0.25 * leader.probability:
         return "the recordings hardly tell it from the leading explanation"
     if answer.explanation is None and answer.probability < _MOST_UNLISTED:
@@ -104,7 +104,7 @@ _UNDECIDABLE: Mapping[Undecidable, str] = {
 }
 
 
-_DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # as in `WORDS` else
+_DETERMINING = {"recorded_at": "the time of recording", "sensor": "the sensor"}  # others as in `WORDS`
 
 
 def undecidable(result: AxisResult) -> str:
@@ -133,8 +133,11 @@ def location_statement(
     *,
     agrees: bool = False,
 ) -> str:
-    """One plain sentence; `whole` says of each axis of the region whether the region reaches all along it, `agrees`
-    that recordings and model agree within the noise."""
+    """The location of the misfit in one sentence.
+
+    `reaches_all` says for each axis of the region whether the region spans all of it, `agrees` that recordings and
+    model agree within the noise.
+    """
     unknown = [WORDS[result.axis][0] for result in axes if result.p_value is None]
     tail = f"; whether it depends on {listed(unknown)}, this design cannot tell" if unknown else ""
     if len(unknown) == len(axes) and unknown:
@@ -157,7 +160,7 @@ def location_statement(
 
 
 def _where(region: Mapping[str, Sequence[float | str]], reaches_all: Mapping[str, bool]) -> str:
-    """Along which ranges most of it lies, and at which sensor or on which day it is largest."""
+    """The ranges that hold most of the misfit, and the sensor or day where it is largest."""
     ranges: list[str] = []
     levels: list[str] = []
     for name, ends in region.items():
@@ -187,7 +190,7 @@ def _size(effect: EffectSize) -> str:
 
 
 def _times(effect: EffectSize) -> str:
-    """A large effect as a factor: nothing is more than 100 % below, unless its sign has turned."""
+    """A large effect as a factor; more than 100 % below means the opposite sign."""
     factor, low, high = (1 + percent / 100 for percent in (effect.percent, effect.low, effect.high))
     span = f"{in_digits(low, 2)} to {in_digits(high, 2)}"
     if factor >= 0:
@@ -203,12 +206,12 @@ def _range(axis: str, ends: Sequence[float | str]) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names with commas and a last "and"."""
+    """Names joined with commas and a final "and"."""
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 _STIFFENING = "strain_stiffening"
-_VARIED = {  # of curves, as `WORDS` else
+_VARIED = {  # axes of curves; others as in `WORDS`
     "displacement_mm": "depth",
     "force_n": "largest force",
     "sample_diameter_mm": "diameter of the sample",
@@ -218,7 +221,7 @@ _VARIED = {  # of curves, as `WORDS` else
 
 
 def next_experiment(plan: NextRecordings | None) -> dict[str, Any]:
-    """The document, in lab units; empty where nothing needs to be planned."""
+    """The plan as the report has it, in lab units; empty where nothing needs to be planned."""
     if plan is None:
         return {}
     return {
@@ -255,7 +258,7 @@ def _statement(plan: NextRecordings) -> str:
 
 
 def _block(plan: NextRecordings) -> str:
-    """That a compressed block or an indentation would tell, where that is promising."""
+    """A sentence on a compressed block or an indentation, where that promises to decide."""
     if plan.block is None:
         return ""
     stiffens = any(_STIFFENING in names for names in plan.rivals)
@@ -278,22 +281,25 @@ def _why_none(plan: NextRecordings) -> str:
 
 
 def _rivals(plan: NextRecordings) -> str:
-    """Each explanation in words, "with" between the mechanisms of one, so that "or" parts explanations alone."""
+    """The explanations in words, joined by "or", and the mechanisms of each by "with"."""
     *others, last = [" with ".join(in_words([name]) for name in names) for names in plan.rivals]
     return f"{', '.join(others)} or {last}" if others else last
 
 
-_LARGEST_FLOOR = 20.0  # % of the response: beyond it, recordings say too little of a level to quote it
-_MOST_NAMED = 2  # mechanisms that would not show, beside a value to quote
+_LARGEST_FLOOR = 20.0  # % of the response: noise above which no d33 is quoted
+_MOST_NAMED = 2  # mechanisms that would not show, named with a value to quote
 _ANSWERS = "several answers remain"
-BY_NUISANCES = ("d33", "noise")  # what a mechanism is confounded with that does not show beside d33, E and h
+BY_NUISANCES = ("d33", "noise")  # confounders of mechanisms that d33, E, h or the noise hide
 
 
 @dataclass(frozen=True)
 class StatedD33:
-    """The report's `d33` (None of curves), a finding where no PVDF has it, and the mechanisms that would not show here
-    and move it beyond its interval; those that are wrong declared numbers keep it from being quoted. `why_not`: what
-    else does, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none."""
+    """The report's `d33` and whether it is to be quoted.
+
+    `document` is None for curves. `findings`: one where no PVDF has such a value. `hidden`: mechanisms that would not
+    show here and move d33 beyond its interval; those that are wrong declared numbers prevent quoting it. `why_not`:
+    further reasons against quoting it, in words. `skin_pc_per_n`: the skin's declared d33, None where it declares none.
+    """
 
     document: Mapping[str, Any] | None
     findings: Sequence[Finding] = ()
@@ -303,14 +309,14 @@ class StatedD33:
 
     @property
     def deciding(self) -> list[HiddenShift]:
-        """What keeps d33 from being quoted: hidden wrong declared numbers, and what would change it as much, the
-        largest first; none where no declared number does."""
+        """Hidden mechanisms that prevent quoting d33, the largest first: wrong declared numbers and what would change
+        d33 as much; none where no declared number does."""
         least = min((abs(shift.log_factor) for shift in self.hidden if shift.declared), default=np.inf)
         chosen = [shift for shift in self.hidden if abs(shift.log_factor) >= least]
         return sorted(chosen, key=lambda shift: -abs(shift.log_factor))
 
     def clause(self) -> str:
-        """The value to quote, or why none is; empty where there is no d33."""
+        """A clause on the value to quote, or on why none is quoted; empty where there is no d33."""
         if self.document is None:
             return ""
         if self.document["quotable"]:
@@ -318,7 +324,7 @@ class StatedD33:
         return f"d33 is not to be quoted: {self.interval()}"
 
     def quoted(self) -> str:
-        """The value with its interval, and which physics that would not show would change it most beyond that."""
+        """The value with its interval, and the hidden mechanisms that would change it most beyond that."""
         assert self.document is not None
         value, low, high = (f"{self.document[key]:.3g}" for key in ("value", "low", "high"))
         largest = sorted(self.hidden, key=lambda shift: -abs(shift.log_factor))[:_MOST_NAMED]
@@ -328,14 +334,14 @@ class StatedD33:
         return f"{value} {self.document['unit']} ({interval}){self._over_declared()}{hides}"
 
     def _relative_interval(self) -> str:
-        """The interval without what the declared values may be off by."""
+        """The interval without the tolerances of the declared values."""
         assert self.document is not None
         low, high = (f"{self.document['relative'][key]:.3g}" for key in ("low", "high"))
         return f" with what declared values may be off, {low} to {high} to compare sensors or dates"
 
     def _over_declared(self) -> str:
-        """How many times the skin's declared d33 it is, where the interval leaves that out: a peak-to-peak force or
-        charge taken for an amplitude halves or doubles every FRF, which nothing else in the recordings tells."""
+        """The ratio to the skin's declared d33, where the interval excludes it: a peak-to-peak force or charge taken
+        for an amplitude halves or doubles every FRF, which nothing else in the recordings reveals."""
         assert self.document is not None
         declared = self.skin_pc_per_n
         if declared is None or self.document["low"] <= declared <= self.document["high"]:
@@ -343,7 +349,7 @@ class StatedD33:
         return f", {self.document['value'] / declared:.2g} times the declared {declared:g} {self.document['unit']}"
 
     def interval(self) -> str:
-        """Where it lies, and why it is not to be quoted."""
+        """The interval of d33, and why it is not to be quoted."""
         assert self.document is not None
         low, high = (f"{self.document[key]:.3g}" for key in ("low", "high"))
         lies = f"it lies from {low} to {high} {self.document['unit']}{self._over_declared()}"
@@ -356,14 +362,14 @@ class StatedD33:
 
     @property
     def reasons(self) -> list[str]:
-        """Why it is not to be quoted; none where it is."""
+        """Reasons against quoting d33; empty where it is to be quoted."""
         if self.document is None:
             return list(self.why_not) or ["no answer explains its recordings"]
         hidden = in_words([shift.mechanism for shift in self.deciding[:_MOST_NAMED]])
         return [*self.why_not, *([f"{hidden} would change it without showing"] if hidden else [])]
 
     def not_identifiable(self, confounded: Sequence[Confounding]) -> list[dict[str, str]]:
-        """The report's entries, with what each would do to d33 beyond its interval."""
+        """The report's entries, with the change of d33 by each beyond its interval."""
         hidden = {shift.mechanism: shift for shift in self.hidden}
         mechanisms = {
             confounding.mechanism for confounding in confounded if confounding.confounded_with in BY_NUISANCES
@@ -394,11 +400,11 @@ def stated_d33(
 ) -> StatedD33:
     """The d33 averaged over all answers.
 
-    `quotable`: one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of its
-    search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
+    It is quotable if one answer `stands`, kinds of recordings are not `contradictory`, no parameter is at the bound of
+    its search (`at_bounds`, in words), no unlisted `law` acts within the band, d33 is plausible, the answer fits the
     recordings to their noise, which is a fifth of the response at most, and no wrong declared number that would not
-    show here would move d33 beyond its interval. `unsure`: the relative uncertainty of all FRFs that noise in their
-    channels leaves. `skin_pc_per_n`: the skin's declared one.
+    show here would move d33 beyond its interval. `unsure`: relative uncertainty of all FRFs due to noise in their
+    channels. `skin_pc_per_n`: the skin's declared d33.
     """
     d33 = None if problem.lines.curves else numbers.d33(search, problem, unsure)
     if d33 is None:
@@ -421,15 +427,15 @@ def stated_d33(
     why_not = [words for words, holds in against.items() if holds]
     finding = Finding(Reason.D33_FITTED, "", "d33_pc_per_n", {"d33_pc_per_n": d33["value"], "kind": implausible})
     findings = [finding] if implausible else []
-    # Beside other reasons not to quote it, a hidden one would not be what decides.
+    # Hidden mechanisms matter only where there is no other reason against quoting d33.
     quotable = {**d33, "quotable": not why_not}
     stated = StatedD33(quotable, findings, () if why_not else hidden, why_not, skin_pc_per_n)
     return replace(stated, document={**d33, "quotable": False}) if stated.deciding else stated
 
 
 def _acts_outside_band(law: LeadingLaw) -> bool:
-    """Whether an unlisted law leaves the size of the response as it is over most of the band: a peak, a notch, and a
-    turn of the phase over frequency."""
+    """Whether an unlisted law leaves the magnitude over most of the band unchanged: a peak, a notch, or a change of
+    phase over frequency."""
     return law.law.description.axis == "frequency_hz" and (law.is_phase or law.law.description.form == "peak")
 
 

@@ -1,12 +1,11 @@
-"""A law that nobody listed, and the measurement that would confirm it.
+"""The report's entry for an unlisted law (`unnamed`), and the recordings that would confirm or refute it.
 
-The report's `unnamed`: a law that nobody listed, its numbers, its rivals, what it is worth, and where it holds.
+The entry holds the law's expression, parameters, rivals, held-out errors and range.
 
-The recordings that would best confirm or refute a law that nobody listed, as the report's `next_experiment`.
-
-They are taken in turns at the two ends between which the law changes the charge most, all else equal. There the
-logarithm of the charge differs by d if the law holds, and by nothing if it does not. n recordings at each end leave it
-uncertain by s √(2/n), s the scatter of one recording, and tell the two apart with the probability Φ(d/(2 s √(2/n))).
+The confirming recordings alternate between the two values of the axis where the law changes the charge least and most,
+all else equal. There the logarithms of the charge differ by d if the law holds, and by 0 if it does not. With n
+recordings at each end and the scatter s of one recording, their difference has the standard deviation s √(2/n), and
+the two cases are told apart with the probability Φ(d/(2 s √(2/n))).
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,17 +34,17 @@ from underskin.recordings.campaign import FrfConditions, frf_of
 from underskin.units import Floats
 
 _RIVALS, _LEAST_RIVAL = 5, 0.01
-_AXIS_POINTS = 41  # along the axis, at which a course is looked at
-_STATED = 21  # of these, at which a smooth one is stated
-_LEVEL = 0.1  # of a phase, that it may change along the band and still be called constant
-_STEP = 1e-4  # of fit coordinates, for a course's band
+_AXIS_POINTS = 41  # at which a change along the axis is evaluated
+_STATED = 21  # at which a smooth change is stated
+_LEVEL = 0.1  # relative change of a phase along the band up to which it is called constant
+_STEP = 1e-4  # of fit coordinates, for derivatives
 _OUTWEIGHED = 3.0  # nats
 SHOWN_AS_HOURS = ("recorded_at", "time_of_day")
 
 
 @dataclass(frozen=True)
 class LeadingLaw:
-    """The law of an explanation that leads, its parameters in their units, and the quadratic around them."""
+    """The unlisted law of the leading explanation, with its parameters in their units."""
 
     law: UnlistedLaw
     values: Mapping[str, float]
@@ -53,7 +52,7 @@ class LeadingLaw:
 
     @classmethod
     def of(cls, problem: FittingProblem, explanation: Explanation) -> "LeadingLaw | None":
-        """None where the explanation holds no law."""
+        """The law of an explanation; None where it holds none."""
         law = law_of(problem, explanation)
         if law is None:
             return None
@@ -65,33 +64,34 @@ class LeadingLaw:
 
     @property
     def as_fitted(self) -> dict[str, Any]:
-        """What an adopted model is made of."""
+        """Name and parameters, from which an adopted model is made."""
         return {"law": self.law.name, "parameters": {name: rounded(value, 10) for name, value in self.values.items()}}
 
     @property
     def form(self) -> str:
-        """A peak of negative size is a notch; that of a place or of a lag has a direction and no such sign."""
+        """The form of the law: a peak of negative size is a notch; peaks of a position or lag have no such sign."""
         if self.law.description.form == "peak" and self.values.get("law_change", 0.0) < 0:
             return "notch"
         return self.law.description.form
 
     @property
     def axis(self) -> Axis | None:
-        """That of recordings, or of samples; None of frequency."""
+        """The axis of recordings or samples; None for frequency."""
         return self.law.axis if isinstance(self.law, RecordingLaw | LagLaw | CurveLaw) else None
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Of the axis, as measured."""
+        """Ends of the measured axis."""
         if self.axis is not None:
             return self.axis.low, self.axis.high
         frequency = self.explanation.best.hypothesis.lines.frequency
         return float(frequency.min()), float(frequency.max())
 
     def largest(self) -> tuple[float, float, float]:
-        """Where along the measured axis the change is largest, the change there and its standard deviation.
+        """The value of the measured axis where the change is largest, the change there and its standard deviation.
 
-        Of a place it is the distance, over frequency the magnitude less 1, or where that hardly changes the phase.
+        The change of a position is the distance; over frequency it is the magnitude minus 1, or for laws of the phase
+        the phase [rad].
         """
         low, high = self.ends
         x = np.geomspace(low, high, 8 * _AXIS_POINTS) if self.axis is None else _axis_values(self.axis, _AXIS_POINTS)
@@ -100,7 +100,7 @@ class LeadingLaw:
         return float(x[index]), float(sizes[index]), float(np.sqrt(self.variance(x[[index]])[0]))
 
     def change(self, x: Floats, values: Mapping[str, float] | None = None) -> Floats:
-        """At values x of the axis, with these parameters or as fitted; see `largest`."""
+        """The change at values x of the axis, with these parameters or the fitted ones; see `largest`."""
         change = course(self.law, self.values if values is None else values, x)
         if change.ndim == 2:
             return np.hypot(*change.T)
@@ -110,22 +110,22 @@ class LeadingLaw:
 
     @property
     def is_phase(self) -> bool:
-        """Whether it turns the phase alone."""
+        """Whether it changes the phase only."""
         return isinstance(self.law, FrequencyLaw) and self.law.variant in ("phase", "delay")
 
     @property
     def is_constant_phase(self) -> bool:
-        """Whether it turns the phase alone, by nearly the same angle all along the band."""
+        """Whether it changes the phase only, by nearly the same angle all along the band."""
         ends = self.change(np.array(self.ends)) if self.is_phase else np.zeros(2)
         return bool(np.ptp(ends) < _LEVEL * np.abs(ends).max())
 
     @property
     def is_constant(self) -> bool:
-        """Whether it is the same along all of its axis."""
+        """Whether it is the same all along its axis."""
         return isinstance(self.law, RecordingLaw) and self.law.shape.variant == EVERYWHERE
 
     def variance(self, x: Floats) -> Floats:
-        """Of the change, from the quadratic of the law's own parameters."""
+        """Variance of the change, from the covariance of the law's parameters."""
         span = own_places(self.explanation.names, self.explanation.best.hypothesis.lines)[self.law.name]
         mean = self.explanation.best.hypothesis.mean_places
         rows = [mean.index(index) for index in range(span.start, span.stop)]
@@ -145,7 +145,7 @@ class LeadingLaw:
 def law_document(
     search: Search, problem: FittingProblem, leading: LeadingLaw, groups: Sequence[cross_validation.HeldOut]
 ) -> dict[str, Any]:
-    """The document."""
+    """The report's `unnamed`: expression, parameters, probability, rivals, held-out errors and range."""
     shares = _shares(search, problem)
     combination = _combination(problem, leading.explanation)
     before, after = cross_validation.total(groups)
@@ -169,8 +169,8 @@ def law_document(
 
 
 def _change_along_axis(leading: LeadingLaw) -> list[dict[str, Any]]:
-    """Of a smooth course, or of words, the change at places along the measured axis with its 95 % interval: relative,
-    of a force in N, of a place the distance in mm, over frequency the magnitude less 1."""
+    """The change at values of the measured axis with its 95 % interval: relative, of a force in N, of a position the
+    distance in mm, over frequency the magnitude minus 1."""
     low, high = leading.ends
     words: tuple[str, ...] = ()
     if leading.axis is None:
@@ -191,7 +191,7 @@ def _change_along_axis(leading: LeadingLaw) -> list[dict[str, Any]]:
 
 
 def _axis_values(axis: Axis, most: int) -> Floats:
-    """At which a course is looked at: all levels of words, which have nothing between them, or of a few."""
+    """Values at which a change is evaluated: the levels of words or of few values, otherwise an even grid."""
     few = axis.words or len(axis.levels) <= most
     return axis.levels if few else np.linspace(axis.low, axis.high, most)
 
@@ -216,7 +216,7 @@ def _combination(problem: FittingProblem, explanation: Explanation) -> tuple[str
 
 
 def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str], float]:
-    """Of each combination in all of them, the largest first."""
+    """Probability of each combination of quantity, axis and form among all unlisted laws, the largest first."""
     weights: dict[tuple[str, str, str], float] = {}
     for explanation in search.laws:
         if search.is_supported(explanation):
@@ -228,7 +228,7 @@ def _shares(search: Search, problem: FittingProblem) -> dict[tuple[str, str, str
 
 
 def _parameters(leading: LeadingLaw) -> list[dict[str, Any]]:
-    """Those of the fit, with the names that readers know; of a sine its amplitude, start and period."""
+    """The fitted parameters with readable names; of a sine the amplitude, start and period."""
     law, explanation = leading.law, leading.explanation
     first = own_places(explanation.names, explanation.best.hypothesis.lines)[law.name].start
     stated = [parameter_with_interval(explanation, first + index) for index in range(len(law.parameters_bound))]
@@ -260,7 +260,7 @@ def _wave(leading: LeadingLaw, law: RecordingLaw | LagLaw | CurveLaw) -> list[di
 
 
 def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
-    """A step lies between two levels, nobody knows where."""
+    """The position of a step: between two neighbouring levels of the axis."""
     at, levels = float(law.shape.variant), law.axis.levels
     low, high = levels[levels < at].max(), levels[levels > at].min()
     ends = {"value": rounded(at), "low": rounded(float(low)), "high": rounded(float(high))}
@@ -268,7 +268,7 @@ def _edge(law: RecordingLaw | LagLaw) -> dict[str, Any]:
 
 
 def outweighed(search: Search) -> bool:
-    """Whether a smooth course of no form is much more probable than all laws together."""
+    """Whether a smooth process of no listed form is much more probable than all laws together."""
     laws = [search.log_weight(explanation) for explanation in search.laws if search.is_supported(explanation)]
     processes = [weight for _, weight in search.processes_showing]
     if not laws or not processes:
@@ -279,8 +279,8 @@ def outweighed(search: Search) -> bool:
 _MOST = 4  # recordings at each end
 _SURE = 0.99
 _FIELDS = ("sensor", "indenter_radius_mm", "preload_n", "dynamic_force_n", "dwell_s", "load_cycles")
-_NOT_REPEATABLE = ("order", "recorded_at")  # what no recording can be given again
-_GIVEN_BY_SKIN = ("x_mm", "y_mm", "sensor")  # what the skin gives
+_NOT_REPEATABLE = ("order", "recorded_at")  # values that no new recording can have
+_GIVEN_BY_SKIN = ("x_mm", "y_mm", "sensor")
 _HOW = {
     "time_of_day": " Take them on another day.",
     "previous_preload_n": " Come to the preload from each of these.",
@@ -289,7 +289,7 @@ _HOW = {
 
 @dataclass(frozen=True)
 class _Ends:
-    """Where along the axis the law leaves the least and the most charge, and by how much its logarithm differs."""
+    """The values of the axis where the law gives the least and the most charge, and the difference of ln charge."""
 
     low: float
     high: float
@@ -302,7 +302,8 @@ class _Ends:
 
 
 def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
-    """The document; empty for a law over frequency, over words, over the places of the skin, or the same everywhere."""
+    """The report's `next_experiment`; empty for a law over frequency, words or positions of the skin, or a constant
+    one."""
     law = leading.law
     if (
         leading.is_constant
@@ -352,7 +353,7 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
 
 
 def _commonest(problem: FittingProblem) -> int:
-    """The first recording of the contact that was recorded most often."""
+    """Index of the first recording of the contact that was recorded most often."""
     keys = [
         (recording.sensor, recording.indenter_radius_mm, recording.preload_n, recording.dynamic_force_n)
         for recording in frf_of(problem.collapsed.campaign)
@@ -369,7 +370,7 @@ def _ends(leading: LeadingLaw, law: RecordingLaw, base: int) -> _Ends:
 
 
 def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) -> float:
-    """By which the law multiplies the charge of a recording, with this value on its axis."""
+    """Logarithm of the law's factor on the charge of a recording, with this value on its axis."""
     design = leading.explanation.best.hypothesis.frf_model.design
     moved = law.on(replace(law.axis, values=dict.fromkeys(design.ids, at), range=leading.ends), law.tables)
     seeds = {name: Differentiated(np.array([[value]]), np.zeros((0, 1, 1))) for name, value in leading.values.items()}
@@ -378,7 +379,7 @@ def _log_factor(leading: LeadingLaw, law: RecordingLaw, base: int, at: float) ->
 
 
 def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
-    """Of one recording's charge, relative: from its gain, its place and its lines."""
+    """Relative standard deviation of one recording's charge, from its gain, position and lines."""
     best, collapsed = leading.explanation.best, problem.collapsed
     line = best.levels.level * collapsed.deviation[base] / max(float(np.abs(collapsed.value[base])), 1e-300)
     position = best.levels.position * float(np.hypot(*best.relative_place_slopes[:, base]))
@@ -386,20 +387,20 @@ def _scatter(problem: FittingProblem, leading: LeadingLaw, base: int) -> float:
 
 
 def _enough(size: float) -> tuple[int, float]:
-    """How many recordings at each end make sure, or the most; and the probability that they tell."""
+    """The number of recordings needed at each end, `_MOST` at most, and the probability that they decide."""
     probabilities = [float(ndtr(0.5 * size * np.sqrt(count / 2))) for count in range(1, _MOST + 1)]
     count = next((number for number, probability in enumerate(probabilities, 1) if probability >= _SURE), _MOST)
     return count, probabilities[count - 1]
 
 
 def _nearest(problem: FittingProblem, axis: Axis, at: float) -> int:
-    """The recording that lies nearest on the axis."""
+    """Index of the recording nearest on the axis."""
     values = axis.of([recording.id for recording in problem.collapsed.campaign.recordings])
     return int(np.argmin(np.abs(values - at)))
 
 
 def _conditions_of(problem: FittingProblem, number: int) -> dict[str, Any]:
-    """What a recording was made with, in lab units."""
+    """The conditions of a recording, in lab units."""
     recording: FrfConditions = frf_of(problem.collapsed.campaign)[number]
     fields = {name: getattr(recording, name) for name in _FIELDS}
     return {name: value for name, value in fields.items() if value is not None}

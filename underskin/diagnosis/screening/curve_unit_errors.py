@@ -1,6 +1,6 @@
-"""Curves that contradict the others, or what rubber can be: copies, units off by 1000.
+"""Curves that contradict the others, or any rubber: copies, units off by 1000, excessive depth.
 
-What is compared is the apparent modulus (recordings/curve_course.py).
+The quantity compared is the apparent modulus (recordings/curve_course.py).
 """
 
 from collections.abc import Sequence
@@ -23,15 +23,15 @@ from underskin.recordings.campaign import (
 )
 from underskin.recordings.curve_course import FAR, apparent_mpa, contradictions
 
-_IMPOSSIBLE_MPA = 1e-6, 1e6  # from foam's to diamond's
-_DEEPEST = 0.85  # of a cylinder's height: there the true stress is tens of moduli
+_IMPOSSIBLE_MPA = 1e-6, 1e6  # below foam's and above diamond's
+_DEEPEST = 0.85  # of a cylinder's height, where the true stress is tens of moduli
 
 
 def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
-    """The curves of one kind that agree with each other; findings for the others.
+    """The curves of one kind that agree with each other, and findings on the others.
 
-    Copies and single curves of other magnitudes are left out. Where all curves contradict what is declared nothing is
-    lacking only if `units_checked` confirms it.
+    Copies and single curves of another magnitude are left out. Where all curves contradict what is declared, none is
+    used unless `units_checked` confirms it.
     """
     recorded = [
         recording
@@ -45,7 +45,7 @@ def without_inconsistent(campaign: Campaign, kind: Kind) -> Inspected:
     remaining = replace(campaign, recordings=tuple(curves))
     shared = contradictions(campaign.skin, curves)
     if campaign.units_checked and _possible(campaign, curves):
-        shared = []  # whoever checked the units need not be asked
+        shared = []  # the units have been confirmed
     findings += shared
     if shared:
         return Inspected(replace(remaining, recordings=()), findings, Lacking(Lack.CURVES_CONTRADICT))
@@ -64,7 +64,7 @@ def _without_copies(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecordi
 
 
 def _within_range(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording], list[Finding]]:
-    """Those not pressed through nearly the whole sample, or ten times as deep as the sphere is wide."""
+    """The curves without those pressed through nearly the whole sample, or ten sphere diameters deep."""
     usable, findings = [], []
     for curve in curves:
         displacement_mm = curve.displacement_mm[np.isfinite(curve.displacement_mm)]
@@ -86,7 +86,7 @@ def _within_range(curves: Sequence[CurveRecording]) -> tuple[list[CurveRecording
 
 
 def _like_others(curves: Sequence[CurveRecording], skin: SkinDescription) -> tuple[list[CurveRecording], list[Finding]]:
-    """Those whose apparent modulus is of the others' magnitude; of two, the one that is of the declared one's."""
+    """The curves whose apparent modulus is of the others' magnitude; of two, the one nearer to the declared modulus."""
     modulus = np.array([apparent_mpa(curve, skin.poisson_ratio) for curve in curves])
     if len(curves) < 2 or not np.isfinite(modulus).any():
         return list(curves), []
@@ -114,7 +114,7 @@ def _like_others(curves: Sequence[CurveRecording], skin: SkinDescription) -> tup
 
 
 def _possible(campaign: Campaign, curves: Sequence[CurveRecording]) -> bool:
-    """Whether all apparent moduli are of a solid's magnitude."""
+    """Whether all apparent moduli are of the magnitude of a solid's."""
     modulus = np.array([apparent_mpa(curve, campaign.skin.poisson_ratio) for curve in curves])
     finite = modulus[np.isfinite(modulus)]
     return bool(((finite > _IMPOSSIBLE_MPA[0]) & (finite < _IMPOSSIBLE_MPA[1])).all())

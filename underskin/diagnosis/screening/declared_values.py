@@ -1,8 +1,8 @@
-"""Declared values of the skin, and values shared by all recordings, that no skin and no rig has.
+"""Declared values of the skin, and values common to all recordings, of a magnitude that no skin and no rig has.
 
-An unlikely magnitude looks like a slip of units. Nothing else in the campaign would show it, and every law of contact
-would be fitted with a wrong force or modulus. So it is a finding, and nothing is concluded until it is corrected or
-`units_checked` confirms it.
+Such a value looks like a wrong unit, which nothing else in the campaign would reveal: every contact law would be fitted
+with a wrong force or modulus. It is a finding, and nothing is concluded until it is corrected, or confirmed by
+`units_checked`.
 """
 
 from collections.abc import Sequence
@@ -17,10 +17,10 @@ from underskin.recordings.frf.estimation import lines_of
 from underskin.recordings.plausibility import pitch_mm
 from underskin.units import unit_guess, unusual
 
-_PRELOADS_N = (0.01, 150.0)  # the highest preload of a campaign, and the lowest
-_FREQUENCIES_HZ = (0.5, 2e4)  # the highest line of a campaign
-_LEAST_PAUSE_S = 5.0  # no sweep is made in less
-_SLOW_HZ = (0.02, 5.0)  # a sweep from below the one to no more than the other: a minute and more for each period
+_PRELOADS_N = (0.01, 150.0)  # least for the highest preload of a campaign, most for the lowest
+_FREQUENCIES_HZ = (0.5, 2e4)  # range of the highest line of a campaign
+_LEAST_PAUSE_S = 5.0  # no sweep takes less
+_SLOW_HZ = (0.02, 5.0)  # implausible: a sweep that starts below the first and ends below the second frequency
 _ELASTOMERS_MPA = (0.02, 300.0)  # from gels to the hardest polyurethanes
 _WIDEST_PITCH_MM = 300.0
 _GEOMETRY = ("thickness_mm", "sensor_radius_mm", "width_mm", "length_mm")
@@ -28,7 +28,7 @@ _SLIP = 1000.0
 
 
 def unlikely(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
-    """Magnitudes of the skin, and shared by all recordings, that look like a slip of units."""
+    """Findings on magnitudes of the skin, or common to all recordings, that look like a wrong unit."""
     return [*_of_skin(campaign), *_of_recordings(recordings)]
 
 
@@ -67,7 +67,7 @@ def _of_recordings(recordings: Sequence[FrfRecording]) -> list[Finding]:
 
 
 def _unusual(field: str, findings: Sequence[Finding]) -> list[Finding]:
-    """Unusual magnitudes as slips of units of a declared field: nothing in the campaign says otherwise."""
+    """Unusual magnitudes as wrong units of a declared field, which nothing else in the campaign checks."""
     return [Finding(Reason.DECLARED_UNUSUAL, "", field, finding.arguments) for finding in findings]
 
 
@@ -93,7 +93,7 @@ def _of_frequencies(recordings: Sequence[FrfRecording]) -> list[Finding]:
 
 
 def _pause_s(recordings: Sequence[FrfRecording]) -> float | None:
-    """From one recording of a sensor to its next, as a rule; what is stamped within seconds was made together."""
+    """The median time from one recording of a sensor to its next [s]; stamps within seconds count as one recording."""
     times = [recording.recorded_at for recording in recordings]
     if None in times:
         return None

@@ -1,10 +1,10 @@
-"""Two sensors' cables exchanged from some recording on, told by their gains where every contact is on its own sensor.
+"""Cables of two sensors exchanged from some recording on, detected by gain where each contact is on its own sensor.
 
-Sensors of different gains answer with each other's level since. In the model of levels the columns a, b of X, which say
-which recordings are of either sensor, are then others, a', b': with U = (a, b, a', b'), D = t² diag(−1, −1, 1, 1),
-M = Uᵀ C⁻¹ U and v = Uᵀ C⁻¹ y the evidence gains −½ ln |1 + D M| + ½ vᵀ (1 + D M)⁻¹ D v at given s, t and p. All pairs
-and recordings are tried so; of the plainest few all is fitted. An exchange costs ln of how many were tried, and is held
-against a step of either sensor alone, of any size.
+After the exchange, sensors of different gain answer at each other's level. In the model of levels (`levels`) the
+columns a, b of X, which mark the recordings of either sensor, become a', b'. With U = (a, b, a', b'),
+D = t² diag(−1, −1, 1, 1), M = Uᵀ C⁻¹ U and v = Uᵀ C⁻¹ y, the evidence gains −½ ln |1 + D M| + ½ vᵀ (1 + D M)⁻¹ D v at
+given s, t and p. All pairs and starting recordings are tried this way, and the best few are fitted fully. An exchange
+costs ln of the number tried, and must also exceed a step of any size in one of the two sensors.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,15 +21,15 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Indices
 
 _SPREADS = (0.06, 0.25)  # t of sensors whose exchange would show
-_FITTED = 3  # of those tried
+_FITTED = 3  # exchanges that are fitted fully
 _STEP = 0.4  # prior standard deviation of a sensor's step
-_GAIN = log(100)  # of ln evidence beyond ln of how many were tried
+_GAIN = log(100)  # of ln evidence beyond ln of the number tried
 _OVER_STEP = log(4)  # of ln evidence beyond a step of one sensor
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Numbers of two sensors, the levels since, and by how much ln evidence gains on its cost."""
+    """Two sensors, the levels since the exchange, and the gain of ln evidence after its cost."""
 
     sensors: tuple[int, int]
     since: Indices
@@ -37,7 +37,7 @@ class Exchange:
 
 
 def exchanged_cables(levels: Levels) -> Exchange | None:
-    """The plainest exchange, None where none is plain."""
+    """The exchange of largest gain, None where none is significant."""
     numbers = np.unique(levels.sensor).tolist()
     base = levels.fit(levels.value)
     tried = sorted(
@@ -59,8 +59,8 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
 def with_right_sensors(
     recordings: Sequence[FrfRecording], levels: Levels, exchange: Exchange, positions: Mapping[str, tuple[float, float]]
 ) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with the sensors that they are of, and the finding on it; contacts move with the sensors, whose
-    `places` [mm] are given."""
+    """The recordings with their true sensors, and the finding; contacts move with the sensors, whose `positions` are in
+    mm."""
     since = levels.number[exchange.since]
     names = dict(zip(levels.sensor.tolist(), (recordings[number].sensor for number in levels.number), strict=True))
     first, second = (names[number] for number in exchange.sensors)
@@ -80,7 +80,7 @@ def with_right_sensors(
 def _moved(
     recording: FrfRecording, here: tuple[float, float], there: tuple[float, float]
 ) -> tuple[float, float] | None:
-    """Where the contact lies beside the other sensor."""
+    """The position of the contact relative to the other sensor; None if it was not given."""
     if recording.position_mm is None:
         return None
     x, y = (at + new - old for at, new, old in zip(recording.position_mm, there, here, strict=True))
@@ -88,7 +88,7 @@ def _moved(
 
 
 def _tried(levels: Levels, base: LevelFit, spread: float) -> Iterator[Exchange]:
-    """Every pair and recording, with the gain at the base's s and p."""
+    """Every pair of sensors and first recording, with the gain at the base fit's s and p."""
     same_sensor = np.equal.outer(levels.sensor, levels.sensor)
     precision = np.linalg.inv(np.linalg.inv(base.precision) + (spread**2 - base.spread**2) * same_sensor)
     weighed = precision @ levels.value

@@ -1,26 +1,19 @@
-"""What sensors answer to contacts that all miss their places by the same vector, by the base model.
+"""Sensors that respond where other sensors were pressed: labels exchanged, or cables since some recording.
 
-How probable the levels of recordings are with the labels of sensors exchanged from some recording on, and without.
+A sensor that responds where no response is expected is linked to the sensor nearest to the contact. Each link is tried
+as an exchange of the two, and links that close a cycle as a rotation, as by a plug that is off by one; each is weighed
+against no exchange, at the cost of ln of the number tried. An exchange is undone where every sensor gains by it. Where
+a sensor gains by another's label and no exchange fits both, its recordings contradict their positions and are left out.
+A recording that is far weaker than expected may be of a weak or dead sensor, and does not count.
 
-A recording's level is
-    y_i = d S_i(e) + N(0, (s d S_i)² + (p d |∂S_i/∂place|)² + (f d max S)²),
-with S_i the response of the sensor that is taken to have answered, e the vector by which all contacts miss their
-places, s what sensors, scatter and unnamed physics make of a level, p the scatter of places, and f what reaches a
-sensor that is pressed nowhere near (its neighbours' charge). With probability ε a level is anything up to twice the
-largest. The evidence is averaged over e, d, s, p and f, and over the recordings from which on the sensors may be
-exchanged: one half for all of them, the other half evenly over the later ones.
-
-ε bounds what a wrong label costs, so that the evidence of an exchange may be that of one sensor alone, while the other
-one stays as wrong as it was. Each sensor's own gain, with the others exchanged, tells.
-
-Sensors that answer where other ones were pressed: labels exchanged, or cables since some recording.
-
-A sensor that answers where no response is expected of it is linked to the one that is nearest to where it was pressed.
-Each link is tried as an exchange of the two, and links that close a cycle of more sensors as a rotation, as by a plug
-that is off by one; each is weighed against none, at the cost of ln of how many are tried. Put right is
-one by which every sensor gains. Where a sensor gains by the label of another one, and none of them puts right both, its
-recordings contradict their places and are left out. A recording that answers with far less than is expected may be of a
-weak or dead sensor, and does not count.
+The evidence: the level of a recording is
+    y_i = d S_i(e) + N(0, (s d S_i)² + (p d |∂S_i/∂position|)² + (f d max S)²),
+S_i being the response of the sensor that is assumed to have answered, e the common position error of all contacts,
+s the relative scatter of levels (sensors, recordings, unlisted physics), p the scatter of positions, and f what reaches
+a distant sensor (its neighbours' charge). With probability ε a level is anything up to twice the largest. The evidence
+is averaged over e, d, s, p, f and the recording from which on the sensors are exchanged: one half of the prior for all
+recordings, the other half evenly over the later ones. ε bounds the cost of a wrong label, so that an exchange may gain
+by one sensor while the other stays as wrong as before; the gain of each sensor, the others being exchanged, shows this.
 """
 
 from collections.abc import Mapping, Sequence
@@ -44,7 +37,7 @@ from underskin.units import Floats, Indices
 
 @dataclass(frozen=True, eq=False)
 class DisplacedResponse:
-    """|FRF| of the base model [C/N] and how steep it is [C/N/mm] (displacements, recordings)."""
+    """|FRF| of the base model [C/N] and its slope over position [C/N/mm] (displacements, recordings)."""
 
     value: Floats
     slope: Floats
@@ -57,18 +50,18 @@ def displaced_response(
     displacement_mm: Floats,
     table: SigmaTable,
 ) -> DisplacedResponse:
-    """The response of one sensor to each recording's contact.
+    """The response of a sensor to each recording's contact, for common position errors of all contacts.
 
     Parameters
     ----------
     skin
         The array.
     entries
-        The recordings; a contact without a place is on the sensor that the recording names.
+        A contact without a position is on the sensor that the recording names.
     sensors
-        (recordings,) the sensor that is to answer to each.
+        (recordings,) the sensor that responds to each contact.
     displacement_mm
-        (displacements, 2) by how much all contacts miss their places.
+        (displacements, 2) position errors common to all contacts.
     table
         The σ table.
     """
@@ -96,15 +89,15 @@ def _moved(position: tuple[float, float], displacement: Floats) -> tuple[float, 
 
 _ASTRAY = 1e-5  # ε
 _DISTANCES_MM, _DIRECTIONS, _MISS_MM = (0.3, 0.7, 1.2, 1.8), 8, 0.7  # of e, and its prior standard deviation
-_FREE = np.array(  # d over the usual one, s, p [mm], f
+_FREE = np.array(  # d over its usual value, s, p [mm], f
     [*product(np.exp(np.linspace(-0.6, 0.6, 9)), (0.05, 0.12, 0.3), (0.05, 0.3), (0.02, 0.1))]
 )
 
 
 @dataclass(frozen=True)
 class Start:
-    """From which of the sensors' recordings on, in time, they are exchanged, and by how much ln evidence gains: by all,
-    and at least by each of them with the others exchanged."""
+    """The first exchanged recording of the sensors in time, the gain of ln evidence, and the least gain by a single
+    sensor with the others exchanged."""
 
     first: int
     gain: float
@@ -122,7 +115,8 @@ class ExchangeEvidence:
         largest: float,
         table: SigmaTable,
     ) -> None:
-        """Work out the evidence as given; `level` (recordings,) over the usual one at the `largest` S [C/N]."""
+        """Compute the evidence of the given labels; `level` (recordings,) is over the usual one at the `largest` S
+        [C/N]."""
         self._skin, self._recordings, self._table = skin, recordings, table
         angles = 2 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
         around = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -135,8 +129,8 @@ class ExchangeEvidence:
         self._total += self._prior[:, None]
 
     def exchange(self, indices: Indices, others: Sequence[str]) -> Start:
-        """The most probable start of an exchange; `own` are the sensors' recordings in time, `others` the sensor that
-        each is of."""
+        """The most probable start of an exchange; `indices` are the sensors' recordings in time, `others` the sensor of
+        each after the exchange."""
         turned = self._response([self._recordings[number] for number in indices], others)
         given = DisplacedResponse(self._labelled.value[:, indices], self._labelled.slope[:, indices])
         level, displacements = self._level[indices], range(len(self._miss_mm))
@@ -155,7 +149,7 @@ class ExchangeEvidence:
 
     @property
     def _prior(self) -> Floats:
-        """Of e but for a constant (displacements,), which stand for areas."""
+        """Log prior of e but for a constant (displacements,), each displacement standing for an area."""
         distance = np.hypot(*self._miss_mm.T)
         area = np.maximum(distance, _DISTANCES_MM[0] / 2)
         return np.asarray(np.log(area) - distance**2 / (2 * _MISS_MM**2))
@@ -164,7 +158,7 @@ class ExchangeEvidence:
         return displaced_response(self._skin, recordings, sensors, self._miss_mm, self._table)
 
     def _density(self, response: DisplacedResponse, level: Floats, at: int) -> Floats:
-        """ln of that of each level under one displacement (d and noises, recordings)."""
+        """Log density of each level under one displacement (d and noises, recordings)."""
         d, s, p, f = _FREE.T[:, :, None]
         value, slope = response.value[at] / self._largest, response.slope[at] / self._largest
         variance = d**2 * ((s * value) ** 2 + (p * slope) ** 2 + f**2)
@@ -172,19 +166,19 @@ class ExchangeEvidence:
         return np.asarray(np.log((1 - _ASTRAY) * usual + 0.5 * _ASTRAY))
 
 
-_LEAST_SHAPE = 0.3  # of the largest: smaller ones are measured by it
-_ANSWERS = 0.6  # of a level, or of `_LEAST_SHAPE`, that is not expected: then exchanges are sought
-_WEAK = 0.3  # of the level to be expected
-_GAIN = log(100)  # of ln evidence beyond ln of how many are tried
+_LEAST_SHAPE = 0.3  # of the largest response: the least scale of a level
+_ANSWERS = 0.6  # unexpected share of a level, or of `_LEAST_SHAPE`, above which exchanges are tried
+_WEAK = 0.3  # of the expected level
+_GAIN = log(100)  # of ln evidence beyond ln of the number tried
 _GAIN_OF_EACH = log(4)  # of ln evidence, by each sensor's own recordings
-_FEWEST = 4  # recordings, for one of them to contradict the others
+_FEWEST = 4  # recordings, so that one can contradict the others
 _FAR_OFF = 30.0  # times the usual response
 
 
 @dataclass(frozen=True)
 class _Exchange:
-    """Of each sensor the one whose place it answers at, their recordings since the exchange and before, by how much ln
-    evidence gains on its cost, and by how much by each sensor."""
+    """An exchange: of each label the sensor at whose position it responds, the recordings since the exchange and
+    before, the gain of ln evidence after its cost, and the least gain by a single sensor."""
 
     true_sensor: Mapping[str, str]
     since: list[int]
@@ -196,7 +190,7 @@ class _Exchange:
 def without_exchanges(
     campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings of exchanged sensors with the right sensor, or left out where none is right; the findings."""
+    """The recordings with true sensors, without those that fit no sensor, and the findings."""
     if len(campaign.skin.sensors) < 2 or len(recordings) < _FEWEST:
         return list(recordings), []
     level = np.array([flat_level(recording) for recording in recordings])
@@ -237,8 +231,10 @@ def without_exchanges(
 def _explained(
     recordings: Sequence[FrfRecording], links: Sequence[tuple[str, str]], evidence: ExchangeEvidence, mute: set[str]
 ) -> tuple[list[_Exchange], list[int]]:
-    """The exchanges by which every sensor gains, each sensor in one of them at most and none of the `mute`, whose
-    recordings tell nothing; and the recordings of other sensors that gain alone."""
+    """The exchanges by which every sensor gains, and the recordings of other sensors that gain alone.
+
+    Each sensor is in one exchange at most, and none of the `mute`, whose recordings carry no information.
+    """
     moves = _weighed(recordings, [{name: sensor} for name, sensor in links], evidence)
     best = {name: sensor for move in reversed(moves) for name, sensor in move.true_sensor.items()}
     chosen, settled = list[_Exchange](), set(mute)
@@ -253,7 +249,7 @@ def _explained(
 def _weighed(
     recordings: Sequence[FrfRecording], tried: Sequence[Mapping[str, str]], evidence: ExchangeEvidence
 ) -> list[_Exchange]:
-    """The plain ones of those tried, the plainest first."""
+    """The significant exchanges of those tried, the largest gain first."""
     order = recording_order(recordings)
     exchanges = []
     for true_sensor in tried:
@@ -268,14 +264,14 @@ def _weighed(
 
 
 def _links(campaign: Campaign, unasked: Sequence[FrfRecording]) -> list[tuple[str, str]]:
-    """The sensors of these recordings, each with the sensor that is nearest to where it was pressed."""
+    """The sensors of these recordings, each with the sensor nearest to the contact."""
     links = {(recording.sensor, _nearest(campaign, recording)) for recording in unasked}
     return sorted(link for link in links if link[0] != link[1])
 
 
 def _permutations(links: Sequence[tuple[str, str]], best: Mapping[str, str]) -> list[dict[str, str]]:
-    """The exchange of each link, and the cycles of three sensors or more that the `best` places make; the last sensor
-    of a chain, of which no place is plain, may close it."""
+    """The exchange of each link, and the cycles of three sensors or more that the `best` assignments form; the last
+    sensor of a chain, without a significant assignment, may close it."""
     tried = [{first: second, second: first} for first, second in sorted({(min(link), max(link)) for link in links})]
     for start in sorted(best):
         cycle = [start]
@@ -287,7 +283,7 @@ def _permutations(links: Sequence[tuple[str, str]], best: Mapping[str, str]) -> 
 
 
 def _nearest(campaign: Campaign, recording: FrfRecording) -> str:
-    """The sensor that is nearest to where a recording was pressed."""
+    """The sensor nearest to the contact of a recording."""
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     pressed = recording.position_mm or positions[recording.sensor]
     return min(positions, key=lambda name: dist(positions[name], pressed))
@@ -313,8 +309,8 @@ def _contradiction(recordings: Sequence[FrfRecording]) -> Finding:
 
 
 def _usual(level: Floats, shape: Floats) -> float | None:
-    """The level over the shape in recordings that are neither silent nor far from any sensor; None where one of them
-    is off by far, which is a slip of units."""
+    """The median level over shape in recordings that are neither silent nor far from any sensor; None where one is far
+    off, as by a wrong unit."""
     telling = shape > _LEAST_SHAPE * shape.max(initial=0.0)
     if not telling.any():
         return None
@@ -325,7 +321,7 @@ def _usual(level: Floats, shape: Floats) -> float | None:
 
 
 def _relabelled(campaign: Campaign, recording: FrfRecording, true_sensor: Mapping[str, str]) -> FrfRecording:
-    """The recording as one of the right sensor, the contact where it was."""
+    """The recording with its true sensor, the contact unchanged."""
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     return replace(
         recording,

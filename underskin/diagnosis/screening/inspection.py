@@ -1,12 +1,9 @@
-"""Slips that show in the levels of recordings only: a weak sensor, one that stands alone, amplitudes of another kind,
-a warm-up, cables exchanged.
-
-The plainest is put right first, since each looks a little like the others.
-
-What is wrong with the recordings of a campaign themselves, before any physics is held responsible.
+"""Errors in the recordings of a campaign, checked before any physics is fitted.
 
 Recordings that contradict the others (copies, reversed signs, units off by 1000, no response, no finite line) are
-findings. They are left out of the diagnosis, or corrected where the error is plain (a sensor of reversed sign).
+findings; they are left out, or corrected where the error is plain (a sensor of reversed sign). Errors that show only in
+the levels (a weak or outlying sensor, rms or peak-to-peak amplitudes, a warm-up, exchanged cables) are corrected one at
+a time, the most probable first, since each resembles the others.
 """
 
 from collections.abc import Collection, Sequence
@@ -40,14 +37,14 @@ from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import Complexes
 
 _LEAST = 4  # recordings
-_MOST = 300  # recordings: the covariance of more costs minutes
+_MOST = 300  # recordings: the covariance of more takes minutes
 _MOST_SLIPS = 3
 
 
 def without_level_slips(
     campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings with such slips put right or left out, and the findings on them."""
+    """The recordings corrected for errors in their levels, or without them, and the findings."""
     remaining, findings = list(recordings), list[Finding]()
     if len(remaining) >= _LEAST:
         weak, findings = weak_sensors(remaining, levels(campaign, remaining, table))
@@ -64,7 +61,7 @@ def without_level_slips(
 def _plainest_slip(
     campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable
 ) -> tuple[list[FrfRecording], Finding] | None:
-    """The recordings without the plainest slip, and the finding on it; None where there is none."""
+    """The recordings corrected for the error of largest gain, and the finding; None where there is none."""
     if len(recordings) < _LEAST:
         return None
     recorded_levels = levels(campaign, recordings, table)
@@ -94,10 +91,10 @@ _AXES = ("preload_n", "indenter_radius_mm", "dynamic_force_n")
 
 
 def inspect(campaign: Campaign, table: SigmaTable, keep_ids: Collection[str] | None = None) -> Inspected:
-    """The campaign without what cannot be used, reversed sensors put right, and the findings.
+    """The campaign without unusable recordings, reversed sensors corrected, and the findings.
 
-    Of the recordings whose contacts lie beyond the tables as declared, those `kept` stay (ids); None: all that a
-    plausible modulus brings within.
+    Recordings whose contacts lie beyond the tables as declared are used if their ids are in `keep_ids`; None: if a
+    plausible modulus brings them within.
     """
     recorded = frf_recordings(campaign) if campaign.recordings else ()
     series = as_lines(recorded, units_checked=campaign.units_checked)
@@ -160,13 +157,13 @@ def _inspected(
 
 
 def _impossible(findings: Sequence[Finding], *, confirmable: bool) -> Lacking:
-    """What is to be corrected, or confirmed, before anything can be concluded."""
+    """The fields to be corrected, or confirmed, before anything can be concluded."""
     fields = list(dict.fromkeys(finding.field for finding in findings))
     return Lacking(Lack.IMPOSSIBLE_DECLARATION, {"fields": fields, "confirmable": confirmable})
 
 
 def _with_lines(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    """Those with a line that is finite and not 0."""
+    """The recordings with a line that is finite and not 0, and the findings on the others."""
     usable, findings = [], []
     for recording in recordings:
         values = lines_of(recording).values
@@ -184,7 +181,7 @@ def _with_lines(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording],
 
 
 def _without_copies(recordings: list[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    """Each once: copies have the same lines but for rounding. Only recordings of nearly the same mean are compared."""
+    """The recordings without copies, whose lines agree but for rounding; compared if their means nearly agree."""
     lines = [np.nan_to_num(lines_of(recording).values) for recording in recordings]
     size = np.array([float(np.abs(values).mean()) for values in lines])
     original = np.arange(len(recordings))

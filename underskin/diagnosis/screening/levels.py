@@ -1,24 +1,18 @@
-"""Levels of recordings above the model, and what may cause them.
+"""Levels of recordings over the base model's, the model of these levels, and what may change them.
 
-The lines of recordings as FRFs in phase with the force: without a delay of the chain, which turns them. Whether
-something follows an axis along which recordings differ: then a law may be at work, and no slip need be.
-
-The level of each recording over the base model's, and what else than a slip may move it.
-
-With y_i = ln |level_i / shape_i| of recording i, the model of levels is
+A recording's level is the magnitude of its FRF in the flat zone. With y_i = ln |level_i / shape_i|, shape_i being the
+base model's, the model of levels is
     y = X b + ε,  b ~ N(0, P),  ε_i ~ N(0, s² + (g_i p)²),
-where X holds a gain, one gain a sensor (of standard deviation t), and smooth functions of what physics may follow
-(sphere, preload, place, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter of
-positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the size
-of the smooth functions, p(s) the prior of a recording's gain: a slip is believed where taking it out of y raises the
-evidence by far more than its own description costs.
+where X holds a gain, one gain per sensor (of standard deviation t), and smooth functions of what physics may depend on
+(sphere, preload, position, order, load cycles, dwell, dynamic force), g_i is |∂ ln shape/∂ position| and p the scatter
+of positions. The evidence is the largest ln N(y; 0, C) + ln p(s), C = X P Xᵀ + diag(s² + g² p²), over s, t, p and the
+size of the smooth functions, p(s) being the prior of a recording's gain. A recording error is accepted where removing
+it from y raises the evidence by far more than the cost of describing it.
 
-What may move the levels of recordings, how probable each is beforehand, and the evidence of levels over all of it.
-
-Either nothing does, or one mechanism of the catalogue, or something smooth (`levels`): several mechanisms, or a law
-that nobody listed. A mechanism's changes Δ of ln level, at K points drawn from the priors of its parameters, stand in
-the model of levels as a normal change of the same second moments, Σ Δ Δᵀ/K. Beside nothing and beside each mechanism,
-the declared modulus and thickness may be off as far as their priors allow.
+Causes of a change in level: none, one mechanism of the catalogue, or a smooth change (several mechanisms, or an
+unlisted law). The changes Δ of ln level under a mechanism, at K points from the priors of its parameters, enter as a
+normal change of the same second moments, Σ Δ Δᵀ/K. With no cause, and with each mechanism, the declared modulus and
+thickness may be off as far as their priors allow.
 """
 
 from collections.abc import Sequence
@@ -47,19 +41,22 @@ from underskin.units import Array, Complexes, Floats, Indices, Mask
 
 
 def aligned_lines(recordings: Sequence[FrfRecording]) -> list[Complexes]:
-    """The values [C/N] of each recording's lines without the delay that all of them share."""
+    """The values [C/N] of each recording's lines without the delay common to all."""
     measured = [lines_of(recording) for recording in recordings]
     delay = common_delay(stacked(measured))
     return [advanced(frf.values, frf.frequency, delay) if delay else frf.values for frf in measured]
 
 
-_LEAST = 2  # recordings: a single one is extreme along some axis
-_MISMATCH = 0.25  # of them, as many may be lacking or too many
-_TERMS, _SIZE = 4, 0.3  # cosines over the rank along an axis, and the prior standard deviation of each
+_LEAST = 2  # recordings: a single one is always extreme along some axis
+_MISMATCH = 0.25  # share of the recordings that may differ
+_TERMS, _SIZE = 4, 0.3  # number of cosines over the rank along an axis, and the prior standard deviation of each
 
 
 def follows_an_axis(chosen: Mask, axes: Sequence[Floats]) -> bool:
-    """Whether some recordings are, but for few, those on one side of an axis, or on one level of it."""
+    """Whether the chosen recordings are, but for a few, those on one side of an axis, or on one level of it.
+
+    Then a law along the axis may act, and the recordings need not be wrong.
+    """
     if chosen.sum() < _LEAST:
         return False
     allowed = _MISMATCH * chosen.sum()
@@ -79,8 +76,8 @@ def smooth_along(axis: Floats) -> Floats:
     return np.asarray(_SIZE * np.cos(np.pi * np.outer(share, np.arange(1, _TERMS + 1))))
 
 
-_FLAT_HZ = 130.0  # the response is about flat below
-_LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a crossing of zero, a level says nothing
+_FLAT_HZ = 130.0  # below it the response is about flat
+_LEAST_RESPONSE = 0.2  # of the largest prediction: below it, near a zero crossing, a level is not informative
 SCATTER = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)  # s
 SCATTER_PRIOR = Plateau.of(GAIN_RANGE, GAIN_FALL)
 _SPREAD = (0.01, 0.06, 0.25)  # t
@@ -92,21 +89,21 @@ _OVERALL, _SMOOTH, _CURVATURE = 3.0, 0.3, 0.15  # prior standard deviations of t
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Columns over the recordings that tell a level."""
+    """Columns over the recordings with an informative level."""
 
-    number: Indices  # of the recording among all entries
+    number: Indices  # of the recording among all
     value: Floats  # y
     sensor: Indices
     order: Floats  # 0, 1, … in time
     slope: Floats  # g [1/mm]
     smooth: Floats  # (recordings, columns) of X, times their prior standard deviation
     cycles: Floats | None
-    axes: tuple[Floats, ...]  # what else may move the level: each axis on which the recordings differ (recordings,)
+    axes: tuple[Floats, ...]  # each axis on which the recordings differ (recordings,)
 
     def fit(self, value: Floats, further: Floats | None = None, sensor: Indices | None = None) -> "LevelFit":
         """The best s, t, p and size of the smooth functions for `value` (recordings,).
 
-        `further` (recordings, columns) is added to X, scaled by its prior; `sensor` stands for the recordings' sensors.
+        `further` (recordings, columns), scaled by its prior, is added to X; `sensor` replaces the recordings' sensors.
         """
         added = 0.0 if further is None else further @ further.T
         best, chosen, best_spread = -np.inf, np.eye(len(value)), self.spreads[0]
@@ -124,12 +121,12 @@ class Levels:
         return LevelFit(best, np.asarray(np.linalg.inv(chosen), dtype=np.float64), best_spread)
 
     def precision(self, scatter: float, smooth_size: float) -> Floats:
-        """C⁻¹ (recordings, recordings) at given s and size of the smooth functions."""
+        """C⁻¹ (recordings, recordings) at a given s and size of the smooth functions."""
         noise = scatter**2 + (_USUAL_POSITION_MM * self.slope) ** 2
         return np.asarray(np.linalg.inv(self.expected(_USUAL_SPREAD, smooth_size * self.smooth) + np.diag(noise)))
 
     def expected(self, spread: float, columns: Floats, sensor: Indices | None = None) -> Floats:
-        """X P Xᵀ (recordings, recordings) at a sensors' spread t, of a gain, the sensors' and columns."""
+        """X P Xᵀ (recordings, recordings) at the sensors' spread t, for a gain, the sensors' gains and `columns`."""
         indicator = np.eye(int(self.sensor.max()) + 1)[self.sensor if sensor is None else sensor]
         return np.asarray(_OVERALL**2 + columns @ columns.T + spread**2 * indicator @ indicator.T)
 
@@ -154,18 +151,18 @@ class LevelFit:
     spread: float
 
     def amplitude(self, value: Floats, column: Floats) -> tuple[float, float]:
-        """That of a column in y by generalised least squares, and its standard deviation."""
+        """The amplitude of a column in y by generalised least squares, and its standard deviation."""
         weight = self.precision @ column
         total = float(weight @ column)
         return float(weight @ value) / total, total**-0.5
 
     def residual(self, value: Floats) -> Floats:
-        """Each value less what all others let expect of it."""
+        """Each value minus its expectation given all others."""
         return np.asarray((self.precision @ value) / np.diag(self.precision))
 
 
 def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaTable) -> Levels:
-    """Those of a campaign's recordings, signs put right."""
+    """The levels of a campaign's recordings, whose signs are correct."""
     subset = replace(campaign, recordings=tuple(recordings))
     model = compose((), subset, table, "frf")
     prediction = model.predict(np.array([parameter.start for parameter in model.parameters]))
@@ -237,7 +234,7 @@ def _smooth(campaign: Campaign, recordings: Sequence[FrfRecording], order: Float
 
 
 def _standard(column: Floats) -> Floats:
-    """From −1 to 1."""
+    """The column scaled to −1 … 1."""
     middle, half = (np.max(column) + np.min(column)) / 2, (np.max(column) - np.min(column)) / 2
     return np.asarray((column - middle) / half if half > 0 else np.zeros(len(column)))
 
@@ -251,13 +248,12 @@ def _log_density(value: Floats, covariance: Floats) -> float:
 
 _NO_CAUSE, _SINGLE_CAUSE, _SMOOTH_CAUSE = 0.6, 0.25, 0.15  # prior probabilities
 _DRAWS = 8
-_LEAST_RATIO = 1e-3  # of the base model's
+_LEAST_RATIO = 1e-3  # of the base model's response
 
 
 @dataclass(frozen=True, eq=False)
 class Cause:
-    """The logarithm of its prior, and what it adds to X: columns times their prior standard deviations
-    (recordings, columns)."""
+    """The logarithm of its prior, and its columns of X times their prior standard deviations (recordings, columns)."""
 
     log_prior: float
     columns: Floats
@@ -265,15 +261,15 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """ln evidence of each alternative (alternatives,), and what is expected of its coefficients, over their prior
-    standard deviations (alternatives, columns)."""
+    """ln evidence of each alternative (alternatives,), and the means of its coefficients over their prior standard
+    deviations (alternatives, columns)."""
 
     evidence: Floats
     coefficient: Floats
 
 
 def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Levels, table: SigmaTable) -> list[Cause]:
-    """All that may move the levels of a campaign's recordings, those that `levels` has."""
+    """All causes that may change the levels of a campaign's recordings, for the rows of `levels`."""
     contacts = tuple(recording.without_measurements(frequency_hz=np.ones(1)) for recording in recordings)
     conditions = Conditions("contacts", campaign.skin, contacts)
     base = compose((), conditions, table, "frf")
@@ -310,9 +306,10 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
 
 
 def explained(levels: Levels, causes: Sequence[Cause], further: Floats) -> Explained:
-    """The levels by each alternative, over all causes, at the best s, t, p (`levels`) of each.
+    """The evidence of each alternative, summed over all causes, at the best s, t, p of each.
 
-    `further` (alternatives, recordings, columns) is what each alternative adds to X, times prior standard deviations.
+    `further` (alternatives, recordings, columns): columns that each alternative adds to X, times their prior standard
+    deviations.
     """
     by_cause = [_by_cause(levels, cause.columns, further) for cause in causes]
     joint = np.array([cause.log_prior + result.evidence for cause, result in zip(causes, by_cause, strict=True)])
@@ -323,7 +320,7 @@ def explained(levels: Levels, causes: Sequence[Cause], further: Floats) -> Expla
 
 
 def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
-    """The same by one cause."""
+    """The evidence of each alternative under one cause."""
     alternatives, recordings, width = further.shape
     right = np.column_stack([levels.value, further.transpose(1, 0, 2).reshape(recordings, -1)])
     evidence, coefficient = np.full(alternatives, -np.inf), np.zeros((alternatives, width))
@@ -345,7 +342,7 @@ def _by_cause(levels: Levels, columns: Floats, further: Floats) -> Explained:
 
 
 def _drawn(model: FrfModel, start: Floats) -> Array:
-    """Points (points, parameters) from the priors of a mechanism's parameters, declared values as they are."""
+    """Points (points, parameters) from the priors of a mechanism's parameters, declared values unchanged."""
     mechanism_parameters = model.parameters[: len(model.parameters) - len(start)]
     if not mechanism_parameters:
         return start[None, :]

@@ -1,7 +1,7 @@
-"""Single recordings against the base model before any fit: no response, off by 1000, reversed.
+"""Single recordings against the base model before any fit: no response, units off by 1000, reversed sign.
 
-Only the level of each recording over the prediction of the base model is compared, without a delay that the chain has:
-its apparent d33. Recordings without a response, or where little is predicted (near a zero crossing), have none.
+Only the level over the base model's prediction is compared (the apparent d33), after removing the chain's delay.
+Recordings without a response, or where little is predicted (near a zero crossing), have none.
 """
 
 from collections.abc import Collection, Sequence
@@ -26,17 +26,17 @@ from underskin.units import Complexes, Floats
 _UNIT_FACTORS = (1e3, 1e-3)
 _FACTOR_WIDTH = np.log(12.0)
 _LIKELY_D33 = (0.3, 1000.0)  # pC/N; polymers have 5 to 40, ceramics up to some hundred
-_LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a crossing of zero, a sign says nothing
+_LEAST_RESPONSE = 0.2  # of the campaign's largest prediction: below it, near a zero crossing, a sign is not informative
 _UPPER = 0.75  # quantile of the lines: a resonance is narrower
-_LOWEST = 5  # one line of so many counts as low, and of evenly spaced ones only the lowest third in log frequency
-_D33 = 15.0  # pC/N: the prior's centre is what the prediction is made with
+_LOWEST = 5  # one line in five counts as low, and of evenly spaced ones only the lowest third in log frequency
+_D33 = 15.0  # pC/N: the prediction is made with the centre of the prior
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Consistent:
-    """The recordings that can be used, reversed ones put right, the findings, and what is `lacking` where none can.
+    """The usable recordings, reversed ones corrected, the findings, and what is `lacking` where none is usable.
 
     `beyond` are the ids of those whose contacts lie beyond the tables as declared.
     """
@@ -50,7 +50,7 @@ class Consistent:
 def against_model(
     campaign: Campaign, recordings: list[FrfRecording], table: SigmaTable, keep_ids: Collection[str] | None
 ) -> Consistent:
-    """The recordings held against the base model; `kept` as for `within_tables`."""
+    """The recordings compared with the base model; `keep_ids` as for `within_tables`."""
     aligned = aligned_lines(recordings)
     unresponsive, variance = no_response(aligned)
     if unresponsive.all():
@@ -84,8 +84,8 @@ def against_model(
 
 
 def _apparent(aligned: Sequence[Complexes], model: Model, usable: Mask) -> tuple[Floats, Floats, Floats]:
-    """Each recording's level over the base model's, NaN where it says nothing; the same of what a quarter of its lines
-    exceed, which no filter takes from all of them; and the level to be expected [C/N]."""
+    """Each recording's level over the base model's, NaN where not informative; the same for the upper quartile of its
+    lines, which no filter suppresses; and the expected level [C/N]."""
     predicted = model.predict(np.array([parameter.start for parameter in model.parameters])).value
     shape = predicted[np.searchsorted(model.recording, np.arange(len(aligned)))].real
     level = np.array([float(np.nanmedian(values.real)) for values in aligned])
@@ -119,8 +119,8 @@ def _off_by_1000(recordings: list[FrfRecording], ratio: Floats) -> tuple[Mask, l
 
 
 def _has_one_sign(recordings: list[FrfRecording], aligned: Sequence[Complexes]) -> Mask:
-    """Whether a recording's lowest lines are on the same side of zero as all of it: above a resonance charge is in
-    antiphase, which reverses nothing."""
+    """Whether a recording's lowest lines have the sign of all its lines: above a resonance the charge is in antiphase,
+    which is no reversed polarity."""
     sides = []
     for recording, values in zip(recordings, aligned, strict=True):
         real, frequency = values.real, lines_of(recording).frequency
@@ -131,7 +131,8 @@ def _has_one_sign(recordings: list[FrfRecording], aligned: Sequence[Complexes]) 
 
 
 def _contradiction(ratio: Floats, turned: Floats) -> Finding | None:
-    """Of two recordings whose levels are about 1000 × apart, or of opposite signs; which of them is off, they hide."""
+    """The finding on two recordings whose levels are a factor of about 1000 apart, or of opposite signs; which of them
+    is wrong cannot be told."""
     low, high = sorted(np.abs(ratio).tolist())
     if not low > 0:
         return None
@@ -143,7 +144,7 @@ def _contradiction(ratio: Floats, turned: Floats) -> Finding | None:
 
 
 def _of_all(ratio: Floats, declared: float | None) -> list[Finding]:
-    """A d33 that no sensor has, or that is 1000 × off the declared one."""
+    """The finding on a d33 that no sensor has, or that is off the declared one by a factor of 1000."""
     d33 = float(np.nanmedian(np.abs(ratio))) * _D33 if np.isfinite(ratio).any() else 0.0
     if d33 <= 0:
         return []

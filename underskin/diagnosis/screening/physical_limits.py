@@ -1,5 +1,6 @@
-"""Numbers beyond any instrument and any skin (`recordings/campaign.py`): a recording that holds one is left out;
-where the skin has one, nothing can be concluded.
+"""Numbers beyond any instrument or skin (`recordings/campaign.py`).
+
+A recording that holds one is left out; where the skin does, nothing can be concluded.
 """
 
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ _WIDEST_SENSOR = 100.0  # radii over the thickness; tables end far below
 
 
 def without_extremes(campaign: Campaign) -> Inspected:
-    """The campaign without recordings that hold such numbers, each a finding; `lacking` where its skin does."""
+    """The campaign without recordings that hold impossible numbers, each a finding; `lacking` where its skin does."""
     of_skin = _of_skin(campaign.skin, any(isinstance(recording, FrfRecording) for recording in campaign.recordings))
     if of_skin:
         arguments = {"fields": [finding.field for finding in of_skin], "confirmable": False}
@@ -31,7 +32,7 @@ def without_extremes(campaign: Campaign) -> Inspected:
 
 
 def _of_skin(skin: SkinDescription, has_frf: bool) -> list[Finding]:
-    """Of the skin's fields; the sensors' size is of use to FRFs alone."""
+    """Findings on the skin's fields; the sensors' size matters for FRFs only."""
     findings = [
         replace(finding, field=f"skin.{finding.field}")
         for finding in _excess_findings(skin, Reason.IMPOSSIBLE_SKIN, "")

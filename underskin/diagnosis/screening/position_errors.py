@@ -1,7 +1,7 @@
-"""Places of contacts that contradict the sensors they belong to: given in m or µm beside sensors in mm.
+"""Positions of contacts that contradict their sensors': given in m or µm where sensors are in mm.
 
-A place p counts as a slip of units where f·p, with f = 1000 or 1/1000, lies far nearer to its own sensor than p does.
-At a sensor in the origin a slip cannot be seen, and does little.
+A position p has a wrong unit where f·p, with f = 1000 or 1/1000, lies far nearer to its sensor than p does. At a sensor
+in the origin this cannot be detected, and has little effect.
 """
 
 from collections.abc import Sequence
@@ -15,19 +15,22 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.units import Floats
 
 _UNIT_FACTORS = (
-    # factor, least distance from the sensor [mm], unit that the places were given in, or the sensors
+    # factor, least distance from the sensor [mm], unit of the positions, or of the sensors
     (1e3, 1.0, "m", "µm"),
     (1e-3, 200.0, "µm", "m"),
 )
 _NEARER = 5.0
-_AT_SENSORS_MM = (1e-4, 0.01)  # no stage and no lab means such distances from a sensor
-_MOST_SHARE = 0.25  # of the recordings at most; more are no accident of single ones
+_AT_SENSORS_MM = (1e-4, 0.01)  # implausible distances from a sensor: no stage is that precise
+_MOST_SHARE = 0.25  # of the recordings at most; more are no error of single ones
 
 Mask = NDArray[np.bool_]
 
 
 def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Mask, list[Finding], list[Finding]]:
-    """Which single recordings' places are 1000 × off, the findings on them, and the findings where many are off."""
+    """Which recordings' positions are off by a factor of 1000, the findings on them, and the findings where many are.
+
+    The mask holds the single ones only.
+    """
     sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
     mask = np.zeros(len(recordings), dtype=bool)
     single, shared = [], []
@@ -46,7 +49,7 @@ def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[M
 
 
 def at_sensors(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
-    """Places that differ from their sensors' by some µm at most: an offset series in m."""
+    """Positions that differ from their sensors' by some µm at most: an offset series in m."""
     sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
     farthest = float(np.hypot(*(contact_mm - sensor_mm).T).max())
     if not _AT_SENSORS_MM[0] < farthest < _AT_SENSORS_MM[1]:
@@ -55,7 +58,7 @@ def at_sensors(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[F
 
 
 def _sensors_and_places(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Floats, Floats]:
-    """Of each recording [mm], (recordings, 2) each."""
+    """Positions of each recording's sensor and contact [mm], (recordings, 2) each."""
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     sensor_mm: Floats = np.array([positions[recording.sensor] for recording in recordings]).reshape(-1, 2)
     contact_mm: Floats = np.array(

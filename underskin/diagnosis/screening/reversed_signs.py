@@ -1,7 +1,7 @@
-"""Polarity that is reversed: of all recordings, of whole sensors, of single recordings, or at random.
+"""Reversed polarity: of all recordings, of whole sensors, of single recordings, or at random.
 
-A recording's own sign is that of its level over the base model's, where it tells one. Reversed recordings are plain
-where their levels are those of the others in magnitude, so that up to half of all may be; else they are a few at most.
+The sign of a recording is that of its level over the base model's, where that is well defined. Where the reversed
+levels equal the others in magnitude, up to half of all recordings may be reversed; otherwise a few at most.
 """
 
 from collections.abc import Sequence
@@ -15,20 +15,20 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.units import Floats, Mask
 
 _FEW = 0.2  # of the others
-_ALIKE, _MOSTLY = 2.0, 0.8  # times the others' level at most, in that share of the reversed ones
+_ALIKE, _MOSTLY = 2.0, 0.8  # largest ratio to the others' level, and the share of reversed recordings within it
 _LISTED = 6  # single findings at most
 
 
 @dataclass(frozen=True)
 class Signs:
-    """−1 for each recording to be reversed, 0 where it is unknown, else 1; and the findings."""
+    """−1 for each recording to be reversed, 0 where unknown, otherwise 1; and the findings."""
 
     signs: Floats
     findings: list[Finding]
 
 
 def signs_of(recordings: Sequence[FrfRecording], turned: Floats, usable: Mask) -> Signs:
-    """Those of recordings whose levels over the base model's are `turned`, NaN where that tells no sign."""
+    """The signs of recordings from their levels over the base model's, `turned`, NaN where these have no clear sign."""
     negative = np.isfinite(turned) & (turned < 0) & usable
     positive = np.isfinite(turned) & (turned > 0) & usable
     signs = np.ones(len(recordings))
@@ -58,7 +58,7 @@ def signs_of(recordings: Sequence[FrfRecording], turned: Floats, usable: Mask) -
 
 
 def _reversed_sensors(recordings: Sequence[FrfRecording], negative: Mask, positive: Mask) -> tuple[str, ...]:
-    """The sensors with several reversed recordings and hardly another."""
+    """The sensors of which several recordings are reversed and hardly any other is not."""
     names = dict.fromkeys(recording.sensor for recording in recordings)
     counts = {name: _of(recordings, (name,)) for name in names}
     return tuple(
@@ -69,7 +69,7 @@ def _reversed_sensors(recordings: Sequence[FrfRecording], negative: Mask, positi
 
 
 def _plain(turned: Floats, negative: Mask, positive: Mask) -> bool:
-    """Whether the reversed levels are those of the others but for the sign."""
+    """Whether the reversed levels equal those of the others but for the sign."""
     usual = float(np.median(turned[positive])) if positive.any() else 0.0
     size = -turned[negative] / usual if usual > 0 else np.zeros(1)
     return bool(((size < _ALIKE) & (size > 1 / _ALIKE)).mean() >= _MOSTLY)

@@ -1,7 +1,7 @@
-"""One sensor whose level stands beside that of all others, which are alike: its own d33 or its cable, no physics.
+"""One sensor whose level differs from that of all others, which agree: its own d33 or cable, not the physics.
 
-With a gain of its own for that sensor the model of levels must explain them far better than with any spread of all
-sensors, and than anything smooth along an axis. Where several sensors differ, that is `sensor_spread`.
+A separate gain for that sensor must explain the levels far better than any spread of all sensors, and than anything
+smooth along an axis. Where several sensors differ, the mechanism `sensor_spread` applies.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,13 @@ from underskin.recordings.campaign import FrfRecording
 _LEAST_SENSORS = 4
 _LEAST = 0.14  # of |ln gain|
 _AMPLITUDE = 0.4  # prior standard deviation of ln gain
-_GAIN, _OVER_RIVALS = 1.7, 1.5  # of ln evidence, on its cost, and over what else may do it
-_COST = 2.0  # per ln of how many sensors there are: one that is tried, and one that chance puts apart
+_GAIN, _OVER_RIVALS = 1.7, 1.5  # of ln evidence, after its cost, and over other explanations
+_COST = 2.0  # per ln of the number of sensors: one for the choice, and one for an outlier by chance
 
 
 @dataclass(frozen=True)
 class OutlyingSensor:
-    """Number of the sensor, the logarithm of its gain over the others', and by how much ln evidence gains on its
-    cost."""
+    """The sensor, the logarithm of its gain over the others', and the gain of ln evidence after its cost."""
 
     sensor: int
     amplitude: float
@@ -33,7 +32,7 @@ class OutlyingSensor:
 
 
 def outlying_sensor(levels: Levels) -> OutlyingSensor | None:
-    """The sensor that stands alone most plainly, None where none is plain."""
+    """The sensor whose gain differs most from the others', None where none is significant."""
     numbers = np.unique(levels.sensor).tolist()
     if len(numbers) < _LEAST_SENSORS:
         return None
@@ -56,7 +55,7 @@ def outlying_sensor(levels: Levels) -> OutlyingSensor | None:
 def without_sensor_gain(
     recordings: Sequence[FrfRecording], levels: Levels, outlier: OutlyingSensor
 ) -> tuple[list[FrfRecording], Finding]:
-    """The recordings with those of the sensor at the others' level, and the finding on it."""
+    """The recordings with the sensor's gain removed, and the finding."""
     first = int(levels.number[levels.sensor == outlier.sensor][0])
     name = recordings[first].sensor
     scaled = [

@@ -1,7 +1,7 @@
-"""Two sensors that fall silent together while others answer.
+"""Two sensors that stop responding together while others respond.
 
-Their cables may be exchanged, so that each was recorded while the other one was pressed. A connector or an amplifier
-that they share may as well have failed: they answer nothing, so that nothing tells which.
+Either their cables are exchanged, so that each was recorded while the other was pressed, or a connector or amplifier
+that they share has failed. As neither gives a response, the recordings cannot tell which.
 """
 
 from collections.abc import Sequence
@@ -15,11 +15,11 @@ from underskin.findings.finding import Finding
 from underskin.mechanisms.unlisted.axes import recording_order
 from underskin.recordings.campaign import FrfRecording
 
-_FEWEST = 2  # silent recordings of each of them
+_FEWEST = 2  # silent recordings of each of the two sensors
 
 
 def without_silent_pair(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRecording], list[Finding]]:
-    """The recordings without those since two sensors show no response, and the finding on it."""
+    """The recordings without those of two sensors since they show no response, and the finding."""
     since = _silent_since(recordings)
     if not since:
         return list(recordings), []
@@ -30,8 +30,8 @@ def without_silent_pair(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRec
 
 
 def _silent_since(recordings: Sequence[FrfRecording]) -> list[int]:
-    """The recordings, in time, of the two sensors that answer until some recording and never since, where others do;
-    none where not two do so."""
+    """The recordings, in time, of two sensors since both stopped responding while others respond; empty where these
+    are not exactly two."""
     silent, _ = no_response(aligned_lines(recordings))
     order = np.argsort(recording_order(recordings), kind="stable").tolist()
     falling = set[str]()

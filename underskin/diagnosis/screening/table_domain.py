@@ -1,7 +1,7 @@
-"""Which contacts lie within the tables as declared, and the slip of units that would explain that none does.
+"""Which contacts lie within the tables as declared, and the wrong unit that would explain that none does.
 
-Where the declared modulus is too small, contacts are computed wider and harder pressed than they were. Those that a
-plausible modulus brings within the tables are not left out before the fit has told E; until then they are predicted by
+Where the declared modulus is too small, contacts are computed wider and more loaded than they were. Contacts that a
+plausible modulus brings within the tables are kept until the fit has found E; until then they are predicted by
 continuation of the tables (mechanisms/models/sigma_curves.py).
 """
 
@@ -20,7 +20,7 @@ from underskin.recordings.campaign import Campaign, FrfRecording
 from underskin.surrogate.sigma_table import SigmaTable
 from underskin.units import to_si
 
-_ENOUGH = 0.5  # of the contacts within the tables: then a slip, or a wrong modulus, is worth naming
+_ENOUGH = 0.5  # of the contacts within the tables: then a wrong unit, or modulus, is worth naming
 
 Mask = NDArray[np.bool_]
 Undo = Callable[[Campaign, float], Campaign]
@@ -33,10 +33,10 @@ def within_tables(
     table: SigmaTable,
     keep_ids: Collection[str] | None,
 ) -> tuple[Mask, Mask, list[Finding]]:
-    """Which contacts lie within the tables as declared, which others are kept, and the findings on the rest.
+    """Which contacts lie within the tables as declared, which others are used, and the findings on the rest.
 
-    `kept` are the recordings whose contacts are known to lie within the tables; None: where a plausible modulus brings
-    them there. Where none lies within as declared, that modulus must bring most of them there.
+    `keep_ids` are the recordings whose contacts are known to lie within the tables; None: those that a plausible
+    modulus brings there. Where none lies within as declared, that modulus must bring most of them there.
     """
     inside = _inside(model, len(recordings))
     subset = replace(campaign, recordings=tuple(recordings))
@@ -79,13 +79,13 @@ def _inside(model: Model, recordings: int) -> Mask:
 
 
 def _inside_where_stiffest(campaign: Campaign, table: SigmaTable) -> Mask:
-    """Which contacts lie within the tables by the largest modulus that is plausible: contacts are narrowest then."""
+    """Which contacts lie within the tables at the largest plausible modulus, where contacts are narrowest."""
     stiffest = _skin_times("youngs_modulus_mpa")(campaign, LARGEST_FACTOR)
     return _inside(compose((), stiffest, table, "frf"), len(campaign.recordings))
 
 
 def _possible_unit_errors(campaign: Campaign, table: SigmaTable) -> list[Finding]:
-    """Each single field that, taken 1000 times smaller or larger, brings most contacts within the tables."""
+    """Findings on single fields that, taken 1000 times smaller or larger, bring most contacts within the tables."""
     findings = []
     for field, times, units in (
         ("preload_n", _recordings_times("preload_n"), ("mN", "kN")),

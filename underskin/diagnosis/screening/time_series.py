@@ -1,10 +1,9 @@
-"""Contradictions between the force of a time series and what is declared: slips of units, and exchanged channels.
+"""Recordings given as time series: contradictions of their force, and their FRF lines.
 
-The mean of the force is the preload, unless an AC coupling removed it. Its oscillation is the dynamic force, about: the
-peak for sines and blows, √2 times the standard deviation for sines and noise. Drift (a preload that relaxes) is not
-oscillation: the straight line through each eighth of the record is removed.
-
-Recordings given as time series, as the lines that a diagnosis uses.
+The mean force is the preload, unless AC coupling removed it. Its oscillation is about the dynamic force: the peak for
+sines and blows, √2 times the standard deviation for sines and noise. Drift, as of a relaxing preload, is not
+oscillation: the straight line through each eighth of the record is removed. Contradictions point to wrong units or
+exchanged channels.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,7 +24,7 @@ _SLIP, _WITHIN = 1000.0, 30.0
 
 
 def contradiction_of(recording: FrfRecording) -> Finding | None:
-    """What the force of a recording contradicts, if anything."""
+    """The finding where the force of a recording contradicts its declared values, else None."""
     if recording.force_n is None or recording.charge_pc is None:
         return None
     mean = float(np.mean(recording.force_n))
@@ -70,8 +69,8 @@ class Estimated:
     """The recordings as FRFs, and the findings on their time series.
 
     `doubtful`: the findings where the forces of many recordings contradict what is declared; then there are no
-    entries. `uneven`: how uneven the noise of the lines is, by the recording's id. `unsure`: the relative
-    uncertainty of all levels that noise in the channels leaves.
+    recordings. `uneven`: relative noise of the lines, by the recording's id. `unsure`: relative uncertainty of all
+    levels due to noise in the channels.
     """
 
     recordings: list[FrfRecording]
@@ -82,7 +81,7 @@ class Estimated:
 
 
 def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Estimated:
-    """The recordings with the lines that say something, without single ones whose force contradicts what is declared.
+    """The recordings with their usable lines, without single ones whose force contradicts what is declared.
 
     With `units_checked` contradictions are findings and nothing is left out.
     """
@@ -125,7 +124,7 @@ def as_lines(recordings: Sequence[FrfRecording], *, units_checked: bool) -> Esti
 
 
 def as_given(recordings: Sequence[FrfRecording], findings: Sequence[Finding]) -> list[Finding]:
-    """The findings with the fields that a recording was given by: a time series has no frequencies of its own."""
+    """The findings with the fields as given: a time series has a sample rate and charge instead of an FRF."""
     series = {recording.id for recording in recordings if recording.sample_rate_hz is not None}
     if len(series) == len(recordings):
         series.add("")
@@ -136,7 +135,7 @@ def as_given(recordings: Sequence[FrfRecording], findings: Sequence[Finding]) ->
 
 
 def _together(contradictions: list[Finding], recordings: int) -> list[Finding]:
-    """One finding where it is the same of all recordings, else one of each."""
+    """One finding where all recordings have the same, otherwise one for each."""
     kinds = {(finding.reason, finding.field, finding.arguments.get("given_in")) for finding in contradictions}
     if len(contradictions) == recordings > 1 and len(kinds) == 1:
         first = contradictions[0]
@@ -169,7 +168,7 @@ def _unusable(recording: FrfRecording, lines: Usable) -> Finding:
 
 
 def _with_lines(recording: FrfRecording, lines: Usable) -> FrfRecording:
-    """The recording with the lines that are used, of a time series those whose noise is independent."""
+    """The recording with its usable lines; of a time series those whose noise is independent."""
     if recording.sample_rate_hz is None and lines.frf.used_or_all.all():
         return recording
     frf = lines.frf.at(np.flatnonzero(lines.frf.used_or_all)[lines.choice.apart])
@@ -187,8 +186,8 @@ def _with_lines(recording: FrfRecording, lines: Usable) -> FrfRecording:
 
 
 def _lines_left_out(chosen: Sequence[Usable]) -> list[Finding]:
-    """How many lines are left out because the force has little power there, or none that the charge follows, where they
-    are many."""
+    """The finding on lines left out because the force has little power there, or the charge does not follow it, where
+    they are many."""
     choices = [lines.choice for lines in chosen]
     faint, used = (sum(len(getattr(choice, name)) for choice in choices) for name in ("idle", "lines"))
     dependent = used - sum(len(choice.apart) for choice in choices)
@@ -200,7 +199,7 @@ def _lines_left_out(chosen: Sequence[Usable]) -> list[Finding]:
 
 
 def _single_passes(series: Mapping[str, Usable]) -> list[Finding]:
-    """Where the force passes through its band once."""
+    """The finding on recordings whose force passes through its band once."""
     names = [name for name, lines in series.items() if lines.choice.once]
     if not names:
         return []
@@ -209,7 +208,8 @@ def _single_passes(series: Mapping[str, Usable]) -> list[Finding]:
 
 
 def _mains(series: Mapping[str, Usable]) -> list[Finding]:
-    """Where charge stands out at the mains' multiples and force does not, within the band or beside it."""
+    """Findings on charge that stands out at multiples of the mains frequency where the force does not, within the band
+    or near it."""
     pickups = {name: lines.choice.mains for name, lines in series.items() if lines.choice.mains is not None}
     findings = []
     for mains in sorted({pickup.mains_hz for pickup in pickups.values()}):

@@ -1,7 +1,6 @@
-"""Slips of units among the recordings: a force in kN, a sphere in m or a frequency in kHz beside the others.
+"""Wrong units among the recordings: a force in kN, a sphere in m or a frequency in kHz where others are not.
 
-A recording with a single such value is left out. Where the forces of all recordings contradict each other, that is a
-finding.
+A recording with a single such value is left out. A dynamic force that is far too small in all recordings is a finding.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,15 +14,15 @@ from underskin.recordings.campaign import FrfRecording
 from underskin.recordings.frf.estimation import lines_of
 from underskin.units import Mask
 
-_SLIP, _WITHIN = 1000.0, 3.0  # a value is back among the others, within this factor, once the slip is undone
+_SLIP, _WITHIN = 1000.0, 3.0  # a corrected value must be within this factor of the others
 _MOST_SHARE = 0.25  # of the recordings at most, or one of three
-_FEW = 4  # recordings below which the others must agree, each within the same factor
+_FEW = 4  # recordings below which the others must agree within the same factor
 _FAINT = 5e-4  # dynamic force over preload
 
 
 @dataclass(frozen=True)
 class _Field:
-    """A field whose values can be held against each other, and the units that its slips come from."""
+    """A field whose values are compared between recordings, and the units that cause its errors."""
 
     name: str
     of: Callable[[FrfRecording], float]
@@ -40,7 +39,7 @@ _FIELDS = (
 
 
 def single_unit_errors(recordings: Sequence[FrfRecording]) -> tuple[Mask, list[Finding]]:
-    """Which recordings have a value about 1000 × off all others, and the findings on them."""
+    """Which recordings have a value off all others by a factor of about 1000, and the findings on them."""
     off = np.zeros(len(recordings), dtype=bool)
     findings: list[Finding] = []
     if not recordings:
@@ -65,7 +64,7 @@ def single_unit_errors(recordings: Sequence[FrfRecording]) -> tuple[Mask, list[F
 
 
 def faint_oscillation(recordings: Sequence[FrfRecording]) -> list[Finding]:
-    """A dynamic force that is hardly there, as one in kN would be; only the laws of large amplitudes use it."""
+    """The finding on a negligible dynamic force, as one given in kN; only laws of large amplitudes use it."""
     ratio = max(recording.dynamic_force_n / recording.preload_n for recording in recordings)
     if ratio > _FAINT:
         return []

@@ -1,5 +1,4 @@
-"""Curves that nothing can be fitted to are named, and left out of a diagnosis; so are those that no law of a sphere can
-describe."""
+"""Curves that nothing can be fitted to, or that no law of a sphere describes: findings, left out of a diagnosis."""
 
 from dataclasses import replace
 
@@ -17,8 +16,10 @@ from underskin.units import Floats, to_si
 
 
 def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Finding]]:
-    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law;
-    and a finding on each, and on those under a tip that looks like a cone."""
+    """The campaign without the curves of one kind that have too few samples, do not load, or are beyond a sphere's law.
+
+    Each of these is a finding, and so are curves under a tip that looks like a cone.
+    """
     thinned = {recording.id: recording for recording in curve_lines(campaign, kind).campaign.recordings}
     findings, usable = [], []
     for recording in campaign.recordings:
@@ -37,7 +38,7 @@ def without_unusable(campaign: Campaign, kind: Kind) -> tuple[Campaign, list[Fin
 
 
 def _exchanged(recording: object) -> InvalidInput | None:
-    """The refusal of a curve whose columns look exchanged, which its raw samples tell."""
+    """The refusal of a curve whose columns look exchanged, from its raw samples."""
     try:
         if isinstance(recording, IndentationRecording | CompressionRecording):
             require_own_columns(recording)
@@ -47,7 +48,7 @@ def _exchanged(recording: object) -> InvalidInput | None:
 
 
 def _lacking(recording: object, skin: SkinDescription) -> InvalidInput | None:
-    """Why nothing can be concluded from a curve, thinned."""
+    """Why nothing can be concluded from a thinned curve; None if it is usable."""
     if isinstance(recording, IndentationRecording | CompressionRecording) and not np.ptp(recording.displacement_mm):
         return unusable("displacement_mm", float(recording.displacement_mm[0]), "must change")
     try:
@@ -68,11 +69,11 @@ def _lacking(recording: object, skin: SkinDescription) -> InvalidInput | None:
 def _of_other_tip(
     recording: IndentationRecording, skin: SkinDescription
 ) -> tuple[InvalidInput | None, InvalidInput | None]:
-    """Why nothing can be concluded from a curve, with every sample, that another tip than a sphere explains to its
-    noise; and why the tip may be another."""
+    """The refusal of a curve (every sample) that a tip other than a sphere explains to its noise, and the doubt where
+    the tip may be another."""
     try:
         tip = tip_of(*_columns(recording), skin.poisson_ratio, _thickness(skin))
-    except InvalidInput:  # of a way of too few samples, which its means do not have
+    except InvalidInput:  # loading or unloading has too few samples, unlike the thinned curve
         return None, None
     if tip is None or not tip.is_plain:
         return None, None

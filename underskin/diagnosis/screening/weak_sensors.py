@@ -1,7 +1,7 @@
-"""Sensors that answer with a small share of the others' level, in all of their recordings: a fault, not a spread.
+"""Sensors that respond with a small share of the others' level in all their recordings: a fault, not a spread.
 
-A sensor is weak where the largest of its levels y lies below the others' median by more than ln 2.9, and by far more
-than they scatter. Real sensors of one skin differ by tens of percent.
+A sensor is weak where the largest of its levels y lies below the others' median by more than ln 2.9 and by far more
+than their scatter. Sensors of one skin differ by tens of percent.
 """
 
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from underskin.units import Mask
 
 _LEAST_GAP = 1.07
 _SCATTERS = 4.0  # robust standard deviations of the others
-_MOST = 0.34  # of the sensors, or one of two
+_MOST = 0.34  # of the sensors at most, or one of two
 
 
 def weak_sensors(recordings: Sequence[FrfRecording], levels: Levels) -> tuple[Mask, list[Finding]]:
-    """Which recordings are of weak sensors (entries,), and the findings on these."""
+    """Which recordings are of weak sensors (recordings,), and the findings on these."""
     weak: Mask = np.zeros(len(recordings), dtype=bool)
     findings = []
     numbers = np.unique(levels.sensor)

@@ -1,9 +1,9 @@
-"""Campaigns of one skin diagnosed together: what acts in all of them, and what is there from a campaign on.
+"""Campaigns of one skin diagnosed together: which mechanisms act in all of them, and which from some date on.
 
-Curves of campaigns without FRFs are of the same material: they count once, with the first campaign of FRFs that
-says something. Each of those is diagnosed as it would be alone, which gives its noise, its findings and the sets of
-mechanisms that it asks for; then one set a campaign is chosen for all together (course.py). What a sensor's d33 did
-between them is told with the mechanisms taken into account (sensors.py).
+Each campaign with FRFs is first diagnosed alone, which gives its noise, findings and candidate sets of mechanisms; then
+one set per campaign is chosen for all together (course.py). Curves of campaigns without FRFs are of the same material
+and count once, with the first campaign of FRFs that has a result. Changes of the sensors' d33 between campaigns are
+corrected for the mechanisms (sensors.py).
 """
 
 import math
@@ -46,16 +46,16 @@ def diagnose_together(
     Parameters
     ----------
     campaigns
-        Two at least, one of them with FRFs; those are put in the order of their first recordings' times where all have
-        one.
+        Two at least, one of them with FRFs; those with FRFs are sorted by the time of their first recordings where all
+        have one.
     table
         σ.
     name
-        What the report calls them.
+        Their name in the report.
     without
         Mechanisms to leave out of the catalogue.
     progress
-        Told the share that is done.
+        Called with the share that is done.
 
     Returns
     -------
@@ -65,7 +65,8 @@ def diagnose_together(
     Raises
     ------
     InvalidInput
-        Fewer than two campaigns, none with FRFs, skins that are declared otherwise, or FRFs that are in two campaigns.
+        Fewer than two campaigns, none with FRFs, skins that are declared differently, or FRFs that are in two
+        campaigns.
     """
     with_frf, of_curves = by_frfs(curves_once(campaigns, set()))
     _check(with_frf, of_curves)
@@ -83,7 +84,7 @@ def _report(
     without: Collection[str],
     progress: Callable[[float], None],
 ) -> dict[str, Any]:
-    """Of campaigns with FRFs in their order, and what curves of others tell; of one alone its own."""
+    """The report on campaigns with FRFs in their order, with the curves of others; of a single usable one its own."""
     ordered, results = list[Campaign](), list[DiagnosisResult]()
     for number, campaign in enumerate(with_frf):
         counted = any(result.search is not None for result in results)
@@ -108,7 +109,8 @@ def _with_changed_sensors(
     table: SigmaTable,
     without: Collection[str],
 ) -> list[DiagnosisResult]:
-    """Diagnosed again where single sensors had changed since the campaign before: that is no physics of the skin."""
+    """The results, diagnosed again where single sensors changed since the previous campaign, which is no physics of the
+    skin."""
     sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
     single = changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
     again = []
@@ -124,7 +126,7 @@ def _outlying_sensors(result: DiagnosisResult) -> frozenset[str]:
 
 
 def _sensors(campaign: Campaign, result: DiagnosisResult, table: SigmaTable) -> SensorsOfCampaign | None:
-    """The sensors under the answer of the campaign alone, or without any mechanism."""
+    """The sensors of a campaign under its own answer, or without any mechanism."""
     leader = None if result.search is None else result.search.answers[0].explanation
     strengths: Values = {} if leader is None else {name: _strengths_of(leader, name) for name in leader.names}
     return sensors_of(campaign, strengths, table, used_recordings(result))
@@ -136,7 +138,7 @@ def _strengths_of(explanation: Explanation, name: str) -> dict[str, float]:
 
 
 def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaign]]:
-    """Those with FRFs, and those of curves alone."""
+    """The campaigns with FRFs, and those with curves only."""
     parts: tuple[list[Campaign], list[Campaign]] = ([], [])
     for campaign in campaigns:
         parts[not any(isinstance(recording, FrfRecording) for recording in campaign.recordings)].append(campaign)
@@ -144,14 +146,14 @@ def by_frfs(campaigns: Sequence[Campaign]) -> tuple[list[Campaign], list[Campaig
 
 
 def with_curves(campaign: Campaign, of_curves: Sequence[Campaign]) -> Campaign:
-    """The campaign with the curves of others of its skin, each called by its own campaign's name."""
+    """The campaign with the curves of other campaigns of its skin, whose names precede the curves' ids."""
     curves = [replace(curve, id=f"{other.name}: {curve.id}") for other in of_curves for curve in other.recordings]
     return replace(campaign, recordings=(*campaign.recordings, *curves)) if curves else campaign
 
 
 def curves_once(campaigns: Sequence[Campaign], seen: set[bytes]) -> list[Campaign]:
-    """The campaigns without curves that an earlier one, or one `seen` before, has number for number: a block that was
-    joined to the FRFs of two dates is one measurement."""
+    """The campaigns without curves that are identical to one of an earlier campaign or to one `seen` before: a block
+    that was added to the FRFs of two dates is one measurement."""
     distinct = []
     for campaign in campaigns:
         curves = {
@@ -172,7 +174,7 @@ def _curve(recording: CurveRecording) -> bytes:
 
 
 def refuse_copies(campaigns: Sequence[Campaign]) -> None:
-    """Raise InvalidInput where an FRF is in two campaigns, number for number: it would count twice."""
+    """Raise InvalidInput where two campaigns hold the identical FRF, which would count twice."""
     owners: dict[bytes, str] = {}
     for campaign in campaigns:
         for index, recording in enumerate(campaign.recordings):

@@ -1,12 +1,9 @@
-"""The report on several campaigns of one skin.
+"""The report on several campaigns of one skin that were diagnosed together.
 
-What recordings of each kind tell of several campaigns or skins, and where kinds contradict each other. Why no d33 of
-several campaigns, or of skins of one make, is to be quoted, and what may be quoted in its place.
-
-Sensors that a campaign's own diagnosis leaves out, as dead or weak: what is left out of one campaign is left out of
-what is said of all, and a sensor that died between two of them comes first.
-
-Clauses on how d33 changed from campaign to campaign. The report of campaigns of one skin that were diagnosed together.
+It lists the sensors that a campaign leaves out as dead or weak (those that failed between two campaigns first), the
+changes of d33 from campaign to campaign, the mechanisms with their dates, and what each kind of recording contributes.
+No d33 of several campaigns, or of skins of one make, is to be quoted; the clauses here say why, and what may be quoted
+in its place.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -57,8 +54,8 @@ from underskin.surrogate.sigma_table import SigmaTable
 
 
 def of_kinds(reports: Iterable[tuple[str, Reported]]) -> dict[str, Any]:
-    """`by_kind` and `contradictions`, these led by the name of the campaign or skin that the report is of; empty where
-    none has several kinds."""
+    """`by_kind` and `contradictions` of all reports, each contradiction with the name of its campaign or skin; empty
+    where no report has several kinds of recordings."""
     with_kinds = [(name, reported.document) for name, reported in reports if "by_kind" in reported.document]
     if not with_kinds:
         return {}
@@ -77,7 +74,7 @@ _MOST_NAMED = 3  # skins in a clause
 
 
 def of_campaigns(last: str, stated: StatedD33) -> str:
-    """A clause on the d33 of a joint report: it is that of the `last` campaign by its recordings alone."""
+    """A clause on the d33 of a joint report, which is that of the `last` campaign by its recordings alone."""
     if stated.document is None:
         return f"no d33 is to be quoted: in {last}, the last campaign, no answer explains the recordings"
     clause = f"d33 here is by the recordings of {last} alone, and not to be quoted for all campaigns"
@@ -89,7 +86,7 @@ def of_campaigns(last: str, stated: StatedD33) -> str:
 def of_skins(mean: float, unit: str, by_skin: Mapping[str, StatedD33], lacking: Mapping[str, Sequence[str]]) -> str:
     """A clause on the d33 of a fleet, the mean of its skins.
 
-    `each`: what the skins' recordings say alone; `lacking`: of some skins the mechanisms that the fleet finds in them
+    `by_skin`: d33 by each skin's recordings alone; `lacking`: of some skins the mechanisms that the fleet shows in them
     and their own diagnosis does not.
     """
     may: list[str] = []
@@ -107,7 +104,7 @@ def of_skins(mean: float, unit: str, by_skin: Mapping[str, StatedD33], lacking: 
 
 
 def not_identifiable(by_name: Mapping[str, StatedD33]) -> list[dict[str, str]]:
-    """What would not show in a campaign, or in a skin's, and keeps its d33 from being quoted."""
+    """Mechanisms that would not show in a campaign, or a skin's, and prevent quoting its d33."""
     return [
         {**row, "reason": f"{name} alone: {row['reason']}"}
         for name, stated in by_name.items()
@@ -122,20 +119,20 @@ def _few(skins: Sequence[str]) -> str:
 
 
 class Fault(StrEnum):
-    """Why a sensor is left out, as a sentence says it of one or of several."""
+    """Why a sensor is left out, in words that fit one or several sensors."""
 
     DEAD = "dead: no charge above noise"
     WEAK = "nearly dead: a small share of the others' charge"
     OTHER = "without a usable recording: see the findings"
 
 
-Faults = Mapping[str, Fault | None]  # by recorded sensor, None of one that is used
+Faults = Mapping[str, Fault | None]  # by recorded sensor; None if it is used
 
 
 @dataclass(frozen=True)
 class _Run:
-    """Campaigns in a row that record a sensor and leave it out: the first, the last one before and the first one after
-    that use it."""
+    """Consecutive campaigns that record a sensor and leave it out: the first of them, and the last before and the first
+    after them that use it."""
 
     fault: Fault
     first: int
@@ -144,7 +141,7 @@ class _Run:
 
 
 def used_recordings(result: DiagnosisResult) -> frozenset[str]:
-    """The recordings that a diagnosis used (ids)."""
+    """Ids of the recordings that a diagnosis used."""
     return (
         frozenset()
         if result.problem is None
@@ -153,7 +150,7 @@ def used_recordings(result: DiagnosisResult) -> frozenset[str]:
 
 
 def faults_of(campaign: Campaign, result: DiagnosisResult) -> Faults:
-    """Each sensor that was recorded with FRFs, and why none of these was used."""
+    """Each sensor with FRFs, and why none of these was used, or None."""
     used = used_recordings(result)
     owner = {recording.id: recording.sensor for recording in campaign.recordings if isinstance(recording, FrfRecording)}
     usable = {sensor for name, sensor in owner.items() if name in used}
@@ -176,7 +173,8 @@ def _fault(codes: set[FindingCode]) -> Fault:
 def exclusions_in_words(
     by_campaign: Sequence[Faults], sensors: Sequence[SensorsOfCampaign | None], dated: CampaignDates
 ) -> list[str]:
-    """A clause on all sensors that share a fault and its dates, those that came between two campaigns first."""
+    """Clauses on the sensors left out, one for each fault and its dates, those that failed between two campaigns
+    first."""
     runs: dict[_Run, list[str]] = {}
     for sensor in dict.fromkeys(sensor for faults in by_campaign for sensor in faults):
         for run in _runs_of_dates([faults.get(sensor, _NOT_RECORDED) for faults in by_campaign]):
@@ -206,7 +204,7 @@ def _runs_of_dates(states: Sequence[Fault | str | None]) -> list[_Run]:
 
 
 def _clause(run: _Run, names: Sequence[str], sensors: Sequence[SensorsOfCampaign | None], dated: CampaignDates) -> str:
-    """ "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
+    """A clause such as "sensor s06 is dead since 2026-09-21: no charge above noise, after 17.1 pC/N on 2026-05-12"."""
     is_single = len(names) == 1
     who = f"sensor {names[0]}" if is_single else f"sensors {listed(names)}"
     state, _, why = run.fault.partition(": ")
@@ -223,20 +221,20 @@ def _clause(run: _Run, names: Sequence[str], sensors: Sequence[SensorsOfCampaign
 
 
 def _earlier(names: Sequence[str], before: SensorsOfCampaign | None) -> str:
-    """d33 that the sensors had."""
+    """d33 of the sensors before."""
     had = (
         [] if before is None else [f"{before.d33[before.ids.index(name)]:.3g}" for name in names if name in before.ids]
     )
     return f"{listed(had)} pC/N" if had else "a response"
 
 
-_MOST_CHANGES, _MOST_CAUSES = 3, 3  # changes in a statement, and mechanisms that would make one
+_MOST_CHANGES, _MOST_CAUSES = 3, 3  # changes in a statement, and mechanisms named as causes of one
 _OF_THE_CHAIN = ("an amplifier's gain", "the temperature")
 
 
 def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: CampaignDates) -> list[str]:
-    """What a statement says of d33: of the array first where it changed, and of sensors beside it, of more than a few
-    how many."""
+    """Clauses on changes of d33: of the array, first if it changed, and of sensors, of which more than a few are
+    counted."""
     dates = 0 if over is None else len(over.numbers)
     steps = [change for change in changed if change.sensor is None and change.is_step and dates > 2]
     of_array = [change_in_words(change, dated) for change in steps]
@@ -251,8 +249,8 @@ def in_statement(changed: Sequence[Change], over: ArrayOverDates | None, dated: 
 
 
 def change_in_words(change: Change, dated: CampaignDates) -> str:
-    """A clause on d33 of one sensor or of the array; of the array, that a change of level tells nothing of its
-    cause."""
+    """A clause on the change of d33 of one sensor or of the array; of the array with its possible causes, which a
+    change of level cannot separate."""
     if change.exchanged_with is not None:
         both = f"sensors {change.sensor} and {change.exchanged_with}"
         return f"{both} look exchanged since {dated.called(change.since)}: each has the d33 that the other had"
@@ -267,7 +265,7 @@ def change_in_words(change: Change, dated: CampaignDates) -> str:
 
 
 def _array_in_words(over: ArrayOverDates, changed: Sequence[Change], dated: CampaignDates) -> list[str]:
-    """From the first to the last campaign."""
+    """Clauses on the array's d33 from the first to the last campaign."""
     first, last = over.numbers[0], over.numbers[-1]
     between = f"between {dated.called(first)} and {dated.called(last)}"
     clause = array_change_in_words(
@@ -287,7 +285,7 @@ def _causes(change: Change) -> str:
 
 
 _ALTERNATIVES = 6
-_DESCRIBED = 0.5  # probability of something undescribed up to which a campaign's d33 is told
+_DESCRIBED = 0.5  # probability of an unlisted cause up to which a campaign's d33 is reported
 
 
 def together_report(
@@ -300,8 +298,11 @@ def together_report(
     outliers: Sequence[frozenset[str]],
     table: SigmaTable,
 ) -> dict[str, Any]:
-    """Of the campaigns in their order, with the result and the report of each alone; `usable` are the numbers of those
-    that tell anything, `dated` these with their dates; `alone` the sensors that each says stand alone."""
+    """The joint report of the campaigns in their order, with the result and the report of each alone.
+
+    `usable` are the indices of the campaigns with a result, `dated` these with their dates; `outliers` the sensors that
+    stand apart within each campaign.
+    """
     candidates = [
         Candidate(result.problem, result.search)
         for result in (results[number] for number in usable)
@@ -316,7 +317,7 @@ def together_report(
     sensors = [
         sensors_of(campaigns[number], strengths[index], table, used_recordings(results[number]))
         if undescribed[index] <= _DESCRIBED
-        else None  # whose levels no mechanism here explains
+        else None  # no known mechanism explains its levels
         for index, number in enumerate(usable)
     ]
     unsure = unsure_of_changes(candidates, leader)
@@ -390,14 +391,14 @@ def together_report(
 
 
 def _with_causes(change: Change, candidates: Sequence[Candidate], leader: Course) -> Change:
-    """With the mechanisms that would make it, of a change of the array."""
+    """The change with the mechanisms that could cause it, if it is of the array."""
     if change.sensor is not None:
         return change
     return replace(change, causes=causes(candidates[change.since], leader.sets[change.since], change))
 
 
 def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, Any]:
-    """`d33.per_campaign`: of the array over the sensors that the campaigns share."""
+    """`d33.per_campaign`: d33 of the array over the sensors common to the campaigns."""
     if over is None:
         return {}
     ends = over.d33[:, None] + SDS_OF_95 * np.outer(over.uncertainty, [0.0, -1.0, 1.0])
@@ -412,7 +413,7 @@ def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, An
 
 
 def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str, dict[str, float]]]:
-    """Of each campaign the parameters of its mechanisms, from all campaigns in which they have that strength."""
+    """The parameters of each campaign's mechanisms, pooled over all campaigns with the same strength."""
     strengths: list[dict[str, dict[str, float]]] = [{} for _ in candidates]
     for mechanism in dict.fromkeys(name for names in leader.sets for name in names):
         for run in _runs(candidates, leader, mechanism):
@@ -424,7 +425,7 @@ def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str
 
 
 def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[dict[int, Shared]]:
-    """The campaigns in which a mechanism acts, by number, those together in which it has the same strength."""
+    """The campaigns in which a mechanism acts, by index, grouped by equal strength."""
     runs: list[dict[int, Shared]] = []
     for number, (candidate, names) in enumerate(zip(candidates, leader.sets, strict=True)):
         fit = candidate.explained(frozenset(names)) if mechanism in names else None
@@ -475,22 +476,22 @@ def _mechanisms(
 
 
 def _shown_in(candidates: Sequence[Candidate], mechanism: str) -> list[int]:
-    """The campaigns that could show it."""
+    """Indices of the campaigns that could show a mechanism."""
     return [number for number, candidate in enumerate(candidates) if mechanism not in candidate.search.unsupported]
 
 
 def _scope(where: Sequence[int], able: Sequence[int], dated: CampaignDates) -> dict[str, Any]:
-    """In which campaigns; `since` where it is there from one date on in all that can show it, and not before."""
+    """The campaigns in which a mechanism acts; `since` if it acts in all that can show it from one date on, and in none
+    before."""
     from_on = list(where) == [number for number in able if number >= where[0]] and where[0] > min(able)
     since = dated.since(where[0]) if from_on else None
     return {"campaigns": [dated.names[number] for number in where], **({"since": since} if since else {})}
 
 
 def _aged(changed: Sequence[Change], dated: CampaignDates) -> list[dict[str, Any]]:
-    """A d33 that changed from one campaign to the next, under the most probable mechanism that would do that: of one
-    sensor ageing, where it fell.
+    """Changes of d33 between campaigns as mechanisms: the most probable cause, or ageing where one sensor's d33 fell.
 
-    Each has a statement, since a change of level alone does not tell its cause.
+    Each has a statement, since a change of level alone does not show its cause.
     """
     rows = []
     for change in changed:
@@ -521,7 +522,7 @@ def _aged(changed: Sequence[Change], dated: CampaignDates) -> list[dict[str, Any
 
 
 def _groups(changed: Sequence[Change]) -> list[dict[str, Any]]:
-    """The mechanisms of which one made a change of level."""
+    """Groups of mechanisms of which one caused a change of level."""
     return [
         {"mechanisms": sorted(change.causes), "probability": round(change.probability, 3)}
         for change in changed
@@ -530,7 +531,7 @@ def _groups(changed: Sequence[Change]) -> list[dict[str, Any]]:
 
 
 def _presence(posterior: Courses, described: float) -> list[dict[str, Any]]:
-    """The posterior that each mechanism acts in at least one campaign."""
+    """The posterior that each mechanism acts in at least one campaign; `described` is that of known physics."""
     once: dict[str, float] = {}
     for sequence in posterior.best:
         for name in {name for names in sequence.sets for name in names}:
@@ -561,7 +562,8 @@ def _statement(
     of_levels: Sequence[str],
     of_d33: str,
 ) -> str:
-    """`decisive` are clauses that come before the verdict, `of_levels` those on d33 of array and sensors."""
+    """The statement; `decisive` are clauses that come before the verdict, `of_levels` those on d33 of array and
+    sensors."""
     percent = in_percent(probability)
     names = dated.names
     parts = [
