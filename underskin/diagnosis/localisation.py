@@ -222,15 +222,15 @@ def _blocks(lines: Lines, bases: dict[str, Floats]) -> dict[str, Indices]:
         if name == "sensor":
             blocks[name] = none
             continue
-        varies = [len(np.unique(axes[name][lines.sensor == number], axis=0)) > 1 for number in np.unique(lines.sensor)]
+        varies = [len(np.unique(axes[name][lines.sensor == sensor], axis=0)) > 1 for sensor in np.unique(lines.sensor)]
         blocks[name] = lines.sensor if all(varies) else (days if name != "recorded_at" else none)
     return blocks
 
 
 def _undecidable(basis: Floats, others: list[Floats], blocks: Indices) -> Undecidable | None:
     arrangements = 1.0
-    for number in np.unique(blocks):
-        arrangements *= float(factorial(min(int((blocks == number).sum()), 20)))
+    for block in np.unique(blocks):
+        arrangements *= float(factorial(min(int((blocks == block).sum()), 20)))
     if arrangements < _LEAST_ARRANGEMENTS:
         return Undecidable.FEW_EXCHANGEABLE
     if others:

@@ -102,7 +102,7 @@ def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]
     cycles = [recording.load_cycles for recording in recordings if recording.load_cycles is not None]
     return [
         FrfConditions(
-            id=f"candidate {number}",
+            id=f"candidate {index}",
             sensor=sensor,
             indenter_radius_mm=sphere,
             preload_n=force,
@@ -113,7 +113,7 @@ def candidates(conditions: Conditions, limits: RigLimits) -> list[FrfConditions]
             position_mm=(position[0] + round(offset, 3), position[1]),
             frequency_hz=np.array([COLLAPSED_HZ]),
         )
-        for number, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
+        for index, (force, sphere, amplitude, dwell, offset) in enumerate(_settings(limits))
     ]
 
 

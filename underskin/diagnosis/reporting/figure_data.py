@@ -224,8 +224,8 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
     chosen = _worst([recording.sensor for recording in frf_recordings(lines.campaign)], misfits[1])
     most = int(np.clip(_MOST_FRF_POINTS // len(chosen), _FEWEST_LINES, _MOST_LINES))
     shown = []
-    for number in chosen:
-        recording, span = lines.campaign.recordings[number], lines.spans[number]
+    for index in chosen:
+        recording, span = lines.campaign.recordings[index], lines.spans[index]
         assert isinstance(recording, FrfRecording)
         shown_rows = span.start + _thinned_lines(lines.frequency[span], most)
         shown.append(
@@ -240,8 +240,8 @@ def shown_frfs(problem: FittingProblem, before: Explanation, after: Explanation)
                 before=predicted_before[shown_rows],
                 after=predicted_after[shown_rows],
                 deviation=deviation[:, shown_rows],
-                misfit_before=misfits[0][number],
-                misfit_after=misfits[1][number],
+                misfit_before=misfits[0][index],
+                misfit_after=misfits[1][index],
             )
         )
     return shown
@@ -277,15 +277,15 @@ def _misfit_percent(measured: Complexes, predicted: Complexes) -> float:
 
 def _worst(sensors: Sequence[str], misfits: Sequence[float]) -> list[int]:
     """Indices of the recordings shown, in order."""
-    order = sorted(range(len(misfits)), key=lambda number: -misfits[number])
+    order = sorted(range(len(misfits)), key=lambda index: -misfits[index])
     if len(order) <= MOST_RECORDINGS:
         return order
     seen: dict[str, int] = {}
     ranks = {}
-    for number in order:
-        ranks[number] = seen[sensors[number]] = seen.get(sensors[number], -1) + 1
-    chosen = set(sorted(order, key=lambda number: ranks[number])[:MOST_RECORDINGS])
-    return [number for number in order if number in chosen]
+    for index in order:
+        ranks[index] = seen[sensors[index]] = seen.get(sensors[index], -1) + 1
+    chosen = set(sorted(order, key=lambda index: ranks[index])[:MOST_RECORDINGS])
+    return [index for index in order if index in chosen]
 
 
 def _thinned_lines(frequency: Floats, most: int) -> Indices:
@@ -447,8 +447,8 @@ class Thinned:
 
 def _steps_of_samples(coordinate: Floats, most: int) -> Indices:
     """The step of each sample (rows,), with about equal numbers of distinct values of `coordinate`."""
-    distinct, number = np.unique(np.round(coordinate, 6), return_inverse=True)
-    steps: Indices = number.reshape(-1) * min(len(distinct), most) // len(distinct)
+    distinct, index = np.unique(np.round(coordinate, 6), return_inverse=True)
+    steps: Indices = index.reshape(-1) * min(len(distinct), most) // len(distinct)
     return steps
 
 
@@ -467,12 +467,12 @@ def _steps_of_lines(lines: Lines, most: int) -> Indices:
 
 def _stepped(column: Floats, axis: str) -> Levels:
     """The distinct values of a column as steps, or steps of about equal counts; displacements in a readable unit."""
-    distinct, number = np.unique(np.round(column, 6), return_inverse=True)
+    distinct, index = np.unique(np.round(column, 6), return_inverse=True)
     steps = min(len(distinct), _MOST_OF_TRAVEL if axis == _TRAVEL else _MOST_LEVELS)
     of_value = np.arange(len(distinct)) * steps // len(distinct)
     starts = np.searchsorted(of_value, np.arange(steps))
     low, high = distinct[starts], distinct[np.append(starts[1:], len(distinct)) - 1]
-    step, middle = of_value[number.reshape(-1)], (low + high) / 2
+    step, middle = of_value[index.reshape(-1)], (low + high) / 2
     if axis != _TRAVEL:
         return Levels(step, _distinct(middle, _DIGITS, fractional=False), low, high, AXES[axis])
     unit, scale = readable_unit(axis, float(np.abs(distinct).max()))

@@ -230,7 +230,7 @@ def before_and_after(
             mode="markers",
             marker={"color": colour, "symbol": marker, "size": 6, "opacity": 0.7},
             name=("before", "after")[panel - 1],
-            text=[ids[number] for number in points.recording],
+            text=[ids[index] for index in points.recording],
             hovertemplate="%{text}<br>predicted %{x:.4g}<br>measured %{y:.4g}<extra></extra>",
             row=1,
             col=panel,
@@ -330,16 +330,16 @@ def _by_sensor(
     rows: Sequence[Mapping[str, Any]], campaigns: Sequence[str], sensors: Sequence[str]
 ) -> Iterator[go.Scatter]:
     offsets = _SENSORS_WIDTH * (np.arange(len(sensors)) - (len(sensors) - 1) / 2) / len(sensors)
-    for number, sensor in enumerate(sensors):
+    for index, sensor in enumerate(sensors):
         sensor_rows = [row for row in rows if row["sensor"] == sensor]
         yield go.Scatter(
-            x=[campaigns.index(row["campaign"]) + offsets[number] for row in sensor_rows],
+            x=[campaigns.index(row["campaign"]) + offsets[index] for row in sensor_rows],
             y=[row["value"] for row in sensor_rows],
             error_y=_error_bars(sensor_rows),
             mode="lines+markers",
             name=escape(sensor),
-            line={"color": LINE_COLOURS[number % len(LINE_COLOURS)], "width": 1},
-            marker={"symbol": _MARKERS[number % len(_MARKERS)], "size": 8},
+            line={"color": LINE_COLOURS[index % len(LINE_COLOURS)], "width": 1},
+            marker={"symbol": _MARKERS[index % len(_MARKERS)], "size": 8},
             text=[escape(row["campaign"]) for row in sensor_rows],
             hovertemplate="%{text}: %{y:.4g} pC/N<extra>%{fullData.name}</extra>",
         )

@@ -199,8 +199,8 @@ def _beyond_tables(problem: FittingProblem, explanation: Explanation) -> list[Fi
     answer = in_words(mechanisms) or SIMPLEST[problem.kind]
     recordings = problem.lines.campaign.recordings
     return [
-        Finding(Reason.OUT_OF_TABLES_FITTED, recordings[number].id, "preload_n", {"answer": answer})
-        for number in outside.tolist()
+        Finding(Reason.OUT_OF_TABLES_FITTED, recordings[index].id, "preload_n", {"answer": answer})
+        for index in outside.tolist()
     ]
 
 

@@ -149,7 +149,7 @@ def _absolute(explanation: Explanation, index: int, multiples: list[float]) -> l
     best, parameter = explanation.best, explanation.model.parameters[index]
     assert parameter.relative_to is not None
     other = parameter_index(explanation, parameter.relative_to)
-    rows = [best.hypothesis.mean_places.index(number) for number in (index, other)]
+    rows = [best.hypothesis.mean_places.index(i) for i in (index, other)]
     deviation = float(np.sqrt(max(best.covariance[np.ix_(rows, rows)].sum(), 0.0)))
     unit = float(np.exp(explanation.point.fit[other]))
     factor = np.exp(SDS_OF_95 * deviation)
@@ -503,13 +503,13 @@ def outlying_sensors(problem: FittingProblem, shown: Explanation) -> str:
     """A clause on the sensors whose d33 lies far from the others'; empty where none does, or without sensor spread."""
     if _SPREAD not in shown.names or problem.kind != "frf":
         return ""
-    numbers, off, deviation = _sensor_deviations(problem, shown)
+    indices, off, deviation = _sensor_deviations(problem, shown)
     if len(off) < _LEAST_SENSORS:
         return ""
     spread = _ROBUST * float(np.median(np.abs(off)))
     far = np.abs(off) > np.maximum(_LEAST, _OUTLIER_SDS * np.maximum(spread, deviation))
     rows = np.flatnonzero(far)[np.argsort(-np.abs(off[far]), kind="stable")].tolist()
-    names = [problem.lines.campaign.skin.sensors[number].id for number in numbers.tolist()]
+    names = [problem.lines.campaign.skin.sensors[index].id for index in indices.tolist()]
     return ", ".join(_clause(names[row], off[row], deviation[row]) for row in rows[:_MOST])
 
 
@@ -517,12 +517,12 @@ def _sensor_deviations(problem: FittingProblem, shown: Explanation) -> tuple[Ind
     """Indices of the sensors, d33 of each over the median minus 1, and its standard deviation."""
     levels = shown.best.levels
     sensor_residuals = residuals(problem, shown, levels.gain, levels.position)
-    numbers, sensor = np.unique(problem.lines.sensor, return_inverse=True)
+    indices, sensor = np.unique(problem.lines.sensor, return_inverse=True)
     weight = sensor_residuals.gain_deviation**-2
     total = np.bincount(sensor, weight)
     value = 1 + np.bincount(sensor, weight * sensor_residuals.gain) / total
     median = float(np.median(value))
-    return numbers, value / median - 1, np.asarray(total**-0.5 / median, dtype=float)
+    return indices, value / median - 1, np.asarray(total**-0.5 / median, dtype=float)
 
 
 def _clause(sensor: str, off: float, deviation: float) -> str:

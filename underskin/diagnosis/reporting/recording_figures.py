@@ -89,8 +89,8 @@ def curve_figure(curves: Sequence[ShownCurve], kind: Kind, before: str, after: s
     figure = make_subplots(
         1 + panels, 1, shared_xaxes=True, vertical_spacing=0.035, row_heights=[1 - panels * share, *[share] * panels]
     )
-    for number, drawing in enumerate(drawings):
-        figure.add_traces([{**trace, "visible": number == 0} for trace in drawing.traces])
+    for index, drawing in enumerate(drawings):
+        figure.add_traces([{**trace, "visible": index == 0} for trace in drawing.traces])
     for path, value in drawings[0].layout.items():
         figure.layout[path] = value
     figure.update_layout(

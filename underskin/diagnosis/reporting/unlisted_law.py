@@ -317,8 +317,8 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
     ends = _ends(leading, law, base)
     is_past = law.axis.name in _NOT_REPEATABLE
     templates = [_nearest(problem, law.axis, at) if is_past else base for at in ends.both]
-    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, number) for number in templates))
-    recordings = [_conditions_of(problem, number) for number in templates]
+    count, probability = _enough(abs(ends.difference) / max(_scatter(problem, leading, index) for index in templates))
+    recordings = [_conditions_of(problem, index) for index in templates]
     if not is_past:
         for recording, at in zip(recordings, ends.both, strict=True):
             recording[law.axis.name] = float(f"{at:.4g}")
@@ -326,7 +326,7 @@ def confirming(problem: FittingProblem, leading: LeadingLaw) -> dict[str, Any]:
     differs = f"{100 * abs(np.expm1(ends.difference)):.2g} %"
     chance = f"with a probability of {in_percent(probability)}"
     if is_past:
-        first, second = (problem.collapsed.campaign.recordings[number].id for number in templates)
+        first, second = (problem.collapsed.campaign.recordings[index].id for index in templates)
         statement = (
             f"Repeating {first} and {second} after one another, {count_text} of each in turns, should tell whether it "
             f"is the time, {chance}: if it is, the {differs} are gone by which they differ beyond what the known "
@@ -399,8 +399,8 @@ def _nearest(problem: FittingProblem, axis: Axis, at: float) -> int:
     return int(np.argmin(np.abs(values - at)))
 
 
-def _conditions_of(problem: FittingProblem, number: int) -> dict[str, Any]:
+def _conditions_of(problem: FittingProblem, index: int) -> dict[str, Any]:
     """The conditions of a recording, in lab units."""
-    recording: FrfConditions = frf_of(problem.collapsed.campaign)[number]
+    recording: FrfConditions = frf_of(problem.collapsed.campaign)[index]
     fields = {name: getattr(recording, name) for name in _FIELDS}
     return {name: value for name, value in fields.items() if value is not None}

@@ -65,17 +65,17 @@ def _least_gain(step: Step) -> float:
 
 def without_step(recordings: Sequence[FrfRecording], levels: Levels, step: Step) -> tuple[list[FrfRecording], Finding]:
     """The recordings corrected for the factor, without those that have no level, and the finding."""
-    off = levels.number[step.off].tolist()
+    off = levels.index[step.off].tolist()
     arguments = {
         "factor": step.factor,
         "meant": _CONVENTION[abs(log(step.factor)) > 0.5],
-        "of": [recordings[number].id for number in off],
+        "of": [recordings[index].id for index in off],
         "recordings": len(recordings),
-        "left_out": len(recordings) - len(levels.number),
+        "left_out": len(recordings) - len(levels.index),
     }
     right = [
-        _times(recordings[number], 1 / step.factor) if number in off else recordings[number]
-        for number in levels.number.tolist()
+        _times(recordings[index], 1 / step.factor) if index in off else recordings[index]
+        for index in levels.index.tolist()
     ]
     return right, Finding(Reason.AMPLITUDE_FACTOR, "", "dynamic_force_n", arguments)
 

@@ -38,7 +38,7 @@ class Exchange:
 
 def exchanged_cables(levels: Levels) -> Exchange | None:
     """The exchange of largest gain, None where none is significant."""
-    numbers = np.unique(levels.sensor).tolist()
+    sensors = np.unique(levels.sensor).tolist()
     base = levels.fit(levels.value)
     tried = sorted(
         (exchange for spread in _SPREADS for exchange in _tried(levels, base, spread)),
@@ -51,7 +51,7 @@ def exchanged_cables(levels: Levels) -> Exchange | None:
     best = max(fitted, key=lambda exchange: exchange.gain, default=None)
     if best is None or best.gain < _GAIN:
         return None
-    cost_of_step = log(max(len(levels.value) - len(numbers), 1))
+    cost_of_step = log(max(len(levels.value) - len(sensors), 1))
     steps = [levels.fit(levels.value, column).evidence - base.evidence for column in _steps(levels, best)]
     return best if best.gain > max(steps) - cost_of_step + _OVER_STEP else None
 
@@ -61,17 +61,17 @@ def with_right_sensors(
 ) -> tuple[list[FrfRecording], Finding]:
     """The recordings with their true sensors, and the finding; contacts move with the sensors, whose `positions` are in
     mm."""
-    since = levels.number[exchange.since]
-    names = dict(zip(levels.sensor.tolist(), (recordings[number].sensor for number in levels.number), strict=True))
-    first, second = (names[number] for number in exchange.sensors)
-    order = dict(zip(levels.number.tolist(), levels.order.tolist(), strict=True))
-    start = min(since.tolist(), key=lambda number: order[number])
+    since = levels.index[exchange.since]
+    names = dict(zip(levels.sensor.tolist(), (recordings[index].sensor for index in levels.index), strict=True))
+    first, second = (names[sensor] for sensor in exchange.sensors)
+    order = dict(zip(levels.index.tolist(), levels.order.tolist(), strict=True))
+    start = min(since.tolist(), key=lambda index: order[index])
     arguments = {"first": first, "second": second, "since": recordings[start].id, "recordings": len(since)}
     right = list(recordings)
-    for number in since.tolist():
-        recording = recordings[number]
+    for index in since.tolist():
+        recording = recordings[index]
         there = second if recording.sensor == first else first
-        right[number] = replace(
+        right[index] = replace(
             recording, sensor=there, position_mm=_moved(recording, positions[recording.sensor], positions[there])
         )
     return right, Finding(Reason.CABLES_EXCHANGED, "", "sensor", arguments)
@@ -116,4 +116,4 @@ def _fit(levels: Levels, exchange: Exchange) -> LevelFit:
 def _steps(levels: Levels, exchange: Exchange) -> list[Floats]:
     """A step of either sensor since the exchange (recordings, 1)."""
     late = np.isin(np.arange(len(levels.value)), exchange.since)
-    return [_STEP * (late & (levels.sensor == number)).astype(float)[:, None] for number in exchange.sensors]
+    return [_STEP * (late & (levels.sensor == sensor)).astype(float)[:, None] for sensor in exchange.sensors]

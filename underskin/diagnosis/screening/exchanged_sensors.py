@@ -131,7 +131,7 @@ class ExchangeEvidence:
     def exchange(self, indices: Indices, others: Sequence[str]) -> Start:
         """The most probable start of an exchange; `indices` are the sensors' recordings in time, `others` the sensor of
         each after the exchange."""
-        turned = self._response([self._recordings[number] for number in indices], others)
+        turned = self._response([self._recordings[index] for index in indices], others)
         given = DisplacedResponse(self._labelled.value[:, indices], self._labelled.slope[:, indices])
         level, displacements = self._level[indices], range(len(self._miss_mm))
         change = np.stack([self._density(turned, level, at) - self._density(given, level, at) for at in displacements])
@@ -141,7 +141,7 @@ class ExchangeEvidence:
         prior[0] = -log(2)
         weighed = evidence - logsumexp(self._total) + prior
         first = int(np.argmax(weighed))
-        sensor = np.array([self._recordings[number].sensor for number in indices[first:]])
+        sensor = np.array([self._recordings[index].sensor for index in indices[first:]])
         without = [
             logsumexp(self._total + change[..., first:][..., sensor != name].sum(axis=-1)) for name in set(sensor)
         ]
@@ -211,7 +211,7 @@ def without_exchanges(
     if not unasked.any():
         return list(recordings), []
     tells = np.flatnonzero(~silent & (level > _WEAK * usual * shape))
-    informative = [recordings[number] for number in tells.tolist()]
+    informative = [recordings[index] for index in tells.tolist()]
     evidence = ExchangeEvidence(campaign.skin, informative, level[tells] / (usual * largest), largest, table)
     links = _links(campaign, [recording for recording, odd in zip(informative, unasked[tells], strict=True) if odd])
     right, findings = list[FrfRecording | None](recordings), list[Finding]()
@@ -219,12 +219,12 @@ def without_exchanges(
     exchanges, contradicting = _explained(informative, links, evidence, mute)
     for exchange in exchanges:
         findings.append(_finding(exchange, informative))
-        for number in exchange.since:
-            right[tells[number]] = _relabelled(campaign, informative[number], exchange.true_sensor)
+        for index in exchange.since:
+            right[tells[index]] = _relabelled(campaign, informative[index], exchange.true_sensor)
     if contradicting:
-        findings.append(_contradiction([informative[number] for number in contradicting]))
-        for number in contradicting:
-            right[tells[number]] = None
+        findings.append(_contradiction([informative[index] for index in contradicting]))
+        for index in contradicting:
+            right[tells[index]] = None
     return [recording for recording in right if recording is not None], findings
 
 
@@ -243,7 +243,7 @@ def _explained(
         if consistent and exchange.least > _GAIN_OF_EACH and not settled & set(exchange.true_sensor):
             chosen.append(exchange)
             settled |= set(exchange.true_sensor)
-    return chosen, sorted({number for move in moves if not settled & set(move.true_sensor) for number in move.since})
+    return chosen, sorted({index for move in moves if not settled & set(move.true_sensor) for index in move.since})
 
 
 def _weighed(
@@ -254,9 +254,10 @@ def _weighed(
     exchanges = []
     for true_sensor in tried:
         indices = sorted(
-            (n for n, recording in enumerate(recordings) if recording.sensor in true_sensor), key=lambda n: order[n]
+            (index for index, recording in enumerate(recordings) if recording.sensor in true_sensor),
+            key=lambda index: order[index],
         )
-        start = evidence.exchange(np.array(indices), [true_sensor[recordings[number].sensor] for number in indices])
+        start = evidence.exchange(np.array(indices), [true_sensor[recordings[index].sensor] for index in indices])
         gain = start.gain - log(len(tried))
         if gain > _GAIN:
             exchanges.append(_Exchange(true_sensor, indices[start.first :], indices[: start.first], gain, start.least))

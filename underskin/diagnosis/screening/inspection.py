@@ -186,23 +186,23 @@ def _without_copies(recordings: list[FrfRecording]) -> tuple[list[FrfRecording],
     size = np.array([float(np.abs(values).mean()) for values in lines])
     original = np.arange(len(recordings))
     order = np.argsort(size, kind="stable")
-    for rank, number in enumerate(order):
+    for rank, index in enumerate(order):
         for earlier in order[:rank][::-1]:
-            if size[number] - size[earlier] > _SAME * size[number]:
+            if size[index] - size[earlier] > _SAME * size[index]:
                 break
-            if _alike(lines[number], lines[earlier]):
-                original[max(number, earlier)] = min(original[number], original[earlier])
+            if _alike(lines[index], lines[earlier]):
+                original[max(index, earlier)] = min(original[index], original[earlier])
     findings = [
         Finding(
             Reason.DUPLICATED_RECORDING,
-            recordings[number].id,
+            recordings[index].id,
             "frf_re_pc_per_n",
             {"original": recordings[int(first)].id},
         )
-        for number, first in enumerate(original)
-        if first != number
+        for index, first in enumerate(original)
+        if first != index
     ]
-    return [recording for number, recording in enumerate(recordings) if original[number] == number], findings
+    return [recording for index, recording in enumerate(recordings) if original[index] == index], findings
 
 
 def _alike(first: Complexes, second: Complexes) -> bool:

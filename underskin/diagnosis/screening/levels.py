@@ -91,7 +91,7 @@ _OVERALL, _SMOOTH, _CURVATURE = 3.0, 0.3, 0.15  # prior standard deviations of t
 class Levels:
     """Columns over the recordings with an informative level."""
 
-    number: Indices  # of the recording among all
+    index: Indices  # of the recording among all
     value: Floats  # y
     sensor: Indices
     order: Floats  # 0, 1, … in time
@@ -179,16 +179,14 @@ def levels(campaign: Campaign, recordings: Sequence[FrfRecording], table: SigmaT
     cycles = [recording.load_cycles for recording in recordings]
     counted = None if any(count is None for count in cycles) else np.array(cycles, dtype=float)[chosen]
     return Levels(
-        number=chosen,
+        index=chosen,
         value=np.log(level[chosen] / shape[chosen]),
-        sensor=np.array([ids.index(recordings[number].sensor) for number in chosen.tolist()], dtype=np.intp),
+        sensor=np.array([ids.index(recordings[index].sensor) for index in chosen.tolist()], dtype=np.intp),
         order=recording_order(recordings)[chosen],
         slope=slope[chosen],
-        smooth=_smooth(
-            campaign, [recordings[number] for number in chosen.tolist()], recording_order(recordings)[chosen]
-        ),
+        smooth=_smooth(campaign, [recordings[index] for index in chosen.tolist()], recording_order(recordings)[chosen]),
         cycles=counted,
-        axes=tuple(axis.of([recordings[number].id for number in chosen.tolist()]) for axis in axes_of(subset)),
+        axes=tuple(axis.of([recordings[index].id for index in chosen.tolist()]) for axis in axes_of(subset)),
     )
 
 
@@ -275,10 +273,10 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
     base = compose((), conditions, table, "frf")
     start = np.array([parameter.start for parameter in base.parameters])
     prediction = base.predict(start)
-    value = prediction.value[levels.number]
+    value = prediction.value[levels.index]
     declared = np.stack(
         [
-            (slope[levels.number] / value).real * parameter.prior.sd
+            (slope[levels.index] / value).real * parameter.prior.sd
             for parameter, slope in zip(base.parameters, prediction.slopes, strict=True)
             if isinstance(parameter.prior, Normal)
         ],
@@ -294,7 +292,7 @@ def causes_of(campaign: Campaign, recordings: Sequence[FrfRecording], levels: Le
             continue
         assert isinstance(model, FrfModel)
         if not any(parameter.moves_covariance for parameter in model.parameters):
-            relative = np.abs([changed[levels.number] / value for changed in model.values(_drawn(model, start))])
+            relative = np.abs([changed[levels.index] / value for changed in model.values(_drawn(model, start))])
             change = np.log(np.maximum(relative, _LEAST_RATIO))
             laws.append(change.T / len(change) ** 0.5)
     smooth_sizes = [smooth_size for smooth_size in SMOOTH_SIZES if smooth_size > 0]

@@ -107,14 +107,14 @@ def _off_by_1000(recordings: list[FrfRecording], ratio: Floats) -> tuple[Mask, l
         return off, findings
     usual = float(np.nanmedian(np.abs(ratio)))
     slip = np.log(np.abs(ratio) / usual) if usual > 0 else np.full(len(ratio), np.nan)
-    for number in np.flatnonzero(np.isfinite(slip)):
+    for index in np.flatnonzero(np.isfinite(slip)):
         for factor in _UNIT_FACTORS:
-            if abs(slip[number] - np.log(factor)) < _FACTOR_WIDTH:
+            if abs(slip[index] - np.log(factor)) < _FACTOR_WIDTH:
                 arguments = {"too_large": factor > 1}
                 findings.append(
-                    Finding(Reason.RESPONSE_BESIDE_OTHERS, recordings[number].id, "frf_re_pc_per_n", arguments)
+                    Finding(Reason.RESPONSE_BESIDE_OTHERS, recordings[index].id, "frf_re_pc_per_n", arguments)
                 )
-                off[number] = True
+                off[index] = True
     return off, findings
 
 

@@ -32,14 +32,14 @@ def no_response(aligned: Sequence[Complexes]) -> tuple[Mask, Floats]:
     `aligned` holds the lines of each recording (lines,) [C/N] without the common delay (see `levels`).
     """
     unresponsive, variance = np.zeros(len(aligned), dtype=bool), np.zeros(len(aligned))
-    for number, values in enumerate(aligned):
+    for index, values in enumerate(aligned):
         lines = values[np.isfinite(values)]
         if len(lines) < _LEAST_LINES:
             continue
         noise = float(np.median(np.abs(np.diff(lines)) ** 2)) / (2 * np.log(2.0))
-        variance[number] = noise / len(lines)
-        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[number]
-        unresponsive[number] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
+        variance[index] = noise / len(lines)
+        small_mean = float(np.abs(lines.mean()) ** 2) < _MEAN * variance[index]
+        unresponsive[index] = small_mean and float(np.mean(np.abs(lines) ** 2)) < _LINES * noise
     return unresponsive, variance
 
 
@@ -73,8 +73,8 @@ def dead(
             continue
         missing &= ~of_sensor | (expected > _PLAIN * expected.max())
         findings += [
-            Finding(Reason.SILENT_RECORDING, recordings[number].id, "frf_re_pc_per_n")
-            for number in np.flatnonzero(missing & of_sensor).tolist()
+            Finding(Reason.SILENT_RECORDING, recordings[index].id, "frf_re_pc_per_n")
+            for index in np.flatnonzero(missing & of_sensor).tolist()
         ]
     return missing, findings
 

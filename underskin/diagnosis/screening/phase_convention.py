@@ -68,7 +68,7 @@ def log_frf_bands(recordings: Sequence[FrfRecording]) -> LogFrfBands:
     followed = np.zeros(value.shape, dtype=bool)
     share, noises = np.full((len(recordings), _BANDS), np.nan), np.full(len(recordings), np.nan)
     rough: list[tuple[Indices, Floats]] = []
-    for number, frf in enumerate(measured):
+    for index, frf in enumerate(measured):
         frequency, lines = _usable(frf)
         if len(lines) < _LEAST_LINES:
             continue
@@ -79,15 +79,15 @@ def log_frf_bands(recordings: Sequence[FrfRecording]) -> LogFrfBands:
             continue
         band = np.clip(np.searchsorted(edges, frequency) - 1, 0, _BANDS - 1)
         rough += [(part, second / noise) for part in (band[:-2], band[1:-1], band[2:])]
-        followed[number] = np.arange(_BANDS) < _lost(logarithm, band, noise)
+        followed[index] = np.arange(_BANDS) < _lost(logarithm, band, noise)
         count = np.bincount(band, minlength=_BANDS)
         with np.errstate(invalid="ignore", divide="ignore"):
             real, imaginary = (
                 np.bincount(band, weights=part, minlength=_BANDS) / count for part in (logarithm.real, logarithm.imag)
             )
-            share[number] = 1 / np.sqrt(count)
-        value[number] = real - np.nanmean(real) + 1j * imaginary
-        noises[number] = noise
+            share[index] = 1 / np.sqrt(count)
+        value[index] = real - np.nanmean(real) + 1j * imaginary
+        noises[index] = noise
     if rough:
         noises = np.maximum(noises, np.nanmedian(noises))
     return LogFrfBands(np.sqrt(edges[1:] * edges[:-1]), value, noises[:, None] * share * _unevenness(rough), followed)

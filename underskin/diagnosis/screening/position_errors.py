@@ -42,7 +42,7 @@ def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[M
             shared.append(Finding(Reason.PLACES, "", "position_mm", {**slip, "sensors_in": sensors_unit}))
             continue
         single += [
-            Finding(Reason.PLACE, recordings[number].id, "position_mm", slip) for number in np.flatnonzero(off).tolist()
+            Finding(Reason.PLACE, recordings[index].id, "position_mm", slip) for index in np.flatnonzero(off).tolist()
         ]
         mask |= off
     return mask, single, shared

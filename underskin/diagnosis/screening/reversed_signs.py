@@ -48,7 +48,7 @@ def signs_of(recordings: Sequence[FrfRecording], turned: Floats, usable: Mask) -
     if not negative.any() or not (few or _plain(turned, negative, positive)):
         return Signs(signs, findings)
     signs[negative] *= -1.0
-    ids = [recordings[number].id for number in np.flatnonzero(negative).tolist()]
+    ids = [recordings[index].id for index in np.flatnonzero(negative).tolist()]
     if len(ids) <= _LISTED:
         findings += [Finding(Reason.RECORDING_REVERSED, name, "frf_re_pc_per_n") for name in ids]
         return Signs(signs, findings)

@@ -33,14 +33,14 @@ class OutlyingSensor:
 
 def outlying_sensor(levels: Levels) -> OutlyingSensor | None:
     """The sensor whose gain differs most from the others', None where none is significant."""
-    numbers = np.unique(levels.sensor).tolist()
-    if len(numbers) < _LEAST_SENSORS:
+    sensors = np.unique(levels.sensor).tolist()
+    if len(sensors) < _LEAST_SENSORS:
         return None
     base = levels.fit(levels.value)
-    outlier = max(numbers, key=lambda number: _plainness(base, levels, number))
+    outlier = max(sensors, key=lambda sensor: _plainness(base, levels, sensor))
     column = (levels.sensor == outlier).astype(float)
     fit = levels.fit(levels.value, _AMPLITUDE * column[:, None])
-    gain = fit.evidence - base.evidence - _COST * log(len(numbers))
+    gain = fit.evidence - base.evidence - _COST * log(len(sensors))
     if gain < _GAIN:
         return None
     amplitude, _ = fit.amplitude(levels.value, column)
@@ -56,7 +56,7 @@ def without_sensor_gain(
     recordings: Sequence[FrfRecording], levels: Levels, outlier: OutlyingSensor
 ) -> tuple[list[FrfRecording], Finding]:
     """The recordings with the sensor's gain removed, and the finding."""
-    first = int(levels.number[levels.sensor == outlier.sensor][0])
+    first = int(levels.index[levels.sensor == outlier.sensor][0])
     name = recordings[first].sensor
     scaled = [
         _times(recording, exp(-outlier.amplitude)) if recording.sensor == name else recording
@@ -71,8 +71,8 @@ def without_sensor_gain(
     return scaled, Finding(reason, "", "frf_re_pc_per_n", arguments)
 
 
-def _plainness(base: LevelFit, levels: Levels, number: int) -> float:
-    amplitude, deviation = base.amplitude(levels.value, (levels.sensor == number).astype(float))
+def _plainness(base: LevelFit, levels: Levels, sensor: int) -> float:
+    amplitude, deviation = base.amplitude(levels.value, (levels.sensor == sensor).astype(float))
     return abs(amplitude) / deviation
 
 

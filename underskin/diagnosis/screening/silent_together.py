@@ -23,9 +23,9 @@ def without_silent_pair(recordings: Sequence[FrfRecording]) -> tuple[list[FrfRec
     since = _silent_since(recordings)
     if not since:
         return list(recordings), []
-    first, second = sorted({recordings[number].sensor for number in since})
+    first, second = sorted({recordings[index].sensor for index in since})
     arguments = {"first": first, "second": second, "since": recordings[since[0]].id, "recordings": len(since)}
-    remaining = [recording for number, recording in enumerate(recordings) if number not in since]
+    remaining = [recording for index, recording in enumerate(recordings) if index not in since]
     return remaining, [Finding(Reason.SILENT_TOGETHER, "", "sensor", arguments)]
 
 
@@ -36,12 +36,12 @@ def _silent_since(recordings: Sequence[FrfRecording]) -> list[int]:
     order = np.argsort(recording_order(recordings), kind="stable").tolist()
     falling = set[str]()
     for name in {recording.sensor for recording in recordings}:
-        answers = [bool(~silent[number]) for number in order if recordings[number].sensor == name]
+        answers = [bool(~silent[index]) for index in order if recordings[index].sensor == name]
         if answers[0] and not any(answers[-_FEWEST:]) and answers == sorted(answers, reverse=True):
             falling.add(name)
     if len(falling) != 2:
         return []
-    of_pair = [number for number in order if recordings[number].sensor in falling]
+    of_pair = [index for index in order if recordings[index].sensor in falling]
     since = of_pair[int((~silent[of_pair]).sum()) :]
-    others = [number for number in order[order.index(since[0]) :] if number not in of_pair]
+    others = [index for index in order[order.index(since[0]) :] if index not in of_pair]
     return since if silent[since].all() and others and not silent[others].any() else []

@@ -60,15 +60,15 @@ def within_tables(
         return inside, beyond, [none_inside, *_possible_unit_errors(subset, table)]
     stiffer = {"declared_mpa": skin.youngs_modulus_mpa, "factor": LARGEST_FACTOR}
     exclusions = [
-        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, recordings[number].id, "preload_n", stiffer)
-        if if_stiffer[number]
+        Finding(Reason.OUT_OF_TABLES_UNLESS_STIFFER, recordings[index].id, "preload_n", stiffer)
+        if if_stiffer[index]
         else Finding(
             Reason.OUT_OF_TABLES_DECLARED,
-            recordings[number].id,
+            recordings[index].id,
             "preload_n",
-            {"radius_mm": float(radius_mm[number]), "thickness_mm": skin.thickness_mm},
+            {"radius_mm": float(radius_mm[index]), "thickness_mm": skin.thickness_mm},
         )
-        for number in np.flatnonzero(~(inside | beyond))
+        for index in np.flatnonzero(~(inside | beyond))
     ]
     return inside, beyond, exclusions
 

@@ -56,9 +56,9 @@ def single_unit_errors(recordings: Sequence[FrfRecording]) -> tuple[Mask, list[F
                 continue
             corrected = values / factor
             plausible = far & (corrected > others.min() / _WITHIN) & (corrected < others.max() * _WITHIN)
-            for number in np.flatnonzero(plausible & ~off).tolist():
-                arguments = {"value": float(values[number]), "too_large": factor > 1, "given_in": unit}
-                findings.append(Finding(Reason.BESIDE_OTHERS, recordings[number].id, field.name, arguments))
+            for index in np.flatnonzero(plausible & ~off).tolist():
+                arguments = {"value": float(values[index]), "too_large": factor > 1, "given_in": unit}
+                findings.append(Finding(Reason.BESIDE_OTHERS, recordings[index].id, field.name, arguments))
             off |= plausible
     return off, findings
 

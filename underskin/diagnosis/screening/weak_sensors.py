@@ -23,9 +23,9 @@ def weak_sensors(recordings: Sequence[FrfRecording], levels: Levels) -> tuple[Ma
     """Which recordings are of weak sensors (recordings,), and the findings on these."""
     weak: Mask = np.zeros(len(recordings), dtype=bool)
     findings = []
-    numbers = np.unique(levels.sensor)
-    for number in numbers:
-        of_sensor = levels.sensor == number
+    sensors = np.unique(levels.sensor)
+    for sensor in sensors:
+        of_sensor = levels.sensor == sensor
         others = levels.value[~of_sensor]
         if len(others) < 2:
             continue
@@ -34,7 +34,7 @@ def weak_sensors(recordings: Sequence[FrfRecording], levels: Levels) -> tuple[Ma
         gap = usual - levels.value[of_sensor]
         if np.median(gap) < max(_LEAST_GAP, _SCATTERS * scatter) or gap.min() < 0.6 * _LEAST_GAP:
             continue
-        name = recordings[levels.number[of_sensor][0]].sensor
+        name = recordings[levels.index[of_sensor][0]].sensor
         sensor_recordings = np.array([recording.sensor == name for recording in recordings])
         weak |= sensor_recordings
         arguments = {
@@ -43,6 +43,6 @@ def weak_sensors(recordings: Sequence[FrfRecording], levels: Levels) -> tuple[Ma
             "recordings": int(sensor_recordings.sum()),
         }
         findings.append(Finding(Reason.WEAK_SENSOR, "", "frf_re_pc_per_n", arguments))
-    if len(findings) > max(1.0, _MOST * len(numbers)):
+    if len(findings) > max(1.0, _MOST * len(sensors)):
         return np.zeros(len(recordings), dtype=bool), []
     return weak, findings

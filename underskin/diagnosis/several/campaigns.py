@@ -86,19 +86,19 @@ def _report(
 ) -> dict[str, Any]:
     """The report on campaigns with FRFs in their order, with the curves of others; of a single usable one its own."""
     ordered, results = list[Campaign](), list[DiagnosisResult]()
-    for number, campaign in enumerate(with_frf):
+    for index, campaign in enumerate(with_frf):
         counted = any(result.search is not None for result in results)
         ordered.append(campaign if counted else with_curves(campaign, of_curves))
         results.append(diagnose(ordered[-1], table, without=without))
-        progress((number + 1) / (len(with_frf) + 1))
+        progress((index + 1) / (len(with_frf) + 1))
     outliers = [_outlying_sensors(result) for result in results]
     results = _with_changed_sensors(ordered, results, outliers, table, without)
     reports = [reported(result) for result in results]
-    usable = [number for number, result in enumerate(results) if result.search is not None]
+    usable = [index for index, result in enumerate(results) if result.search is not None]
     if len(usable) < 2:
-        lacking = (report.document for number, report in enumerate(reports) if number not in usable)
+        lacking = (report.document for index, report in enumerate(reports) if index not in usable)
         return next(lacking, reports[0].document)
-    dated = CampaignDates([ordered[number].name for number in usable], [date_of(ordered[number]) for number in usable])
+    dated = CampaignDates([ordered[index].name for index in usable], [date_of(ordered[index]) for index in usable])
     return together_report(name, ordered, results, reports, usable, dated, outliers, table)
 
 
@@ -114,8 +114,8 @@ def _with_changed_sensors(
     sensors = [_sensors(campaign, result, table) for campaign, result in zip(campaigns, results, strict=True)]
     single = changes(sensors, outliers, [0.0] * len(sensors), np.arange(len(sensors), dtype=float))
     again = []
-    for number, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
-        as_before = corrected(campaign, single, number)
+    for index, (campaign, result) in enumerate(zip(campaigns, results, strict=True)):
+        as_before = corrected(campaign, single, index)
         again.append(result if as_before is campaign else diagnose(as_before, table, without=without))
     return again
 
@@ -201,10 +201,10 @@ def _check(with_frf: Sequence[Campaign], of_curves: Sequence[Campaign]) -> None:
         if names.count(campaign.name) > 1:
             raise InvalidInput("campaigns", campaign.name, "must each have a name of its own")
     first = campaigns[0].skin
-    for number, campaign in enumerate(campaigns):
+    for index, campaign in enumerate(campaigns):
         for field in ("thickness_mm", "youngs_modulus_mpa", "sensor_radius_mm", "poisson_ratio"):
             here, there = getattr(first, field), getattr(campaign.skin, field)
-            if there is None and number >= len(with_frf):
+            if there is None and index >= len(with_frf):
                 continue  # which curves do not need
             if here != there and not (here and there and math.isclose(here, there, rel_tol=1e-9)):
                 allowed = f"must be {here:g}, as {campaigns[0].name} has it: they are to be of one skin"

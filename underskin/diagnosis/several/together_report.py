@@ -190,16 +190,16 @@ def _runs_of_dates(states: Sequence[Fault | str | None]) -> list[_Run]:
     runs: list[_Run] = []
     before: int | None = None
     current: _Run | None = None
-    for number, state in enumerate(states):
+    for index, state in enumerate(states):
         if state == _NOT_RECORDED:
             continue
         if isinstance(state, Fault):
-            current = current or _Run(state, number, before, None)
+            current = current or _Run(state, index, before, None)
             continue
         if current is not None:
-            runs.append(_Run(current.fault, current.first, current.before, number))
+            runs.append(_Run(current.fault, current.first, current.before, index))
             current = None
-        before = number
+        before = index
     return runs if current is None else [*runs, current]
 
 
@@ -256,7 +256,7 @@ def change_in_words(change: Change, dated: CampaignDates) -> str:
         return f"{both} look exchanged since {dated.called(change.since)}: each has the d33 that the other had"
     whose = "of the array" if change.sensor is None else f"of sensor {change.sensor}, beyond the others,"
     way = "fell" if change.value < 0 else "rose"
-    before, after = (dated.called(number) for number in (change.before, change.until))
+    before, after = (dated.called(index) for index in (change.before, change.until))
     half = SDS_OF_95 * change.uncertainty
     low, high = sorted(abs(100 * (change.value + end * half)) for end in (-1, 1))
     size = f"{abs(100 * change.value):.3g} % ({low:.3g} to {high:.3g})"
@@ -405,9 +405,9 @@ def _of_array(over: ArrayOverDates | None, names: Sequence[str]) -> dict[str, An
     columns = ("value", "low", "high")
     return {
         "per_campaign": [
-            {"campaign": names[number], "unit": "pC/N"}
+            {"campaign": names[index], "unit": "pC/N"}
             | {name: rounded(float(at)) for name, at in zip(columns, row, strict=True)}
-            for number, row in zip(over.numbers, ends, strict=True)
+            for index, row in zip(over.numbers, ends, strict=True)
         ]
     }
 
@@ -419,23 +419,23 @@ def _strengths(candidates: Sequence[Candidate], leader: Course) -> list[dict[str
         for run in _runs(candidates, leader, mechanism):
             shared = list(run.values())
             pooled = values(shared[0].parameters, combined(shared)[0]) if len(shared[0].mean) else {}
-            for number in run:
-                strengths[number][mechanism] = pooled
+            for index in run:
+                strengths[index][mechanism] = pooled
     return strengths
 
 
 def _runs(candidates: Sequence[Candidate], leader: Course, mechanism: str) -> list[dict[int, Shared]]:
     """The campaigns in which a mechanism acts, by index, grouped by equal strength."""
     runs: list[dict[int, Shared]] = []
-    for number, (candidate, names) in enumerate(zip(candidates, leader.sets, strict=True)):
+    for index, (candidate, names) in enumerate(zip(candidates, leader.sets, strict=True)):
         fit = candidate.explained(frozenset(names)) if mechanism in names else None
         if fit is None:
             continue
         shared = Shared.of(fit, [mechanism], skin=False)
         if runs and same_strength(next(reversed(runs[-1].values())), shared):
-            runs[-1][number] = shared
+            runs[-1][index] = shared
         else:
-            runs.append({number: shared})
+            runs.append({index: shared})
     return runs
 
 
@@ -477,15 +477,15 @@ def _mechanisms(
 
 def _shown_in(candidates: Sequence[Candidate], mechanism: str) -> list[int]:
     """Indices of the campaigns that could show a mechanism."""
-    return [number for number, candidate in enumerate(candidates) if mechanism not in candidate.search.unsupported]
+    return [index for index, candidate in enumerate(candidates) if mechanism not in candidate.search.unsupported]
 
 
 def _scope(where: Sequence[int], able: Sequence[int], dated: CampaignDates) -> dict[str, Any]:
     """The campaigns in which a mechanism acts; `since` if it acts in all that can show it from one date on, and in none
     before."""
-    from_on = list(where) == [number for number in able if number >= where[0]] and where[0] > min(able)
+    from_on = list(where) == [index for index in able if index >= where[0]] and where[0] > min(able)
     since = dated.since(where[0]) if from_on else None
-    return {"campaigns": [dated.names[number] for number in where], **({"since": since} if since else {})}
+    return {"campaigns": [dated.names[index] for index in where], **({"since": since} if since else {})}
 
 
 def _aged(changed: Sequence[Change], dated: CampaignDates) -> list[dict[str, Any]]:
