@@ -31,7 +31,7 @@ def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[M
 
     The mask holds the single ones only.
     """
-    sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
+    sensor_mm, contact_mm = _sensors_and_contacts(campaign, recordings)
     mask = np.zeros(len(recordings), dtype=bool)
     single, shared = [], []
     for factor, least, unit, sensors_unit in _UNIT_FACTORS:
@@ -50,14 +50,14 @@ def misplaced(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[M
 
 def at_sensors(campaign: Campaign, recordings: Sequence[FrfRecording]) -> list[Finding]:
     """Positions that differ from their sensors' by some µm at most: an offset series in m."""
-    sensor_mm, contact_mm = _sensors_and_places(campaign, recordings)
+    sensor_mm, contact_mm = _sensors_and_contacts(campaign, recordings)
     farthest = float(np.hypot(*(contact_mm - sensor_mm).T).max())
     if not _AT_SENSORS_MM[0] < farthest < _AT_SENSORS_MM[1]:
         return []
     return [Finding(Reason.PLACES_AT_SENSORS, "", "position_mm", {"farthest_mm": farthest})]
 
 
-def _sensors_and_places(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Floats, Floats]:
+def _sensors_and_contacts(campaign: Campaign, recordings: Sequence[FrfRecording]) -> tuple[Floats, Floats]:
     """Positions of each recording's sensor and contact [mm], (recordings, 2) each."""
     positions = {sensor.id: (sensor.x_mm, sensor.y_mm) for sensor in campaign.skin.sensors}
     sensor_mm: Floats = np.array([positions[recording.sensor] for recording in recordings]).reshape(-1, 2)
