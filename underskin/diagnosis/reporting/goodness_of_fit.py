@@ -53,7 +53,7 @@ def explains_percent(
     rest = tuple(other for other in explanation.names if other != name)
     fitted = [candidate for candidate in (*search.explanations, *search.laws) if candidate.names == rest]
     without = fitted[0] if fitted else problem.explain([Request(rest)])[0]
-    assert without is not None  # alone, nothing is left out
+    assert without is not None  # a single request is never pruned
     base = next(candidate for candidate in search.explanations if not candidate.names)
     noise = score.noise / score.size
     misfit_of_base, misfit_without = (_relative_square(problem, candidate) - noise for candidate in (base, without))
